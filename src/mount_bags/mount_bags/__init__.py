@@ -1,0 +1,1 @@
+"""Recording, reading and auditing of drives in rosbag2 MCAP bags."""

@@ -1,0 +1,1 @@
+"""Launch files, configuration, supervisor and the engine-mount command."""

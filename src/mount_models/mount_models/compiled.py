@@ -1,0 +1,52 @@
+"""Compile a law to machine code once per change of its source, and keep the result on disk.
+
+numba's own cache watches only the file of the compiled function: after a change in a law that
+this function calls, it would go on running the old law without a word. Here the folder of the
+cache carries a digest of all sources of the function's package and of `mount_models`, which every
+package may call, so a change anywhere leads to a new folder.
+"""
+
+import functools
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar('F', bound=Callable[..., Any])
+
+_MODELS = Path(__file__).resolve().parent
+
+
+def compiled(function: F) -> F:
+    """Return `function` compiled by numba on its first call and cached on disk."""
+    package = _package_folder(Path(function.__code__.co_filename).resolve())
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(_cache_root() / _sources_digest(package))
+    try:
+        return numba.njit(cache=True, error_model='numpy')(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def _package_folder(file: Path) -> Path:
+    folder = file.parent
+    while (folder.parent / '__init__.py').exists():
+        folder = folder.parent
+    return folder
+
+
+@functools.cache
+def _sources_digest(package: Path) -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for folder in sorted({package, _MODELS}):
+        for source in sorted(folder.rglob('*.py')):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_root() -> Path:
+    base = os.environ.get('XDG_CACHE_HOME') or str(Path.home() / '.cache')
+    return Path(base) / 'engine_mount' / 'compiled'

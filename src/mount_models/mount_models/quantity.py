@@ -1,0 +1,79 @@
+"""Parameters that are born complete: value, unit, sentence, range and source in one place.
+
+A parameter set is a `typing.NamedTuple`, which is immutable, readable by name and understood by
+compiled code. Each field is declared as ``Annotated[float, Quantity(unit, meaning, low, high,
+source)] = default``.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar, get_type_hints
+
+P = TypeVar('P', bound=NamedTuple)
+
+
+class ParameterError(ValueError):
+    """A parameter is missing, of the wrong kind or outside its range; the text says which and the remedy."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a number means: unit, one sentence, allowed range (inclusive) and where it comes from."""
+
+    unit: str
+    meaning: str
+    low: float = -math.inf
+    high: float = math.inf
+    source: str = 'chosen'
+
+
+def quantities(parameters: type[P] | P) -> dict[str, Quantity]:
+    """Return the `Quantity` of every annotated field, by name."""
+    kind = parameters if isinstance(parameters, type) else type(parameters)
+    hints = get_type_hints(kind, include_extras=True)
+    return {
+        name: note
+        for name, hint in hints.items()
+        for note in getattr(hint, '__metadata__', ())
+        if isinstance(note, Quantity)
+    }
+
+
+def checked(parameters: P) -> P:
+    """Return `parameters` with every field in its declared type, or raise `ParameterError`."""
+    hints = get_type_hints(type(parameters))
+    notes = quantities(parameters)
+    values = {}
+    for name, value in parameters._asdict().items():
+        values[name] = _checked_value(name, value, hints[name], notes.get(name))
+    return type(parameters)(**values)
+
+
+def with_values(parameters: P, **changes: Any) -> P:
+    """Return a checked copy of `parameters` with some fields changed; an unknown name is refused."""
+    unknown = sorted(set(changes) - set(parameters._fields))
+    if unknown:
+        raise ParameterError(
+            f'{unknown[0]} is no parameter of {type(parameters).__name__}; '
+            f'known are {", ".join(parameters._fields)}'
+        )
+    return checked(parameters._replace(**changes))
+
+
+def _checked_value(name: str, value: Any, kind: Any, quantity: Quantity | None) -> Any:
+    if kind not in (float, int, bool):
+        return value
+    if kind is bool:
+        if not isinstance(value, bool):
+            raise ParameterError(f'{name} must be true or false; instead received {value!r}')
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ParameterError(f'{name} must be a number; instead received {value!r}')
+    if kind is int and int(value) != value:
+        raise ParameterError(f'{name} must be a whole number; instead received {value!r}')
+    if quantity is not None and not quantity.low <= value <= quantity.high:
+        raise ParameterError(
+            f'{name} ({value:g} {quantity.unit}) must lie within '
+            f'{quantity.low:g} .. {quantity.high:g} {quantity.unit}: {quantity.meaning}'
+        )
+    return kind(value)
