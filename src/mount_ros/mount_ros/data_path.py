@@ -1,0 +1,75 @@
+"""The 1 kHz path of a node: a plain node of its own on an EventsExecutor in a thread of its own.
+
+While a lifecycle transition runs, the executor of its node serves nothing else. So the data path has
+its own node `<name>_io` and goes on receiving during a blocking activation.
+"""
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rosidl_runtime_py.utilities import get_message
+
+from mount_ros.qos import control_qos, publisher_qos, recording_qos
+from mount_ros.topics import Topic
+
+_SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
+
+
+class DataPath:
+    """Publishers and raw subscriptions of a node, served by one thread from `start` to `stop`."""
+
+    def __init__(self, owner: Node, *, lockstep: bool = False):
+        self.lockstep = lockstep
+        self.node = Node(
+            f'{owner.get_name()}_io',
+            namespace=owner.get_namespace(),
+            context=owner.context,
+            use_global_arguments=False,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        self._context: Context = owner.context
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+
+    def publisher(self, topic: Topic) -> Publisher:
+        """Create a publisher of `topic`; publish messages or their serialised bytes with it."""
+        return self.node.create_publisher(get_message(topic.type), topic.name, publisher_qos(topic))
+
+    def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
+        """Call `callback` with the serialised bytes of each message of `topic`."""
+        self._subscribe(topic, callback, control_qos(topic, lockstep=self.lockstep))
+
+    def subscribe_all(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
+        """Like `subscribe`, with the deep reliable queue of a recorder."""
+        self._subscribe(topic, callback, recording_qos(topic))
+
+    def start(self) -> None:
+        """Begin to serve the subscriptions."""
+        self._ending.clear()
+        self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and destroy the node; safe to call twice."""
+        self._ending.set()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join()
+            self._thread = None
+            self.node.destroy_node()
+
+    def _subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: Any) -> None:
+        self.node.create_subscription(get_message(topic.type), topic.name, callback, qos, raw=True)
+
+    def _serve(self) -> None:
+        executor = EventsExecutor(context=self._context)
+        executor.add_node(self.node)
+        # spin() of this executor dispatches nothing in the pinned wheels; spin_once does.
+        while not self._ending.is_set() and self._context.ok():
+            executor.spin_once(_SPIN_PERIOD)
+        executor.remove_node(self.node)

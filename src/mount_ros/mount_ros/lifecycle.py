@@ -1,0 +1,136 @@
+"""A lifecycle node that fails closed: every error ends in the safe state, with a sentence that says why."""
+
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+from mount_ros.data_path import DataPath
+from mount_ros.diagnostics import Diagnostics, Level, Verdict
+
+
+class SafeLifecycleNode(LifecycleNode):
+    """Base of all nodes of the graph.
+
+    A node overrides `configure`, `activate`, `deactivate`, `cleanup` and `judge`; it raises an
+    exception with a clear sentence where a step cannot be done. `deactivate` must leave the coil at
+    0 A and is called on every way out of the active state.
+    """
+
+    def __init__(self, name: str, **arguments):
+        super().__init__(name, **arguments)
+        self.declare_parameter('lockstep', False)
+        self.data_path: DataPath | None = None
+        self._active = False
+        self._refusal = ''
+        self._diagnostics = Diagnostics(self, self._present_verdict)
+
+    # What a node fills in.
+
+    def configure(self) -> None:
+        """Read and check the parameters, create what needs them."""
+
+    def activate(self) -> None:
+        """Begin to work."""
+
+    def deactivate(self) -> None:
+        """Stop working and leave 0 A behind."""
+
+    def cleanup(self) -> None:
+        """Release what `configure` made."""
+
+    def judge(self) -> Verdict:
+        """Return the verdict on the active node; must be quick and must not block."""
+        return Verdict(Level.OK, 'active')
+
+    # State.
+
+    @property
+    def active(self) -> bool:
+        """Whether the node is in its active state."""
+        return self._active
+
+    @property
+    def lockstep(self) -> bool:
+        """Whether time stands in the stamps alone."""
+        return bool(self.get_parameter('lockstep').value)
+
+    def open_data_path(self) -> DataPath:
+        """Create the data path of this node; the node starts it when all subscriptions stand."""
+        self.data_path = DataPath(self, lockstep=self.lockstep)
+        return self.data_path
+
+    def close(self) -> None:
+        """Leave the active state and release everything; called once at the end of the process."""
+        if self._active:
+            self._leave_active()
+        self._release()
+
+    # Transitions.
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        return self._attempt('configure', self.configure, undo=self._release)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        outcome = self._attempt('activate', self.activate, undo=self.deactivate)
+        self._active = outcome == TransitionCallbackReturn.SUCCESS
+        return outcome
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._leave_active()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._release()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _LifecycleNodeMixin__change_state(self, transition_id):  # noqa: N802
+        # rclpy lets a transition that is not valid in the present state end the process with an
+        # exception; a node that drives a coil answers "no" and goes on.
+        try:
+            return super()._LifecycleNodeMixin__change_state(transition_id)  # type: ignore[misc]
+        except Exception as error:
+            self.get_logger().warning(f'transition {transition_id} refused: {error}')
+            return TransitionCallbackReturn.FAILURE
+
+    def _attempt(self, what, step, undo) -> TransitionCallbackReturn:
+        try:
+            step()
+        except Exception as error:
+            # The border of the node: whatever the reason, say it, be safe, stay alive.
+            known = isinstance(error, (ValueError, OSError))
+            self._refusal = str(error) if known else f'{type(error).__name__}: {error}'
+            self.get_logger().error(f'{what} failed: {self._refusal}')
+            self._diagnostics.publish(self._present_verdict())
+            self._make_safe(undo)
+            return TransitionCallbackReturn.FAILURE
+        self._refusal = ''
+        return TransitionCallbackReturn.SUCCESS
+
+    def _leave_active(self) -> None:
+        self._active = False
+        self._make_safe(self.deactivate)
+
+    def _release(self) -> None:
+        self._make_safe(self.cleanup)
+        if self.data_path is not None:
+            self.data_path.stop()
+            self.data_path = None
+
+    def _make_safe(self, step) -> None:
+        try:
+            step()
+        except Exception as error:
+            self.get_logger().error(f'{step.__name__} failed: {type(error).__name__}: {error}')
+
+    def _present_verdict(self) -> Verdict:
+        if self._refusal:
+            return Verdict(Level.ERROR, self._refusal)
+        if not self._active:
+            return Verdict(Level.OK, 'inactive')
+        return self.judge()

@@ -1,0 +1,207 @@
+"""The one declaration of every topic: name, type, delivery, rate, and the scalars that it carries.
+
+Names are relative, so that several mounts live in one car under namespaces. SI units everywhere.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+SAMPLE_RATE = 1000.0  # Hz, chosen: the electronics' measurement rate
+
+
+class Delivery(Enum):
+    """How a topic travels; `mount_ros.qos` turns it into a quality of service."""
+
+    STREAM = 'stream'  # 1 kHz data: reliable publisher, keep last
+    LATCHED = 'latched'  # reliable, transient local: late subscribers get the last one
+    MARK = 'mark'  # occasional and never to be lost: reliable, keep last
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """One named number of a `JointState`: unit of its position, and of its velocity where it has one."""
+
+    name: str
+    unit: str
+    derivative_unit: str = ''
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of the graph; `rate` is in Hz, 0 for topics without a rate of their own."""
+
+    name: str
+    type: str
+    delivery: Delivery
+    rate: float
+    content: str
+    scalars: tuple[Scalar, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the scalars in the order of the message."""
+        return tuple(scalar.name for scalar in self.scalars)
+
+    @property
+    def has_derivatives(self) -> bool:
+        """Whether the message fills `velocity`."""
+        return any(scalar.derivative_unit for scalar in self.scalars)
+
+
+DISPLACEMENT = Topic(
+    'displacement',
+    JOINT_STATE,
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    'displacement of the mount, engine minus chassis; NaN where the sensor says that it is invalid',
+    (Scalar('mount', 'm'),),
+)
+
+COIL_RIPPLE = Topic(
+    'coil_ripple',
+    JOINT_STATE,
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    'mean coil current, and the slopes of current and flux density 18 us after switching',
+    (Scalar('coil_current', 'A', 'A/s'), Scalar('flux_density', 'T', 'T/s')),
+)
+
+CURRENT_SETPOINT = Topic(
+    'current_setpoint',
+    JOINT_STATE,
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    'wanted coil current; its stamp is that of the displacement sample that it answers',
+    (Scalar('coil_current', 'A'),),
+)
+
+AIR_GAP = Topic(
+    'air_gap',
+    JOINT_STATE,
+    Delivery.LATCHED,
+    0.0,
+    'result of the initialisation; its stamp names the activation',
+    (
+        Scalar('rest_gap', 'm'),
+        Scalar('contact_gap', 'm'),
+        Scalar('rest_gap_std', 'm'),
+        Scalar('contact_gap_std', 'm'),
+        Scalar('contact_force', 'N'),
+        Scalar('offset_current', 'A'),
+    ),
+)
+
+CURRENT_FORCE_TABLE = Topic(
+    'current_force_table',
+    'std_msgs/msg/Float64MultiArray',
+    Delivery.LATCHED,
+    0.0,
+    '2 x N, rows `current` (A) and `normal_force` (N); the column label carries the stamp of its air_gap',
+)
+
+CONTROL_TRACE = Topic(
+    'control_trace',
+    JOINT_STATE,
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    'every intermediate of one control step',
+    (
+        Scalar('displacement', 'm'),
+        Scalar('velocity', 'm/s'),
+        Scalar('band_displacement', 'm'),
+        Scalar('band_velocity', 'm/s'),
+        Scalar('predicted_velocity', 'm/s'),
+        Scalar('magnitude', 'm'),
+        Scalar('damping_active', '1'),
+        Scalar('desired_force', 'N'),
+        Scalar('friction_deflection', 'm'),
+        Scalar('friction_coefficient', '1'),
+        Scalar('normal_force', 'N'),
+        Scalar('current', 'A'),
+        Scalar('bridged_samples', '1'),
+    ),
+)
+
+DIAGNOSTICS = Topic(
+    '/diagnostics',
+    'diagnostic_msgs/msg/DiagnosticArray',
+    Delivery.MARK,
+    0.0,
+    'state of each node: level and a sentence with value, limit and remedy',
+)
+
+SESSION = Topic(
+    'session',
+    'std_msgs/msg/String',
+    Delivery.LATCHED,
+    0.0,
+    'what this recording is, YAML: scenario, all parameters, versions',
+)
+
+EVENT = Topic('event', 'std_msgs/msg/String', Delivery.MARK, 0.0, 'something worth finding again, YAML')
+
+SIM_TRUTH = Topic(
+    'sim/truth',
+    JOINT_STATE,
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    'what no sensor sees; only the simulator has it',
+    (
+        Scalar('displacement', 'm'),
+        Scalar('velocity', 'm/s'),
+        Scalar('coil_current', 'A'),
+        Scalar('current_setpoint', 'A'),
+        Scalar('gap', 'm'),
+        Scalar('flux_density', 'T'),
+        Scalar('normal_force', 'N'),
+        Scalar('friction_force', 'N'),
+        Scalar('mount_force', 'N'),
+        Scalar('road_height', 'm'),
+        Scalar('engine_displacement', 'm'),
+        Scalar('chassis_displacement', 'm'),
+        Scalar('chassis_acceleration', 'm/s^2'),
+        Scalar('rest_gap', 'm'),
+        Scalar('contact_gap', 'm'),
+        Scalar('setpoint_latency', 's'),
+    ),
+)
+
+SIM_CHASSIS_ACCELERATION = Topic(
+    'sim/chassis_acceleration',
+    'sensor_msgs/msg/Imu',
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    "the test rack's accelerometer at the chassis side: linear_acceleration.z, upwards, m/s^2",
+)
+
+SIM_MOUNT_FORCE = Topic(
+    'sim/mount_force',
+    'geometry_msgs/msg/WrenchStamped',
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    "the test rack's load cell: wrench.force.z, force of the mount on the chassis, N",
+)
+
+TOPICS: tuple[Topic, ...] = (
+    DISPLACEMENT,
+    COIL_RIPPLE,
+    CURRENT_SETPOINT,
+    AIR_GAP,
+    CURRENT_FORCE_TABLE,
+    CONTROL_TRACE,
+    DIAGNOSTICS,
+    SESSION,
+    EVENT,
+    SIM_TRUTH,
+    SIM_CHASSIS_ACCELERATION,
+    SIM_MOUNT_FORCE,
+)
+
+
+def topic(name: str) -> Topic:
+    """Return the topic of this relative name, or raise `KeyError` with the known names."""
+    for candidate in TOPICS:
+        if candidate.name == name:
+            return candidate
+    raise KeyError(f'{name!r} is no topic of the graph; known are {", ".join(t.name for t in TOPICS)}')
