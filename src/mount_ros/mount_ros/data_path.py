@@ -12,8 +12,8 @@ from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rosidl_runtime_py.utilities import get_message
 
+from mount_ros.message_types import message_class
 from mount_ros.qos import control_qos, publisher_qos, recording_qos
 from mount_ros.topics import Topic
 
@@ -39,7 +39,7 @@ class DataPath:
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create a publisher of `topic`; publish messages or their serialised bytes with it."""
-        return self.node.create_publisher(get_message(topic.type), topic.name, publisher_qos(topic))
+        return self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`."""
@@ -64,7 +64,7 @@ class DataPath:
             self.node.destroy_node()
 
     def _subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: Any) -> None:
-        self.node.create_subscription(get_message(topic.type), topic.name, callback, qos, raw=True)
+        self.node.create_subscription(message_class(topic.type), topic.name, callback, qos, raw=True)
 
     def _serve(self) -> None:
         executor = EventsExecutor(context=self._context)

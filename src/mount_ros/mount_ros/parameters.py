@@ -26,7 +26,7 @@ def read(node: Node, defaults: P, prefix: str = '') -> P:
         name: node.get_parameter(_full_name(prefix, name)).value for name in defaults._fields
     }
     try:
-        return checked(type(defaults)(**values))
+        return checked(defaults._replace(**values))
     except ParameterError as error:
         raise ParameterError(f'{node.get_name()}: {prefix + "." if prefix else ""}{error}') from None
 
