@@ -1,0 +1,225 @@
+"""The current-force law of the actuator as the controller knows it, and its inverse (Eqs 3, 4, Table 1)."""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mount_models.compiled import compiled
+from mount_models.quantity import Quantity
+
+_POLYNOMIAL = 'polynomial coefficients in powers of the gap in micrometres, lowest power first'
+
+
+class OutsideLaw(ValueError):
+    """A force law was asked for something that it was never fitted to; the text says what and the remedy."""
+
+
+class GapOutsideLaw(OutsideLaw):
+    """The air gap lies outside the guarded range of the force law."""
+
+
+class CurrentOutsideLaw(OutsideLaw):
+    """The coil current lies outside the guarded range of the force law."""
+
+
+class ForceOutsideLaw(OutsideLaw):
+    """No current within the guarded range gives this force at this air gap."""
+
+
+class ForceLaw(NamedTuple):
+    """Eq (3) with Eq (4): F = (a1 + a2 i) [atan(a3 a4) + atan(a3 (i - a4))] + a5 i^2 [atan(a3 a4) - atan(...)].
+
+    Inside the polynomials the gap is in micrometres, as in Table 1; every argument and result is SI.
+    The law is meaningful only between `gap_low` and `gap_high` and from 0 to `current_high`.
+    """
+
+    a1: Annotated[tuple[float, ...], Quantity('N', f'offset of the saturated line: {_POLYNOMIAL}')]
+    a2: Annotated[tuple[float, ...], Quantity('N/A', f'slope of the saturated line: {_POLYNOMIAL}')]
+    a3: Annotated[tuple[float, ...], Quantity('1/A', f'sharpness of the knee: {_POLYNOMIAL}')]
+    a4: Annotated[tuple[float, ...], Quantity('A', f'current at the knee: {_POLYNOMIAL}')]
+    a5: Annotated[tuple[float, ...], Quantity('N/A^2', f'curvature of the parabola: {_POLYNOMIAL}')]
+    gap_low: Annotated[float, Quantity('m', 'smallest guarded air gap', 1e-6, 5e-3)]
+    gap_high: Annotated[float, Quantity('m', 'largest guarded air gap', 1e-6, 5e-3)]
+    current_high: Annotated[float, Quantity('A', 'largest guarded coil current', 0.1, 20.0)]
+
+
+TABLE_1 = ForceLaw(
+    a1=(70.2, -0.157, 5.84e-4, -9.77e-7),
+    a2=(77.2, -0.305, 5.28e-4, -2.58e-7),
+    a3=(20.7, -0.11, 2.3e-4, -1.59e-7),
+    a4=(-8.9e-3, 4.6e-3),
+    a5=(354.0, -2.21, 5e-3, -3.85e-6),
+    gap_low=200e-6,
+    gap_high=520e-6,
+    current_high=3.0,
+)
+"""The authors' prototype as printed in Table 1; the guarded range lies well within the hard limits."""
+
+TABLE_1_HARD_LIMITS = (148e-6, 546e-6)
+"""Gaps (m) beyond which Table 1 stops rising with current or falling with gap somewhere in 0 .. 3 A (derived)."""
+
+
+@compiled
+def force(law, current, gap):
+    """Return the magnetic force (N) at `current` (A) and `gap` (m), Eq (3); NaN outside the guarded range."""
+    if not (_gap_inside(law, gap) and _current_inside(law, current)):
+        return math.nan
+    return _force_and_slope(_coefficients(law, gap), current)[0]
+
+
+@compiled
+def current_for_force(law, force, gap):
+    """Return the current (A) that gives `force` (N) at `gap` (m), to 1e-9 A; NaN where there is none.
+
+    Inverse of Eq (3), which has no closed form: Newton's steps, kept inside a shrinking bracket.
+    """
+    if not (_gap_inside(law, gap) and force >= 0.0):
+        return math.nan
+    if force == 0.0:
+        return 0.0
+    a = _coefficients(law, gap)
+    low, high = 0.0, law.current_high
+    highest_force = _force_and_slope(a, high)[0]
+    if not force <= highest_force * (1.0 + _ROUNDING):
+        return math.nan
+    current = high * math.sqrt(force / highest_force)
+    for _ in range(_MOST_STEPS):
+        reached, slope = _force_and_slope(a, current)
+        if reached > force:
+            high = current
+        else:
+            low = current
+        following = current - (reached - force) / slope
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - current) < _CURRENT_RESOLUTION:
+            return following
+        current = following
+    return current
+
+
+def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return the magnetic force (N) for currents (A) and gaps (m) of any shapes that broadcast, Eq (3).
+
+    Raises `GapOutsideLaw` or `CurrentOutsideLaw`; nothing is ever extrapolated.
+    """
+    current, gap = np.broadcast_arrays(np.asarray(current, float), np.asarray(gap, float))
+    check_gap(law, gap)
+    _check_current(law, current)
+    return _each_force(law, current.ravel(), gap.ravel()).reshape(gap.shape)[()]
+
+
+def checked_current_for_force(
+    law: ForceLaw, force: npt.ArrayLike, gap: npt.ArrayLike
+) -> npt.NDArray[np.float64]:
+    """Return the current (A) for forces (N) and gaps (m) of any shapes that broadcast, inverse of Eq (3).
+
+    Raises `GapOutsideLaw`, or `ForceOutsideLaw` for a force that is negative or beyond `current_high`.
+    """
+    force, gap = np.broadcast_arrays(np.asarray(force, float), np.asarray(gap, float))
+    check_gap(law, gap)
+    current = _each_current(law, force.ravel(), gap.ravel()).reshape(gap.shape)
+    unreachable = np.isnan(current)
+    if unreachable.any():
+        _refuse_force(law, float(force[unreachable][0]), float(gap[unreachable][0]))
+    return current[()]
+
+
+def check_gap(law: ForceLaw, gap: npt.ArrayLike) -> None:
+    """Raise `GapOutsideLaw` unless every gap (m) lies in the guarded range of `law`."""
+    gap = np.asarray(gap, float)
+    inside = (gap >= law.gap_low - _GAP_ROUNDING) & (gap <= law.gap_high + _GAP_ROUNDING)
+    if not inside.all():
+        value = float(gap[~inside].flat[0])
+        raise GapOutsideLaw(
+            f'air gap ({value * 1e6:.1f} um) must lie within {law.gap_low * 1e6:.1f} .. '
+            f'{law.gap_high * 1e6:.1f} um; beyond it the force law is not valid: check the gap measurement, '
+            f'or calibrate the actuator over a wider range of gaps'
+        )
+
+
+_ROUNDING = 1e-12
+_GAP_ROUNDING = 1e-12  # m: 546 * 1e-6 and 546e-6 differ by a rounding, no more
+_CURRENT_RESOLUTION = 1e-10  # A
+_MOST_STEPS = 80
+
+
+@compiled
+def _force_and_slope(a, current):
+    """Return Eq (3) in N and its derivative with respect to current in N/A, from a1 .. a5 at one gap."""
+    a1, a2, a3, a4, a5 = a
+    knee = math.atan(a3 * a4)
+    reach = a3 * (current - a4)
+    bend = math.atan(reach)
+    bend_slope = a3 / (1.0 + reach * reach)
+    line = a1 + a2 * current
+    parabola = a5 * current * current
+    force = line * (knee + bend) + parabola * (knee - bend)
+    slope = a2 * (knee + bend) + 2.0 * a5 * current * (knee - bend) + (line - parabola) * bend_slope
+    return force, slope
+
+
+@compiled
+def _coefficients(law, gap):
+    """Return a1 .. a5 at `gap` (m), Eq (4)."""
+    gap_um = gap * 1e6
+    return (
+        _polynomial(law.a1, gap_um),
+        _polynomial(law.a2, gap_um),
+        _polynomial(law.a3, gap_um),
+        _polynomial(law.a4, gap_um),
+        _polynomial(law.a5, gap_um),
+    )
+
+
+@compiled
+def _polynomial(coefficients, x):
+    value = 0.0
+    for k in range(len(coefficients) - 1, -1, -1):
+        value = value * x + coefficients[k]
+    return value
+
+
+@compiled
+def _gap_inside(law, gap):
+    return law.gap_low - _GAP_ROUNDING <= gap <= law.gap_high + _GAP_ROUNDING
+
+
+@compiled
+def _current_inside(law, current):
+    return 0.0 <= current <= law.current_high * (1.0 + _ROUNDING)
+
+
+@compiled
+def _each_force(law, current, gap):
+    result = np.empty(gap.size)
+    for k in range(gap.size):
+        result[k] = force(law, current[k], gap[k])
+    return result
+
+
+@compiled
+def _each_current(law, force, gap):
+    result = np.empty(gap.size)
+    for k in range(gap.size):
+        result[k] = current_for_force(law, force[k], gap[k])
+    return result
+
+
+def _check_current(law: ForceLaw, current: npt.NDArray[np.float64]) -> None:
+    inside = (current >= 0.0) & (current <= law.current_high * (1.0 + _ROUNDING))
+    if not inside.all():
+        raise CurrentOutsideLaw(
+            f'coil current ({float(current[~inside].flat[0]):.3f} A) must lie within 0.000 .. '
+            f'{law.current_high:.3f} A; beyond it the force law was never fitted: limit the current'
+        )
+
+
+def _refuse_force(law: ForceLaw, value: float, gap: float) -> None:
+    highest = float(force(law, law.current_high, gap))
+    raise ForceOutsideLaw(
+        f'magnetic force ({value:.2f} N) must lie within 0.00 .. {highest:.2f} N, which {law.current_high:.2f} A '
+        f'reach at an air gap of {gap * 1e6:.1f} um; demand less force, or make the gap smaller'
+    )

@@ -1,0 +1,188 @@
+"""What the controller makes of its gap estimates: contact force, offset current and the current-force table.
+
+Everything here uses the fitted law of `actuator.law`; the simulated truth is `closing`.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from mount_models.actuator.law import ForceLaw, checked_current_for_force, checked_force
+from mount_models.compiled import compiled
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class ForceTableError(ValueError):
+    """A current-force table cannot be built, read or used as asked; the text says why and the remedy."""
+
+
+def zero_current_rest_gap(
+    law: ForceLaw, spring_stiffness: float, gap_at_rest_current: float, rest_current: float
+) -> float:
+    """Return the gap (m) at 0 A from the gap measured at `rest_current` (A), whose small pull closes it a little.
+
+    Derived: d_rest = d + F(i, d) / k_s; the 492 um of section 3.2 are measured at 0.2 A.
+    """
+    return (
+        gap_at_rest_current + float(checked_force(law, rest_current, gap_at_rest_current)) / spring_stiffness
+    )
+
+
+def zero_load_contact_gap(
+    law: ForceLaw,
+    spring_stiffness: float,
+    pad_stiffness: float,
+    rest_gap: float,
+    crossing_gap: float,
+    crossing_current: float,
+) -> float:
+    """Return the gap (m) at which the pads just touch, from the gap measured at the 20 mH crossing.
+
+    There the pads are already compressed by the normal force F_N, so d_c = d_20 + F_N / k_p (derived; section
+    3.2 uses d_20 itself). `rest_gap` (m) is that at 0 A. Raises `ForceTableError` if nothing presses the pads.
+    """
+    pull = float(checked_force(law, crossing_current, crossing_gap))
+    normal_force = pull - spring_stiffness * (rest_gap - crossing_gap)
+    if not normal_force >= 0.0:
+        raise ForceTableError(
+            f'normal force at {crossing_current:.3f} A ({normal_force:.1f} N) must not be negative: the pads are '
+            f'not in contact at {crossing_gap * 1e6:.1f} um; check both gap estimates and the spring stiffness'
+        )
+    return crossing_gap + normal_force / pad_stiffness
+
+
+def contact_force(spring_stiffness: float, rest_gap: float, contact_gap: float) -> float:
+    """Return the magnetic force F_c = k_s (d_rest - d_c) (N) at which the pads just touch."""
+    if not rest_gap > contact_gap:
+        raise ForceTableError(
+            f'contact gap ({contact_gap * 1e6:.1f} um) must lie below the rest gap ({rest_gap * 1e6:.1f} um); '
+            f'measure both again: the pads may be stuck to the rod'
+        )
+    return spring_stiffness * (rest_gap - contact_gap)
+
+
+def offset_current(
+    law: ForceLaw, spring_stiffness: float, rest_gap: float, contact_gap: float, light_pressure: float
+) -> float:
+    """Return the current (A) of the ready position: `light_pressure` (N) more than just touching (section 3.2)."""
+    wanted = contact_force(spring_stiffness, rest_gap, contact_gap) + light_pressure
+    return float(checked_current_for_force(law, wanted, contact_gap))
+
+
+def current_force_table(
+    law: ForceLaw,
+    spring_stiffness: float,
+    pad_stiffness: float,
+    rest_gap: float,
+    contact_gap: float,
+    current_high: float = 3.0,
+    step: float = 0.5,
+) -> FloatArray:
+    """Return the current-force table, shape (2, N): rows current (A) and normal force on the pads (N).
+
+    Both rows rise strictly, from the contact current at 0 N in steps of `step` (N) to `current_high` (A). The
+    spring's share is subtracted and the pads' compression included: at normal force F_N the gap is
+    d = d_c - F_N / k_p and the magnet pulls F_N + k_s (d_rest - d). Raises `ForceTableError` or `OutsideLaw`.
+    """
+    if not step > 0.0:
+        raise ForceTableError(f'step ({step:g} N) must be positive; 0.5 N is usual')
+    contact_force(spring_stiffness, rest_gap, contact_gap)
+    highest = _highest_normal_force(law, spring_stiffness, pad_stiffness, rest_gap, contact_gap, current_high)
+    normal_force = np.append(np.arange(0.0, highest - 0.01 * step, step), highest)
+    gap = contact_gap - normal_force / pad_stiffness
+    current = checked_current_for_force(law, normal_force + spring_stiffness * (rest_gap - gap), gap)
+    current[-1] = current_high
+    return checked_table(np.stack([current, normal_force]))
+
+
+def checked_table(table: npt.ArrayLike) -> FloatArray:
+    """Return `table` as an array of shape (2, N) whose rows rise strictly from 0 N, or raise `ForceTableError`."""
+    rows = np.asarray(table, float)
+    if rows.ndim != 2 or rows.shape[0] != 2 or rows.shape[1] < 2:
+        raise ForceTableError(
+            f'current-force table must have shape (2, N >= 2); instead received {rows.shape}'
+        )
+    if not np.isfinite(rows).all():
+        raise ForceTableError('current-force table must be finite; initialise the actuator again')
+    for name, row in zip(('current', 'normal force'), rows, strict=True):
+        falls = np.flatnonzero(np.diff(row) <= 0.0)
+        if falls.size:
+            k = int(falls[0])
+            raise ForceTableError(
+                f'{name} of the current-force table must rise strictly; entries {k} and {k + 1} are '
+                f'{row[k]:g} and {row[k + 1]:g}: initialise the actuator again'
+            )
+    if rows[0, 0] < 0.0 or rows[1, 0] != 0.0:
+        raise ForceTableError(
+            f'current-force table must start at 0 N and a current of 0 A or more; instead it starts at '
+            f'{rows[1, 0]:g} N and {rows[0, 0]:g} A'
+        )
+    return rows
+
+
+@compiled
+def table_current(current_row, force_row, normal_force):
+    """Return the current (A) for `normal_force` (N) by interpolation; NaN below 0 N or beyond the last entry."""
+    return _interpolated(force_row, current_row, normal_force)
+
+
+@compiled
+def table_normal_force(current_row, force_row, current):
+    """Return the normal force (N) at `current` (A): 0 up to the contact current, NaN beyond the last entry."""
+    if 0.0 <= current <= current_row[0]:
+        return 0.0
+    return _interpolated(current_row, force_row, current)
+
+
+def checked_table_current(table: FloatArray, normal_force: npt.ArrayLike) -> FloatArray:
+    """Return the current (A) for normal forces (N) of any shape; raises `ForceTableError` outside the table."""
+    wanted = np.asarray(normal_force, float)
+    inside = (wanted >= 0.0) & (wanted <= table[1, -1])
+    if not inside.all():
+        raise ForceTableError(
+            f'normal force ({float(wanted[~inside].flat[0]):.2f} N) must lie within 0.00 .. {table[1, -1]:.2f} N, '
+            f'which {table[0, -1]:.2f} A reach; demand less force'
+        )
+    return np.asarray(np.interp(wanted, table[1], table[0]))[()]
+
+
+@compiled
+def _interpolated(x_row, y_row, x):
+    last = x_row.size - 1
+    if not x_row[0] <= x <= x_row[last]:
+        return math.nan
+    low, high = 0, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x_row[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    share = (x - x_row[low]) / (x_row[high] - x_row[low])
+    return y_row[low] + share * (y_row[high] - y_row[low])
+
+
+def _highest_normal_force(
+    law: ForceLaw,
+    spring_stiffness: float,
+    pad_stiffness: float,
+    rest_gap: float,
+    contact_gap: float,
+    current: float,
+) -> float:
+    """Return the normal force (N) at `current` (A): what the magnet pulls at the compressed gap less the spring."""
+    normal_force = 0.0
+    for _ in range(50):  # each step is some thirty times smaller than the one before
+        gap = contact_gap - normal_force / pad_stiffness
+        following = float(checked_force(law, current, gap)) - spring_stiffness * (rest_gap - gap)
+        if not following > 0.0:
+            raise ForceTableError(
+                f'current_high ({current:.2f} A) must close the pads; it leaves {-following:.1f} N of the spring '
+                f'unbalanced at {gap * 1e6:.1f} um: check both gap estimates, or allow more current'
+            )
+        if abs(following - normal_force) < 1e-9:
+            break
+        normal_force = following
+    return normal_force
