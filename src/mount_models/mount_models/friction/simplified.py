@@ -1,0 +1,82 @@
+"""Simplified friction model for control, Eq (9): sliding velocity = measured velocity, no spring c_Re."""
+
+import math
+
+import numpy as np
+
+from mount_models.compiled import compiled
+from mount_models.friction.coefficient import dynamic_coefficient, offset_coefficient, slope_coefficient
+
+FADE_VELOCITY = 0.001
+"""v_w in m/s (chosen): below it the weight 1 - exp(-(v/v_w)^2) fades mu to zero, because the simplified
+model knows no sticking (Sec. 4)."""
+LOWEST_COEFFICIENT = 0.05
+"""Floor of mu when a force is divided by it (chosen)."""
+_FIXED_POINT_STEPS = 6
+
+
+@compiled
+def simplified_step(contact, coefs, deflection, velocity, normal_force, dt):
+    """Return (force, new deflection, coefficient) after `dt` seconds at constant velocity and normal force.
+
+    Eq (9) in its right form: F_F = sign(v) mu F_N and d_R xi' = F_F - c_R xi (the print multiplies mu
+    by F_F). Because mu is linear in xi, xi is integrated exactly, so no step is too long.
+    `deflection` xi in m, `velocity` in m/s, forces in N; `coefficient` is mu after fading, so that
+    |force| = coefficient x normal force.
+    """
+    load = max(normal_force, 0.0)
+    direction = -1.0 if velocity < 0.0 else 1.0
+    weight = fade_weight(velocity) * coefs.scale
+    drive = direction * weight * load * offset_coefficient(coefs, velocity, load)
+    stiffness = contact.tangential_stiffness - weight * load * slope_coefficient(coefs, velocity, load)
+    advance = _relaxation(stiffness * dt / contact.tangential_damping)
+    new_deflection = deflection + (drive - stiffness * deflection) * advance * dt / contact.tangential_damping
+    coefficient = faded_coefficient(coefs, velocity, direction * new_deflection, load)
+    return direction * coefficient * load, new_deflection, coefficient
+
+
+@compiled
+def simplified_response(contact, coefs, velocity, normal_force, dt):
+    """Return (force, deflection) from rest for `velocity` and `normal_force`, all arrays (n,), SI units."""
+    force = np.zeros(velocity.size)
+    deflection = np.zeros(velocity.size)
+    xi = 0.0
+    for k in range(velocity.size):
+        force[k], xi, _ = simplified_step(contact, coefs, xi, velocity[k], normal_force[k], dt)
+        deflection[k] = xi
+    return force, deflection
+
+
+@compiled
+def faded_coefficient(coefs, velocity, deflection_u, normal_force):
+    """Return mu of Eq (12), faded to zero at very low `velocity` (m/s); u in m, normal force in N."""
+    return fade_weight(velocity) * dynamic_coefficient(coefs, velocity, deflection_u, normal_force)
+
+
+@compiled
+def fade_weight(velocity):
+    """Return 1 - exp(-(v/v_w)^2) for `velocity` in m/s."""
+    return -math.expm1(-((velocity / FADE_VELOCITY) ** 2))
+
+
+@compiled
+def normal_force_for(coefs, desired_force, velocity, deflection_u, start):
+    """Return (normal force, coefficient) that give the magnitude of `desired_force` (N) at `velocity`.
+
+    The inverse of `faded_coefficient`: mu depends on F_N, so F_N = F / mu(F_N) is solved by fixed-point
+    steps from `start` (the last value, N). mu counts at least `LOWEST_COEFFICIENT`. u in m.
+    """
+    wanted = abs(desired_force)
+    normal_force = start
+    for _ in range(_FIXED_POINT_STEPS):
+        coefficient = max(faded_coefficient(coefs, velocity, deflection_u, normal_force), LOWEST_COEFFICIENT)
+        normal_force = wanted / coefficient
+    return normal_force, coefficient
+
+
+@compiled
+def _relaxation(exponent):
+    """Return (1 - exp(-z)) / z, which is 1 at z = 0."""
+    if abs(exponent) < 1e-8:
+        return 1.0 - 0.5 * exponent
+    return -math.expm1(-exponent) / exponent

@@ -1,0 +1,201 @@
+"""Eqs (12)-(14) against the values that Table 2 gives, and the inverse in velocity against the law."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_models.friction.coefficient import (
+    FrictionCoefficients,
+    dynamic_coefficient,
+    offset_coefficient,
+    sliding_speed,
+    slope_coefficient,
+)
+from mount_models.friction.contact import FrictionContact
+from mount_models.quantity import ParameterError, checked, quantities, with_values
+
+TABLE_2 = FrictionCoefficients()
+CONTACT = FrictionContact()
+
+
+def steady_coefficient(velocity, normal_force, coefs=TABLE_2):
+    """mu after xi has settled at mu F_N / c_R: a / (1 - b F_N / c_R)."""
+    a = offset_coefficient(coefs, velocity, normal_force)
+    b = slope_coefficient(coefs, velocity, normal_force)
+    return a / (1.0 - b * normal_force / CONTACT.tangential_stiffness)
+
+
+STEADY = {
+    40: ['0.455/0.759', '0.651/1.105', '0.729/1.258', '0.818/1.434', '0.961/1.718'],
+    80: ['0.533/0.847', '0.740/1.198', '0.801/1.317', '0.900/1.501', '1.057/1.799'],
+    100: ['0.560/0.872', '0.763/1.211', '0.809/1.304', '0.909/1.487', '1.067/1.781'],
+    120: ['0.577/0.885', '0.772/1.205', '0.801/1.271', '0.900/1.449', '1.057/1.735'],
+}
+
+
+@pytest.mark.parametrize('normal_force', STEADY)
+def test_steady_coefficient_has_the_published_consequences_of_table_2(normal_force):
+    for speed_mm, pair in zip((1, 5, 10, 20, 60), STEADY[normal_force], strict=True):
+        positive, negative = (float(text) for text in pair.split('/'))
+        speed = speed_mm * 1e-3
+        assert steady_coefficient(speed, float(normal_force)) == pytest.approx(positive, abs=5.1e-4)
+        assert steady_coefficient(-speed, float(normal_force)) == pytest.approx(negative, abs=5.1e-4)
+
+
+def test_steady_coefficient_of_one_pad_is_that_of_a_brake_lining():
+    speeds = np.array([1, 5, 10, 20, 60]) * 1e-3
+    for sign, low, high in ((1, 0.23, 0.53), (-1, 0.38, 0.90)):
+        per_pad = [steady_coefficient(sign * v, n) / 2 for v in speeds for n in (40.0, 80.0, 100.0, 120.0)]
+        assert min(per_pad) == pytest.approx(low, abs=6e-3)
+        assert max(per_pad) == pytest.approx(high, abs=6e-3)
+
+
+def test_offset_spans_the_identified_range():
+    for sign, low, high in ((1, 0.45, 1.40), (-1, 0.75, 2.29)):
+        assert offset_coefficient(TABLE_2, sign * 0.001, 40.0) == pytest.approx(low, abs=6e-3)
+        assert offset_coefficient(TABLE_2, sign * 0.060, 120.0) == pytest.approx(high, abs=6e-3)
+
+
+def test_positive_and_negative_offsets_keep_an_almost_constant_ratio():
+    for speed, ratio in ((0.001, 0.64), (0.010, 0.62), (0.060, 0.60)):
+        found = offset_coefficient(TABLE_2, speed, 100.0) / offset_coefficient(TABLE_2, -speed, 100.0)
+        assert found == pytest.approx(ratio, abs=5e-3)
+
+
+def test_normal_force_factors_are_about_one_at_100_newton():
+    rise_p = TABLE_2.a_p1 + TABLE_2.a_p2 * math.log(TABLE_2.a_p3 + 1.0)
+    rise_n = TABLE_2.a_n1 + TABLE_2.a_n2 * math.log(TABLE_2.a_n3 + 1.0)
+    assert offset_coefficient(TABLE_2, 0.001, 100.0) / rise_p == pytest.approx(0.983, abs=5e-4)
+    assert offset_coefficient(TABLE_2, -0.001, 100.0) / rise_n == pytest.approx(1.008, abs=5e-4)
+    slope = slope_coefficient(TABLE_2, 0.0, 100.0) / 1000.0
+    assert (slope - TABLE_2.b_offset) / TABLE_2.b_1 == pytest.approx(0.983, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ('normal_force', 'positive', 'negative'), [(40.0, 0.150, 0.423), (100.0, 0.199, 0.522)]
+)
+def test_breakaway_is_the_coefficient_at_rest(normal_force, positive, negative):
+    assert dynamic_coefficient(TABLE_2, 0.0, 0.0, normal_force) == pytest.approx(positive, abs=5e-4)
+    assert dynamic_coefficient(TABLE_2, -1e-12, 0.0, normal_force) == pytest.approx(negative, abs=5e-4)
+
+
+def test_slope_is_slightly_positive_at_small_load_and_speed_as_printed():
+    assert slope_coefficient(TABLE_2, 0.001, 40.0) == pytest.approx(3.9e3, abs=60.0)
+
+
+def test_slope_uses_the_magnitude_of_the_velocity():
+    assert slope_coefficient(TABLE_2, -0.007, 90.0) == slope_coefficient(TABLE_2, 0.007, 90.0) < 0.0
+
+
+def test_slope_with_negative_offset_is_negative_everywhere():
+    other_sign = with_values(TABLE_2, b_offset=-14.0)
+    slopes = [slope_coefficient(other_sign, v, n) for v in (0.0, 0.001, 0.06) for n in (0.0, 40.0, 120.0)]
+    assert max(slopes) < 0.0
+
+
+def test_law_is_not_extrapolated_beyond_the_identified_loads_and_the_velocity_limit():
+    assert offset_coefficient(TABLE_2, 0.01, 20.0) == offset_coefficient(TABLE_2, 0.01, 40.0)
+    assert offset_coefficient(TABLE_2, 0.01, 300.0) == offset_coefficient(TABLE_2, 0.01, 120.0)
+    assert slope_coefficient(TABLE_2, 0.06, 300.0) == slope_coefficient(TABLE_2, 0.01, 120.0)
+
+
+def test_scale_multiplies_the_coefficient():
+    stronger = with_values(TABLE_2, scale=1.15)
+    assert dynamic_coefficient(stronger, 0.02, 3e-6, 80.0) == pytest.approx(
+        1.15 * dynamic_coefficient(TABLE_2, 0.02, 3e-6, 80.0), rel=1e-14
+    )
+
+
+MONOTONE_BELOW_UM = {
+    40: (15.5, 30.1),
+    60: (12.9, 24.5),
+    80: (11.4, 21.1),
+    100: (10.4, 18.8),
+    120: (9.6, 17.2),
+}
+
+
+@pytest.mark.parametrize('normal_force', MONOTONE_BELOW_UM)
+def test_coefficient_rises_with_speed_up_to_the_invertible_deflection(normal_force):
+    speeds = np.linspace(1e-9, 0.060, 1200)
+    for sign, limit_um in zip((1.0, -1.0), MONOTONE_BELOW_UM[normal_force], strict=True):
+        for u_um, rising in ((limit_um - 0.06, True), (limit_um + 0.6, False)):
+            mu = [dynamic_coefficient(TABLE_2, sign * v, u_um * 1e-6, float(normal_force)) for v in speeds]
+            assert bool(np.all(np.diff(mu) > 0.0)) is rising
+
+
+def test_without_the_velocity_limit_the_coefficient_turns_at_10_millimetres_per_second():
+    unlimited = with_values(TABLE_2, slope_velocity_limit=1.0)
+    speeds = np.linspace(0.0, 0.060, 6001)
+    mu = [dynamic_coefficient(unlimited, v, 10e-6, 100.0) for v in speeds]
+    assert speeds[int(np.argmax(mu))] == pytest.approx(0.0104, abs=1e-4)
+
+
+deflections = st.floats(-40e-6, 40e-6)
+loads = st.floats(0.01, 350.0)
+directions = st.sampled_from([-1.0, 1.0])
+
+
+def running_maximum(direction, speed, u, normal_force):
+    grid = np.append(np.linspace(0.0, min(speed, 0.010), 400), speed)
+    return max(dynamic_coefficient(TABLE_2, direction * max(v, 1e-15), u, normal_force) for v in grid)
+
+
+@given(direction=directions, speed=st.floats(1e-6, 1.0), u=st.floats(-9e-6, 9e-6), normal_force=loads)
+@settings(deadline=None, max_examples=200)
+def test_speed_is_recovered_from_the_coefficient_where_it_is_unique(direction, speed, u, normal_force):
+    traction = normal_force * dynamic_coefficient(TABLE_2, direction * speed, u, normal_force)
+    assert sliding_speed(TABLE_2, direction, traction, u, normal_force, 0.0) == pytest.approx(speed, rel=1e-9)
+
+
+@given(
+    direction=directions,
+    traction=st.floats(1e-3, 1e4),
+    u=deflections,
+    normal_force=loads,
+    resistance=st.floats(1.0, 1e5),
+)
+@settings(deadline=None, max_examples=300)
+def test_speed_balances_traction_on_the_monotone_envelope(direction, traction, u, normal_force, resistance):
+    speed = sliding_speed(TABLE_2, direction, traction, u, normal_force, resistance)
+    assert 0.0 <= speed <= traction / resistance * (1.0 + 1e-12)
+    friction = normal_force * running_maximum(direction, speed, u, normal_force)
+    if speed > 0.0:
+        assert friction + resistance * speed == pytest.approx(traction, rel=1e-5, abs=1e-9)
+    else:
+        assert friction >= traction * (1.0 - 1e-12)
+
+
+@given(
+    direction=directions,
+    tractions=st.tuples(st.floats(0.0, 500.0), st.floats(0.0, 500.0)),
+    u=st.floats(-1e-3, 1e-3),
+    normal_force=loads,
+)
+@settings(deadline=None, max_examples=200)
+def test_more_traction_never_slides_slower(direction, tractions, u, normal_force):
+    slow, fast = (
+        sliding_speed(TABLE_2, direction, traction, u, normal_force, 400.0) for traction in sorted(tractions)
+    )
+    assert fast >= slow * (1.0 - 1e-12)
+
+
+def test_contact_sticks_between_the_two_breakaway_forces():
+    for direction in (1.0, -1.0):
+        limit = 100.0 * dynamic_coefficient(TABLE_2, direction * 1e-15, 0.0, 100.0)
+        assert sliding_speed(TABLE_2, direction, 0.999 * limit, 0.0, 100.0, 400.0) == 0.0
+        assert sliding_speed(TABLE_2, direction, 1.001 * limit, 0.0, 100.0, 400.0) > 0.0
+
+
+@pytest.mark.parametrize('parameters', [TABLE_2, CONTACT])
+def test_every_parameter_has_unit_meaning_and_a_range_that_holds_its_default(parameters):
+    assert set(quantities(parameters)) == set(parameters._fields)
+    assert checked(parameters) == parameters
+
+
+def test_parameter_that_breaks_the_law_is_refused_with_its_value():
+    with pytest.raises(ParameterError, match=r'a_p2 \(-0\.1 1\) must lie within'):
+        with_values(TABLE_2, a_p2=-0.1)

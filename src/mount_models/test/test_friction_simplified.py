@@ -1,0 +1,108 @@
+"""The simplified friction model, Eq (9), and the normal force that gives a desired force."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
+from mount_models.friction.contact import FrictionContact
+from mount_models.friction.simplified import (
+    LOWEST_COEFFICIENT,
+    faded_coefficient,
+    normal_force_for,
+    simplified_response,
+    simplified_step,
+)
+
+COEFS = FrictionCoefficients()
+CONTACT = FrictionContact()
+
+
+@pytest.mark.parametrize('dt', [1e-5, 1e-4, 1e-3])
+def test_sine_at_8_hertz_gives_the_known_peaks_and_work(dt):
+    time = np.arange(0.0, 6.0, dt)
+    phase = 2.0 * np.pi * 8.0 * time
+    force, _ = simplified_response(
+        CONTACT, COEFS, 1e-3 * 2.0 * np.pi * 8.0 * np.cos(phase), np.full(time.size, 100.0), dt
+    )
+    cycle = force[-round(0.125 / dt) :]
+    assert cycle.max() == pytest.approx(132.29, abs=0.02)
+    # a coarse step samples beside the peak
+    assert cycle.min() == pytest.approx(-203.12, abs=0.02 if dt < 1e-3 else 0.1)
+    velocity = 1e-3 * 2.0 * np.pi * 8.0 * np.cos(phase[-cycle.size :])
+    assert np.sum(cycle * velocity) * dt == pytest.approx(0.640, abs=6e-4)
+
+
+velocities = st.floats(-2.0, 2.0)
+loads = st.floats(0.0, 350.0)
+
+
+@given(velocity=velocities, normal_force=loads, start=st.floats(-50e-6, 50e-6), dt=st.floats(1e-6, 100.0))
+@settings(deadline=None, max_examples=200)
+def test_deflection_moves_towards_its_end_value_at_any_step_length(velocity, normal_force, start, dt):
+    _, end, _ = simplified_step(CONTACT, COEFS, start, velocity, normal_force, 1e4)
+    _, reached, _ = simplified_step(CONTACT, COEFS, start, velocity, normal_force, dt)
+    assert min(start, end) - 1e-12 <= reached <= max(start, end) + 1e-12
+
+
+@given(velocity=velocities, normal_force=loads, start=st.floats(-20e-6, 20e-6))
+@settings(deadline=None, max_examples=100)
+def test_two_half_steps_equal_one_step(velocity, normal_force, start):
+    _, whole, _ = simplified_step(CONTACT, COEFS, start, velocity, normal_force, 0.2)
+    _, half, _ = simplified_step(CONTACT, COEFS, start, velocity, normal_force, 0.1)
+    _, halves, _ = simplified_step(CONTACT, COEFS, half, velocity, normal_force, 0.1)
+    assert halves == pytest.approx(whole, rel=1e-9, abs=1e-18)
+
+
+@given(velocity=velocities, normal_force=loads, deflection=st.floats(-100e-6, 100e-6))
+@settings(deadline=None, max_examples=200)
+def test_force_only_opposes_motion(velocity, normal_force, deflection):
+    force, _, coefficient = simplified_step(CONTACT, COEFS, deflection, velocity, normal_force, 1e-3)
+    assert force * velocity >= 0.0
+    assert abs(force) == pytest.approx(coefficient * normal_force, rel=1e-12)
+
+
+def test_deflection_settles_where_the_spring_carries_the_friction_force():
+    force, deflection, _ = simplified_step(CONTACT, COEFS, 0.0, 0.005, 100.0, 100.0)
+    assert force == pytest.approx(76.3, abs=0.05)
+    assert deflection == pytest.approx(force / CONTACT.tangential_stiffness, rel=1e-9)
+
+
+def test_force_fades_to_zero_at_rest_and_is_whole_at_sliding_speed():
+    assert simplified_step(CONTACT, COEFS, 0.0, 0.0, 100.0, 1e-3)[0] == 0.0
+    assert faded_coefficient(COEFS, 0.001, 0.0, 100.0) == pytest.approx(
+        (1.0 - np.exp(-1.0)) * dynamic_coefficient(COEFS, 0.001, 0.0, 100.0), rel=1e-12
+    )
+    assert faded_coefficient(COEFS, 0.005, 0.0, 100.0) == pytest.approx(
+        dynamic_coefficient(COEFS, 0.005, 0.0, 100.0), rel=1e-9
+    )
+
+
+@given(
+    velocity=st.floats(0.004, 0.5),
+    sign=st.sampled_from([-1.0, 1.0]),
+    force=st.floats(1.0, 250.0),
+    deflection_u=st.floats(-10e-6, 10e-6),
+    start=st.floats(0.0, 300.0),
+)
+@settings(deadline=None, max_examples=200)
+def test_normal_force_gives_the_desired_force(velocity, sign, force, deflection_u, start):
+    normal_force, coefficient = normal_force_for(COEFS, force, sign * velocity, deflection_u, start)
+    assert coefficient * normal_force == pytest.approx(force, rel=1e-12)
+    mu = faded_coefficient(COEFS, sign * velocity, deflection_u, normal_force)
+    assert mu * normal_force == pytest.approx(force, rel=0.01)
+
+
+def test_normal_force_for_a_signed_force_is_that_for_its_magnitude():
+    assert normal_force_for(COEFS, -80.0, -0.02, 0.0, 50.0) == normal_force_for(COEFS, 80.0, -0.02, 0.0, 50.0)
+
+
+def test_coefficient_counts_at_least_its_floor_where_it_fades():
+    normal_force, coefficient = normal_force_for(COEFS, 3.0, 0.0, 0.0, 0.0)
+    assert coefficient == LOWEST_COEFFICIENT
+    assert normal_force == pytest.approx(60.0)
+
+
+def test_no_desired_force_needs_no_normal_force():
+    assert normal_force_for(COEFS, 0.0, 0.03, 0.0, 80.0)[0] == 0.0
