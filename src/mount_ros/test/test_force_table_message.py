@@ -1,0 +1,96 @@
+"""The current-force table survives its message, and everything that is no table is refused."""
+
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+
+from mount_ros.force_table_message import (
+    ForceTableMessageError,
+    from_bytes,
+    from_message,
+    to_message,
+)
+
+STAMP = 1_700_000_000_123_456_789
+TABLE = np.array([[0.4725, 0.8, 1.6, 3.0], [0.0, 40.0, 200.0, 304.0]])
+
+
+def test_table_and_activation_survive_the_message():
+    received = from_message(to_message(STAMP, TABLE))
+    assert received.activation == STAMP
+    assert np.array_equal(received.table, TABLE)
+
+
+def test_table_and_activation_survive_serialisation():
+    received = from_bytes(serialize_message(to_message(STAMP, TABLE)))
+    assert received.activation == STAMP
+    assert np.array_equal(received.table, TABLE)
+
+
+def test_layout_names_rows_sizes_strides_and_the_activation():
+    message = to_message(STAMP, TABLE)
+    rows, columns = message.layout.dim
+    assert (rows.label, rows.size, rows.stride) == ('rows: current (A), normal_force (N)', 2, 8)
+    assert (columns.label, columns.size, columns.stride) == (f'activation {STAMP}', 4, 4)
+    assert list(message.data[:4]) == TABLE[0].tolist()
+
+
+@pytest.mark.parametrize(
+    ('table', 'sentence'),
+    [
+        (np.ones(4), 'shape'),
+        (np.ones((3, 4)), 'shape'),
+        (TABLE[:, :1], 'shape'),
+        ([[0.1, np.nan], [0.0, 1.0]], 'finite; column 1'),
+        ([[0.1, 0.2], [0.0, np.inf]], 'finite; column 1'),
+        ([[0.1, 0.3, 0.3], [0.0, 1.0, 2.0]], 'current at columns 1 and 2 is 0.3 and 0.3 A'),
+        ([[0.1, 0.2, 0.3], [0.0, 2.0, 1.0]], 'normal force at columns 1 and 2 is 2 and 1 N'),
+        ([[-0.1, 0.2], [0.0, 1.0]], 'within 0 .. 3 A; it spans -0.1 .. 0.2'),
+        ([[0.1, 3.001], [0.0, 1.0]], 'within 0 .. 3 A; it spans 0.1 .. 3.001'),
+    ],
+)
+def test_what_is_no_table_is_neither_sent_nor_read(table, sentence):
+    with pytest.raises(ForceTableMessageError, match=sentence):
+        to_message(STAMP, table)
+    rows = np.asarray(table, float)
+    if rows.ndim == 2 and rows.shape[0] == 2:
+        message = to_message(STAMP, TABLE)
+        message.data = rows.ravel().tolist()
+        message.layout.dim[0].stride = rows.size
+        message.layout.dim[1].size = message.layout.dim[1].stride = rows.shape[1]
+        with pytest.raises(ForceTableMessageError, match=sentence):
+            from_message(message)
+
+
+def test_a_message_of_other_dimensions_is_refused():
+    message = to_message(STAMP, TABLE)
+    message.layout.dim = message.layout.dim[:1]
+    with pytest.raises(ForceTableMessageError, match=r'2 x N; instead received \[2\]'):
+        from_message(message)
+
+
+def test_a_message_with_other_rows_is_refused():
+    message = to_message(STAMP, TABLE)
+    message.layout.dim[0].label = 'normal_force, current'
+    with pytest.raises(ForceTableMessageError, match='normal_force, current'):
+        from_message(message)
+
+
+def test_a_truncated_message_is_refused():
+    message = to_message(STAMP, TABLE)
+    message.data = message.data[:-1]
+    with pytest.raises(ForceTableMessageError, match=r'2 x 4 numbers.*holds 7'):
+        from_message(message)
+
+
+@pytest.mark.parametrize('label', ['', 'activation', 'activation ', 'activation soon', 'activation -4', '12'])
+def test_a_table_that_does_not_name_its_activation_is_refused(label):
+    message = to_message(STAMP, TABLE)
+    message.layout.dim[1].label = label
+    with pytest.raises(ForceTableMessageError, match='must name its activation'):
+        from_message(message)
+
+
+def test_a_refusal_tells_the_remedy():
+    with pytest.raises(ForceTableMessageError, match='activate mount_init again'):
+        to_message(STAMP, np.zeros((2, 3)))
