@@ -12,6 +12,7 @@ from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 
 from mount_ros.message_types import message_class
 from mount_ros.qos import control_qos, publisher_qos, recording_qos
@@ -36,10 +37,14 @@ class DataPath:
         self._context: Context = owner.context
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
+        self._publishers: list[Publisher] = []
+        self._subscriptions: list[Subscription] = []
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create a publisher of `topic`; publish messages or their serialised bytes with it."""
-        return self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
+        publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
+        self._publishers.append(publisher)
+        return publisher
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`."""
@@ -48,6 +53,15 @@ class DataPath:
     def subscribe_all(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Like `subscribe`, with the deep reliable queue of a recorder."""
         self._subscribe(topic, callback, recording_qos(topic))
+
+    def unmatched(self) -> list[str]:
+        """Return the names of the topics that nobody on the other side has been found for yet.
+
+        Data sent before both sides have found each other is lost without a word.
+        """
+        alone = [s.topic_name for s in self._subscriptions if s.get_publisher_count() == 0]
+        alone += [p.topic_name for p in self._publishers if p.get_subscription_count() == 0]
+        return sorted(set(alone))
 
     def start(self) -> None:
         """Begin to serve the subscriptions."""
@@ -64,7 +78,10 @@ class DataPath:
             self.node.destroy_node()
 
     def _subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: Any) -> None:
-        self.node.create_subscription(message_class(topic.type), topic.name, callback, qos, raw=True)
+        subscription = self.node.create_subscription(
+            message_class(topic.type), topic.name, callback, qos, raw=True
+        )
+        self._subscriptions.append(subscription)
 
     def _serve(self) -> None:
         executor = EventsExecutor(context=self._context)

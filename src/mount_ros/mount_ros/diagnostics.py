@@ -36,7 +36,7 @@ class Diagnostics:
         self._node = node
         self._judge = judge
         self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS.name, publisher_qos(DIAGNOSTICS))
-        self._last: tuple[Level, str] | None = None
+        self._last: tuple[Level, str, object] | None = None
         self._beats = 0
         self._timer = node.create_timer(0.1, self._beat)
 
@@ -53,10 +53,15 @@ class Diagnostics:
         message = DiagnosticArray(status=[status])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
-        self._last = (verdict.level, verdict.sentence)
+        self._last = _essence(verdict)
 
     def _beat(self) -> None:
         self._beats += 1
         verdict = self._judge()
-        if self._beats % 10 == 0 or (verdict.level, verdict.sentence) != self._last:
+        if self._beats % 10 == 0 or _essence(verdict) != self._last:
             self.publish(verdict)
+
+
+def _essence(verdict: Verdict) -> tuple[Level, str, object]:
+    """Return what makes a verdict news."""
+    return verdict.level, verdict.sentence, verdict.figures.get('unmatched')

@@ -129,6 +129,11 @@ class SafeLifecycleNode(LifecycleNode):
             self.get_logger().error(f'{step.__name__} failed: {type(error).__name__}: {error}')
 
     def _present_verdict(self) -> Verdict:
+        verdict = self._verdict_without_matches()
+        unmatched = ', '.join(self.data_path.unmatched()) if self.data_path is not None else 'not configured'
+        return Verdict(verdict.level, verdict.sentence, {**verdict.figures, 'unmatched': unmatched})
+
+    def _verdict_without_matches(self) -> Verdict:
         if self._refusal:
             return Verdict(Level.ERROR, self._refusal)
         if not self._active:

@@ -6,9 +6,11 @@ numbers are replaced. A message of another layout (a foreign publisher) is read 
 deserialiser, by names.
 """
 
+import functools
 import math
 import struct
 from collections.abc import Sequence
+from typing import Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
@@ -90,6 +92,26 @@ class ScalarsLayout:
         full = len(message.velocity) == len(message.name)
         velocities = tuple(message.velocity[index] if full else math.nan for index in order)
         return stamp_of(raw), positions, velocities
+
+
+class OneNumberLayout:
+    """Packs a stamped message of any type in which only the stamp and one number ever change."""
+
+    def __init__(self, message: Any, path: str):
+        """Take the message to repeat; `path` names the number, such as `wrench.force.z`."""
+        mark = _marks(1, 0)
+        *owners, field = path.split('.')
+        owner = functools.reduce(getattr, owners, message)
+        setattr(owner, field, mark[0])
+        self._template = bytearray(serialize_message(message))
+        self._number = struct.Struct('<d')
+        self._offset = _offset_of(self._template, mark)
+
+    def pack(self, stamp: int, number: float) -> bytes:
+        """Return the message of time `stamp` (ns) with this number."""
+        _STAMP.pack_into(self._template, _STAMP_OFFSET, *divmod(stamp, _NANOSECONDS))
+        self._number.pack_into(self._template, self._offset, number)
+        return bytes(self._template)
 
 
 def _marks(count: int, first: int) -> list[float]:

@@ -1,0 +1,57 @@
+# engine mount: `make drive` and `make test` are all that a new machine needs.
+
+VENV ?= .venv
+BIN := $(VENV)/bin
+PACKAGES := mount_models mount_ros mount_driver mount_init mount_control mount_sim mount_bags mount_bringup
+# The first Python that runs, is 3.11 to 3.13 (the wheels of rclpy end there) and can make environments.
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
+DRIVE_OPTIONS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help drive test bench lint format setup setup-dev clean
+
+help: ## list the commands
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
+
+drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and record it
+	@$(BIN)/engine-mount drive $(DRIVE_OPTIONS)
+
+test: $(VENV)/.ready-dev ## pass all tests
+	@$(BIN)/python -m pytest
+
+bench: $(VENV)/.ready-dev ## performance figures as ratios, side by side in one run
+	@$(BIN)/engine-mount bench
+
+lint: $(VENV)/.ready-dev ## style, types
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+format: $(VENV)/.ready-dev ## put the sources in shape
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+setup: $(VENV)/.ready ## what `make drive` needs
+setup-dev: $(VENV)/.ready-dev ## what `make test` needs
+
+clean: ## remove the environment and all that was built
+	rm -rf $(VENV) build install log src/*/build src/*/*.egg-info .pytest_cache .mypy_cache .ruff_cache
+
+$(VENV)/.created:
+	@test -n '$(PYTHON)' || { echo 'No Python 3.11, 3.12 or 3.13 found; install one, or say PYTHON=/path/to/python3'; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { echo 'No virtual environment could be made; on Debian and Ubuntu: apt-get install python3-venv'; rm -rf $(VENV); exit 1; }
+	@touch $@
+
+$(VENV)/.ready: $(VENV)/.created requirements.txt $(wildcard src/*/setup.py)
+	@echo 'Setting up (once, about two minutes) ...'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --use-pep517 \
+		$(foreach package,$(PACKAGES),-e src/$(package))
+	@$(BIN)/engine-mount prepare
+	@touch $@
+
+$(VENV)/.ready-dev: $(VENV)/.ready requirements-dev.txt
+	@echo 'Setting up tests and checks (once, about a minute) ...'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
+	@touch $@
