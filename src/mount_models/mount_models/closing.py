@@ -155,7 +155,7 @@ def _gap_above(mechanics, actuator, current, gap):
 
 @compiled
 def _normal_force(mechanics, actuator, current, contact_pull):
-    """Return the force (N) on the pads, pressed from their touching gap by `contact_pull` (N) or a little more."""
+    """Return the force (N) on the pads; `contact_pull` (N) is the net pull at the gap where they touch."""
     pads = mechanics.pad_stiffness
     normal_force = contact_pull
     for _ in range(20):

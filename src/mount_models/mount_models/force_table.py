@@ -21,7 +21,7 @@ class ForceTableError(ValueError):
 def zero_current_rest_gap(
     law: ForceLaw, spring_stiffness: float, gap_at_rest_current: float, rest_current: float
 ) -> float:
-    """Return the gap (m) at 0 A from the gap measured at `rest_current` (A), whose small pull closes it a little.
+    """Return the gap (m) at 0 A from that measured at `rest_current` (A), which already closes it a little.
 
     Derived: d_rest = d + F(i, d) / k_s; the 492 um of section 3.2 are measured at 0.2 A.
     """
@@ -40,15 +40,15 @@ def zero_load_contact_gap(
 ) -> float:
     """Return the gap (m) at which the pads just touch, from the gap measured at the 20 mH crossing.
 
-    There the pads are already compressed by the normal force F_N, so d_c = d_20 + F_N / k_p (derived; section
-    3.2 uses d_20 itself). `rest_gap` (m) is that at 0 A. Raises `ForceTableError` if nothing presses the pads.
+    There the normal force F_N has already compressed the pads, so d_c = d_20 + F_N / k_p (derived; section
+    3.2 uses d_20). `rest_gap` (m) is that at 0 A. Raises `ForceTableError` if nothing presses the pads.
     """
     pull = float(checked_force(law, crossing_current, crossing_gap))
     normal_force = pull - spring_stiffness * (rest_gap - crossing_gap)
     if not normal_force >= 0.0:
         raise ForceTableError(
-            f'normal force at {crossing_current:.3f} A ({normal_force:.1f} N) must not be negative: the pads are '
-            f'not in contact at {crossing_gap * 1e6:.1f} um; check both gap estimates and the spring stiffness'
+            f'normal force at {crossing_current:.3f} A ({normal_force:.1f} N) must not be negative: the pads '
+            f'do not touch at {crossing_gap * 1e6:.1f} um; check both gap estimates and the spring stiffness'
         )
     return crossing_gap + normal_force / pad_stiffness
 
@@ -57,8 +57,8 @@ def contact_force(spring_stiffness: float, rest_gap: float, contact_gap: float) 
     """Return the magnetic force F_c = k_s (d_rest - d_c) (N) at which the pads just touch."""
     if not rest_gap > contact_gap:
         raise ForceTableError(
-            f'contact gap ({contact_gap * 1e6:.1f} um) must lie below the rest gap ({rest_gap * 1e6:.1f} um); '
-            f'measure both again: the pads may be stuck to the rod'
+            f'contact gap ({contact_gap * 1e6:.1f} um) must lie below the rest gap '
+            f'({rest_gap * 1e6:.1f} um); measure both again: the pads may be stuck to the rod'
         )
     return spring_stiffness * (rest_gap - contact_gap)
 
@@ -66,7 +66,7 @@ def contact_force(spring_stiffness: float, rest_gap: float, contact_gap: float) 
 def offset_current(
     law: ForceLaw, spring_stiffness: float, rest_gap: float, contact_gap: float, light_pressure: float
 ) -> float:
-    """Return the current (A) of the ready position: `light_pressure` (N) more than just touching (section 3.2)."""
+    """Return the current (A) of the ready position, `light_pressure` (N) past just touching (section 3.2)."""
     wanted = contact_force(spring_stiffness, rest_gap, contact_gap) + light_pressure
     return float(checked_current_for_force(law, wanted, contact_gap))
 
@@ -84,7 +84,8 @@ def current_force_table(
 
     Both rows rise strictly, from the contact current at 0 N in steps of `step` (N) to `current_high` (A). The
     spring's share is subtracted and the pads' compression included: at normal force F_N the gap is
-    d = d_c - F_N / k_p and the magnet pulls F_N + k_s (d_rest - d). Raises `ForceTableError` or `OutsideLaw`.
+    d = d_c - F_N / k_p and the magnet pulls F_N + k_s (d_rest - d).
+    Raises `ForceTableError`, or `OutsideLawError` where the law does not reach.
     """
     if not step > 0.0:
         raise ForceTableError(f'step ({step:g} N) must be positive; 0.5 N is usual')
@@ -98,7 +99,7 @@ def current_force_table(
 
 
 def checked_table(table: npt.ArrayLike) -> FloatArray:
-    """Return `table` as an array of shape (2, N) whose rows rise strictly from 0 N, or raise `ForceTableError`."""
+    """Return `table` as an array (2, N) whose rows rise strictly from 0 N, or raise `ForceTableError`."""
     rows = np.asarray(table, float)
     if rows.ndim != 2 or rows.shape[0] != 2 or rows.shape[1] < 2:
         raise ForceTableError(
@@ -124,26 +125,26 @@ def checked_table(table: npt.ArrayLike) -> FloatArray:
 
 @compiled
 def table_current(current_row, force_row, normal_force):
-    """Return the current (A) for `normal_force` (N) by interpolation; NaN below 0 N or beyond the last entry."""
+    """Return the current (A) for `normal_force` (N), interpolated; NaN below 0 N or past the last entry."""
     return _interpolated(force_row, current_row, normal_force)
 
 
 @compiled
 def table_normal_force(current_row, force_row, current):
-    """Return the normal force (N) at `current` (A): 0 up to the contact current, NaN beyond the last entry."""
+    """Return the normal force (N) at `current` (A): 0 up to the contact current, NaN past the last entry."""
     if 0.0 <= current <= current_row[0]:
         return 0.0
     return _interpolated(current_row, force_row, current)
 
 
 def checked_table_current(table: FloatArray, normal_force: npt.ArrayLike) -> FloatArray:
-    """Return the current (A) for normal forces (N) of any shape; raises `ForceTableError` outside the table."""
+    """Return the current (A) for normal forces (N) of any shape, or raise `ForceTableError` outside."""
     wanted = np.asarray(normal_force, float)
     inside = (wanted >= 0.0) & (wanted <= table[1, -1])
     if not inside.all():
         raise ForceTableError(
-            f'normal force ({float(wanted[~inside].flat[0]):.2f} N) must lie within 0.00 .. {table[1, -1]:.2f} N, '
-            f'which {table[0, -1]:.2f} A reach; demand less force'
+            f'normal force ({float(wanted[~inside].flat[0]):.2f} N) must lie within 0.00 .. '
+            f'{table[1, -1]:.2f} N, which {table[0, -1]:.2f} A reach; demand less force'
         )
     return np.asarray(np.interp(wanted, table[1], table[0]))[()]
 
@@ -172,15 +173,15 @@ def _highest_normal_force(
     contact_gap: float,
     current: float,
 ) -> float:
-    """Return the normal force (N) at `current` (A): what the magnet pulls at the compressed gap less the spring."""
+    """Return the normal force (N) at `current` (A): the magnet's pull less the spring's, pads compressed."""
     normal_force = 0.0
     for _ in range(50):  # each step is some thirty times smaller than the one before
         gap = contact_gap - normal_force / pad_stiffness
         following = float(checked_force(law, current, gap)) - spring_stiffness * (rest_gap - gap)
         if not following > 0.0:
             raise ForceTableError(
-                f'current_high ({current:.2f} A) must close the pads; it leaves {-following:.1f} N of the spring '
-                f'unbalanced at {gap * 1e6:.1f} um: check both gap estimates, or allow more current'
+                f'current_high ({current:.2f} A) must close the pads; it leaves {-following:.1f} N of the '
+                f'spring unbalanced at {gap * 1e6:.1f} um: check both gap estimates, or allow more current'
             )
         if abs(following - normal_force) < 1e-9:
             break

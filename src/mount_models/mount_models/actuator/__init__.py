@@ -1,1 +1,1 @@
-"""The electromagnet: the controller's force law and its fit, and the simulated actuator that stands for the real one."""
+"""The electromagnet: the controller's force law and its fit, and the simulated actuator."""

@@ -12,24 +12,24 @@ from mount_models.quantity import Quantity
 _POLYNOMIAL = 'polynomial coefficients in powers of the gap in micrometres, lowest power first'
 
 
-class OutsideLaw(ValueError):
+class OutsideLawError(ValueError):
     """A force law was asked for something that it was never fitted to; the text says what and the remedy."""
 
 
-class GapOutsideLaw(OutsideLaw):
+class GapOutsideLaw(OutsideLawError):  # noqa: N818
     """The air gap lies outside the guarded range of the force law."""
 
 
-class CurrentOutsideLaw(OutsideLaw):
+class CurrentOutsideLaw(OutsideLawError):  # noqa: N818
     """The coil current lies outside the guarded range of the force law."""
 
 
-class ForceOutsideLaw(OutsideLaw):
+class ForceOutsideLaw(OutsideLawError):  # noqa: N818
     """No current within the guarded range gives this force at this air gap."""
 
 
 class ForceLaw(NamedTuple):
-    """Eq (3) with Eq (4): F = (a1 + a2 i) [atan(a3 a4) + atan(a3 (i - a4))] + a5 i^2 [atan(a3 a4) - atan(...)].
+    """Eqs (3), (4): F = (a1 + a2 i) [atan(a3 a4) + atan(a3 (i - a4))] + a5 i^2 [atan(a3 a4) - atan(...)].
 
     Inside the polynomials the gap is in micrometres, as in Table 1; every argument and result is SI.
     The law is meaningful only between `gap_low` and `gap_high` and from 0 to `current_high`.
@@ -58,7 +58,7 @@ TABLE_1 = ForceLaw(
 """The authors' prototype as printed in Table 1; the guarded range lies well within the hard limits."""
 
 TABLE_1_HARD_LIMITS = (148e-6, 546e-6)
-"""Gaps (m) beyond which Table 1 stops rising with current or falling with gap somewhere in 0 .. 3 A (derived)."""
+"""Gaps (m) beyond which Table 1 no longer rises with current and falls with gap over 0 .. 3 A (derived)."""
 
 
 @compiled
@@ -220,6 +220,7 @@ def _check_current(law: ForceLaw, current: npt.NDArray[np.float64]) -> None:
 def _refuse_force(law: ForceLaw, value: float, gap: float) -> None:
     highest = float(force(law, law.current_high, gap))
     raise ForceOutsideLaw(
-        f'magnetic force ({value:.2f} N) must lie within 0.00 .. {highest:.2f} N, which {law.current_high:.2f} A '
-        f'reach at an air gap of {gap * 1e6:.1f} um; demand less force, or make the gap smaller'
+        f'magnetic force ({value:.2f} N) must lie within 0.00 .. {highest:.2f} N, which '
+        f'{law.current_high:.2f} A reach at an air gap of {gap * 1e6:.1f} um; demand less force, '
+        f'or make the gap smaller'
     )

@@ -78,7 +78,7 @@ def gap_flux_density(actuator, current, gap):
 
 @compiled
 def force(actuator, current, gap):
-    """Return the magnetic force (N) between the core halves at `current` (A) and `gap` (m), Eq (1), A = 2 A_g."""
+    """Return the magnetic force (N) between the halves at `current` (A) and `gap` (m), Eq (1), A = 2 A_g."""
     density = gap_flux_density(actuator, current, gap)
     return actuator.gap_area * density * density / MU_0
 
@@ -108,7 +108,7 @@ def differential_permeability(actuator, field):
 
 @compiled
 def mean_incremental_inductance(actuator, current, gap):
-    """Return the slope of flux linkage over current (H) for slow changes, which reach the whole core section."""
+    """Return the slope of flux linkage over current (H) for slow changes, which reach all of the core."""
     permeability = differential_permeability(actuator, core_field(actuator, current, gap))
     reluctance = 1.0 / gap_permeance(actuator, gap)
     reluctance += actuator.core_length / (permeability * actuator.gap_area)

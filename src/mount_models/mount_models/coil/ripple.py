@@ -56,7 +56,7 @@ def flux_rate(coil, actuator, current):
 
 @compiled
 def current_rate(coil, actuator, current, gap):
-    """Return di/dt (A/s) at the moment of sampling, so that n A (dB/dt) / (di/dt) is the ripple's inductance."""
+    """Return di/dt (A/s) at the moment of sampling; n A (dB/dt) / (di/dt) is the ripple's inductance."""
     voltage = coil.link_voltage - coil.resistance * current
     return voltage / incremental_inductance(coil, actuator, current, gap)
 
@@ -80,7 +80,7 @@ def skin_factor(coil, diffusion_time, duty):
 
 @compiled
 def skin_factor_series(coil, diffusion_time, duty, terms):
-    """Return S of `skin_factor` as its series with at most `terms` terms; the reference for the quick form."""
+    """Return S of `skin_factor` as its series of at most `terms` terms; the reference for the quick form."""
     off_time = (1.0 - duty) * coil.pwm_period
     total = 0.0
     for k in range(1, terms + 1):
@@ -94,7 +94,7 @@ def skin_factor_series(coil, diffusion_time, duty, terms):
 
 @compiled
 def diffusion_time(coil, permeability):
-    """Return tau = mu sigma a^2 (s), the time in which a field crosses half a plate of `permeability` (H/m)."""
+    """Return tau = mu sigma a^2 (s), in which a field crosses half a plate of `permeability` (H/m)."""
     return permeability * coil.conductivity * coil.plate_half_thickness**2
 
 

@@ -1,0 +1,187 @@
+"""A specimen: everything the controller knows of one particular actuator, as one checked file.
+
+A specimen is what a calibration has measured and what is known by design. It holds no truth of the
+simulated plant; two mounts of one car have two specimens.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+
+import yaml
+
+from mount_models.actuator.law import ForceLaw
+from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
+from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
+from mount_models.quantity import Quantity, quantities
+
+T = TypeVar('T', bound=NamedTuple)
+
+DEFAULT_SPECIMEN = Path(__file__).resolve().parent / 'specimens' / 'default.yaml'
+
+
+class SpecimenError(ValueError):
+    """A specimen is incomplete, of the wrong kind or outside its limits; the text says where."""
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """One actuator with its coil, springs and pads, as the controller knows it; SI units throughout."""
+
+    name: str
+    force_law: ForceLaw
+    gap_curves: GapCurves
+    turns_area: Annotated[float, Quantity('m^2', 'turns times core area, forms L_i = n A dB/di', 1e-5, 10.0)]
+    spring_stiffness: Annotated[float, Quantity('N/m', 'stiffness k_s of both halves', 1e3, 1e7)]
+    pad_stiffness: Annotated[float, Quantity('N/m', 'stiffness k_p of the pads in contact', 5e6, 1e10)]
+    rest_current: Annotated[
+        float, Quantity('A', 'current at which the rest gap is measured', 0.01, 1.0, 'section 3.2')
+    ] = 0.2
+    crossing_inductance: Annotated[
+        float, Quantity('H', 'inductance at which the contact gap is measured', 1e-3, 1.0, 'section 3.2')
+    ] = 20e-3
+    current_limit: Annotated[
+        float, Quantity('A', 'largest current of the coil', 0.1, 20.0, 'section 3.2')
+    ] = 3.0
+    friction: dict[str, float] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+
+def default_specimen() -> Specimen:
+    """Return the specimen that `python -m mount_models.calibration` measured on the simulated actuator."""
+    return load_specimen(DEFAULT_SPECIMEN)
+
+
+def load_specimen(path: str | Path) -> Specimen:
+    """Return the specimen in the YAML file `path`; every doubt raises `SpecimenError` and names the entry."""
+    try:
+        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+    except OSError as error:
+        raise SpecimenError(
+            f'specimen file {path} cannot be read ({error.strerror}); give its full path'
+        ) from error
+    except yaml.YAMLError as error:
+        raise SpecimenError(f'specimen file {path} is not valid YAML; {error}') from error
+    try:
+        return specimen_from_mapping(content)
+    except SpecimenError as error:
+        raise SpecimenError(f'specimen file {path}: {error}') from error
+
+
+def save_specimen(specimen: Specimen, path: str | Path) -> None:
+    """Write the checked `specimen` to `path` as YAML, readable and without loss of digits."""
+    text = yaml.safe_dump(
+        specimen_to_mapping(checked_specimen(specimen)), sort_keys=False, default_flow_style=None, width=110
+    )
+    Path(path).write_text(
+        f'# Specimen of the engine mount. SI units; the coefficients of force_law: see Table 1.\n{text}'
+    )
+
+
+def specimen_to_mapping(specimen: Specimen) -> dict[str, Any]:
+    """Return the specimen as plain dictionaries, lists, texts and numbers."""
+    return {entry.name: _plain(getattr(specimen, entry.name)) for entry in fields(specimen)}
+
+
+def specimen_from_mapping(content: Any) -> Specimen:
+    """Return the checked specimen described by plain dictionaries and lists, or raise `SpecimenError`."""
+    hints = get_type_hints(Specimen)
+    values = _complete(content, list(hints), 'specimen')
+    for name, kind in hints.items():
+        values[name] = _converted(values[name], kind, name)
+    return checked_specimen(Specimen(**values))
+
+
+def checked_specimen(specimen: Specimen) -> Specimen:
+    """Return `specimen` if all values agree with their limits and each other, or raise `SpecimenError`."""
+    for name, quantity in quantities(Specimen).items():
+        _check_limits(getattr(specimen, name), quantity, name)
+    for name, quantity in quantities(ForceLaw).items():
+        value = getattr(specimen.force_law, name)
+        if isinstance(value, float):
+            _check_limits(value, quantity, f'force_law.{name}')
+    try:
+        check_force_law(specimen.force_law)
+        check_gap_curves(specimen.gap_curves)
+    except (ForceLawRefusedError, GapCurvesRefusedError) as error:
+        raise SpecimenError(f'{error}') from error
+    if specimen.current_limit > specimen.force_law.current_high:
+        raise SpecimenError(
+            f'current_limit ({specimen.current_limit:.2f} A) must not exceed force_law.current_high '
+            f'({specimen.force_law.current_high:.2f} A); lower it, or calibrate up to it'
+        )
+    return specimen
+
+
+def _complete(content: Any, names: list[str], where: str) -> dict[str, Any]:
+    """Return `content` if it is a mapping with exactly these names."""
+    if not isinstance(content, Mapping):
+        raise SpecimenError(
+            f'{where} must be a mapping of names to values; instead received {_told(content)}'
+        )
+    missing = [name for name in names if name not in content]
+    unknown = [str(name) for name in content if name not in names]
+    if missing or unknown:
+        fault = f'{missing[0]} is missing' if missing else f'{unknown[0]} is unknown'
+        raise SpecimenError(
+            f'{where} must hold exactly {", ".join(names)}; {fault}: correct it or calibrate again'
+        )
+    return dict(content)
+
+
+def _converted(value: Any, kind: Any, where: str) -> Any:
+    """Return `value` from a file as the declared `kind`."""
+    if isinstance(kind, type) and issubclass(kind, tuple):
+        hints = get_type_hints(kind)
+        parts = _complete(value, list(hints), where)
+        return kind(
+            **{name: _converted(parts[name], hint, f'{where}.{name}') for name, hint in hints.items()}
+        )
+    if get_origin(kind) is tuple:
+        if not isinstance(value, (list, tuple)) or not value:
+            raise SpecimenError(f'{where} must be a list of numbers; instead received {_told(value)}')
+        return tuple(_number(part, f'{where}[{k}]') for k, part in enumerate(value))
+    if get_origin(kind) is dict:
+        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+            raise SpecimenError(
+                f'{where} must be a mapping of names to values; instead received {_told(value)}'
+            )
+        if get_args(kind)[1] is float:
+            return {name: _number(part, f'{where}.{name}') for name, part in value.items()}
+        return dict(value)
+    if kind is str:
+        if not isinstance(value, str) or not value:
+            raise SpecimenError(f'{where} must be a text; instead received {_told(value)}')
+        return value
+    return _number(value, where)
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        remedy = ' (YAML reads 1e-6 as a text: write 1.0e-6)' if isinstance(value, str) else ''
+        raise SpecimenError(f'{where} must be a finite number; instead received {_told(value)}{remedy}')
+    return float(value)
+
+
+def _told(value: Any) -> str:
+    return repr(value) if len(repr(value)) < 60 else type(value).__name__
+
+
+def _check_limits(value: float, quantity: Quantity, where: str) -> None:
+    if not quantity.low <= value <= quantity.high:
+        raise SpecimenError(
+            f'{where} ({value:g} {quantity.unit}) must lie within {quantity.low:g} .. {quantity.high:g} '
+            f'{quantity.unit}: {quantity.meaning}'
+        )
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, '_asdict'):
+        return {name: _plain(part) for name, part in value._asdict().items()}
+    if isinstance(value, Mapping):
+        return {name: _plain(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    return value
