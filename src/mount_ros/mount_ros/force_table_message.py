@@ -25,17 +25,18 @@ class ForceTableMessageError(ValueError):
     """A current-force table message holds no usable table; the text says why and the remedy."""
 
 
-class ReceivedForceTable(NamedTuple):
-    """What a message holds: `activation` (ns) and `table`, shape (2, N), rows current (A) and force (N)."""
+class ForceTable(NamedTuple):
+    """What a message holds: `stamp` (ns) of its air_gap, `current` (A), `normal_force` (N), shape (N,)."""
 
-    activation: int
-    table: FloatArray
+    stamp: int
+    current: FloatArray
+    normal_force: FloatArray
 
 
-def to_message(activation: int, table: npt.ArrayLike) -> Float64MultiArray:
+def to_message(stamp: int, table: npt.ArrayLike) -> Float64MultiArray:
     """Return the message of a table of shape (2, N), rows current (A) and normal force (N).
 
-    `activation` is the stamp (ns) of the `air_gap` message. Raises `ForceTableMessageError` for a table
+    `stamp` (ns) is that of the `air_gap` message. Raises `ForceTableMessageError` for a table
     that `from_message` would refuse.
     """
     rows = np.asarray(table, float)
@@ -45,12 +46,12 @@ def to_message(activation: int, table: npt.ArrayLike) -> Float64MultiArray:
     count = int(rows.shape[1])
     dimensions = [
         MultiArrayDimension(label=_ROWS_LABEL, size=2, stride=2 * count),
-        MultiArrayDimension(label=f'{_ACTIVATION_LABEL}{activation}', size=count, stride=count),
+        MultiArrayDimension(label=f'{_ACTIVATION_LABEL}{stamp}', size=count, stride=count),
     ]
     return Float64MultiArray(layout=MultiArrayLayout(dim=dimensions), data=rows.ravel().tolist())
 
 
-def from_message(message: Float64MultiArray) -> ReceivedForceTable:
+def from_message(message: Float64MultiArray) -> ForceTable:
     """Return activation stamp and table of `message`, or raise `ForceTableMessageError`."""
     dimensions = list(message.layout.dim)
     if len(dimensions) != 2 or dimensions[0].size != 2:
@@ -67,10 +68,10 @@ def from_message(message: Float64MultiArray) -> ReceivedForceTable:
         )
     rows = np.array(message.data, float).reshape(2, count)
     _check(rows)
-    return ReceivedForceTable(_activation(dimensions[1].label), rows)
+    return ForceTable(_activation(dimensions[1].label), rows[0], rows[1])
 
 
-def from_bytes(raw: bytes) -> ReceivedForceTable:
+def from_bytes(raw: bytes) -> ForceTable:
     """Like `from_message`, from the serialised message that a data path hands over."""
     return from_message(deserialize_message(raw, Float64MultiArray))
 

@@ -17,14 +17,14 @@ TABLE = np.array([[0.4725, 0.8, 1.6, 3.0], [0.0, 40.0, 200.0, 304.0]])
 
 def test_table_and_activation_survive_the_message():
     received = from_message(to_message(STAMP, TABLE))
-    assert received.activation == STAMP
-    assert np.array_equal(received.table, TABLE)
+    assert received.stamp == STAMP
+    assert np.array_equal([received.current, received.normal_force], TABLE)
 
 
 def test_table_and_activation_survive_serialisation():
     received = from_bytes(serialize_message(to_message(STAMP, TABLE)))
-    assert received.activation == STAMP
-    assert np.array_equal(received.table, TABLE)
+    assert received.stamp == STAMP
+    assert np.array_equal([received.current, received.normal_force], TABLE)
 
 
 def test_layout_names_rows_sizes_strides_and_the_activation():
