@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from mount_models.compiled import compiled
 from mount_models.friction.coefficient import (
     FrictionCoefficients,
     dynamic_coefficient,
@@ -134,14 +135,17 @@ def test_without_the_velocity_limit_the_coefficient_turns_at_10_millimetres_per_
     assert speeds[int(np.argmax(mu))] == pytest.approx(0.0104, abs=1e-4)
 
 
-deflections = st.floats(-40e-6, 40e-6)
 loads = st.floats(0.01, 350.0)
 directions = st.sampled_from([-1.0, 1.0])
 
 
+@compiled
 def running_maximum(direction, speed, u, normal_force):
-    grid = np.append(np.linspace(0.0, min(speed, 0.010), 400), speed)
-    return max(dynamic_coefficient(TABLE_2, direction * max(v, 1e-15), u, normal_force) for v in grid)
+    highest = dynamic_coefficient(TABLE_2, direction * 1e-15, u, normal_force)
+    for step in range(3001):
+        slower = min(speed, 0.010) * 10.0 ** (-step / 500.0)
+        highest = max(highest, dynamic_coefficient(TABLE_2, direction * slower, u, normal_force))
+    return max(highest, dynamic_coefficient(TABLE_2, direction * speed, u, normal_force))
 
 
 @given(direction=directions, speed=st.floats(1e-6, 1.0), u=st.floats(-9e-6, 9e-6), normal_force=loads)
@@ -153,18 +157,22 @@ def test_speed_is_recovered_from_the_coefficient_where_it_is_unique(direction, s
 
 @given(
     direction=directions,
-    traction=st.floats(1e-3, 1e4),
-    u=deflections,
+    ratio=st.floats(0.001, 3.0),
+    u=st.floats(-100e-6, 100e-6),
     normal_force=loads,
-    resistance=st.floats(1.0, 1e5),
+    resistance=st.floats(1.0, 4000.0),
 )
+@example(direction=1.0, ratio=0.55, u=30e-6, normal_force=100.0, resistance=40.0)  # on the envelope
+@example(direction=1.0, ratio=0.1, u=100e-6, normal_force=100.0, resistance=400.0)  # mu = 0 at rest
+@example(direction=-1.0, ratio=0.1, u=1e-3, normal_force=100.0, resistance=400.0)  # mu = 0 far up
 @settings(deadline=None, max_examples=300)
-def test_speed_balances_traction_on_the_monotone_envelope(direction, traction, u, normal_force, resistance):
+def test_speed_balances_traction_on_the_monotone_envelope(direction, ratio, u, normal_force, resistance):
+    traction = ratio * normal_force
     speed = sliding_speed(TABLE_2, direction, traction, u, normal_force, resistance)
     assert 0.0 <= speed <= traction / resistance * (1.0 + 1e-12)
     friction = normal_force * running_maximum(direction, speed, u, normal_force)
     if speed > 0.0:
-        assert friction + resistance * speed == pytest.approx(traction, rel=1e-5, abs=1e-9)
+        assert friction + resistance * speed == pytest.approx(traction, rel=1e-4, abs=1e-9)
     else:
         assert friction >= traction * (1.0 - 1e-12)
 

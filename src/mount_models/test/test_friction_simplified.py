@@ -91,7 +91,7 @@ def test_normal_force_gives_the_desired_force(velocity, sign, force, deflection_
     normal_force, coefficient = normal_force_for(COEFS, force, sign * velocity, deflection_u, start)
     assert coefficient * normal_force == pytest.approx(force, rel=1e-12)
     mu = faded_coefficient(COEFS, sign * velocity, deflection_u, normal_force)
-    assert mu * normal_force == pytest.approx(force, rel=0.01)
+    assert mu * normal_force == pytest.approx(force, rel=1e-3)
 
 
 def test_normal_force_for_a_signed_force_is_that_for_its_magnitude():

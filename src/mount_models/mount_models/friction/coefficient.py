@@ -142,15 +142,14 @@ def sliding_speed(coefs, direction, traction, deflection_u, normal_force, resist
     at_rest = rest + log_gain * math.log(shift)
     if traction <= at_rest:
         return 0.0
-    if at_rest < 0.0 and drag > 0.0:
-        free = traction / drag
-        if rest + log_gain * math.log(shift + free) + linear * min(free, corner) <= 0.0:
-            return free / _MM_PER_M
-
     top = corner
     if linear < 0.0:
         top = min(max(-log_gain / linear - shift, 0.0), corner)
     at_top = rest + log_gain * math.log(shift + top) + linear * top
+    if at_rest < 0.0 and traction < drag * top:
+        free = traction / drag
+        if rest + log_gain * math.log(shift + free) + linear * free <= 0.0:
+            return free / _MM_PER_M
     if traction <= at_top + drag * top:
         return _rising_root(rest - traction, log_gain, shift, linear + drag, 0.0) / _MM_PER_M
 
