@@ -1,0 +1,126 @@
+"""Where each signal of a message lies, taken from the DBC and turned into compiled bit fields.
+
+cantools takes about 15 us to encode and 11 us to decode the measurement, which is too much at several
+kHz. So the positions, lengths, signs, scales and limits are read from its database once; after that one
+call of a compiled bit field does the work. A test holds the result against cantools.
+"""
+
+from collections.abc import Sequence
+from decimal import Decimal
+from operator import itemgetter
+from typing import Any
+
+import bitstruct.c
+from cantools.database.can import Message
+from cantools.database.can.signal import Signal
+
+# Steps from the DBC's units to SI; other units are kept and appear in the name of the field.
+_SI_FACTORS = {'mm': Decimal('0.001')}
+
+
+class DatabaseError(ValueError):
+    """The DBC does not describe what this driver needs; the text says what is missing."""
+
+
+class OutOfRangeError(ValueError):
+    """A value lies outside the limits that the DBC gives for its signal."""
+
+
+class Scaling:
+    """One signal between its SI value and its raw whole number, with the limits of the DBC."""
+
+    def __init__(self, signal: Signal):
+        scale = Decimal(str(signal.scale)) * _SI_FACTORS.get(signal.unit or '', Decimal(1))
+        self.steps = float(1 / scale)  # raw steps per SI unit
+        if signal.offset or not self.steps.is_integer():
+            raise DatabaseError(
+                f'{signal.name}: factor {signal.scale} and offset {signal.offset} are not usable; '
+                f'needed are offset 0 and a whole number of steps per unit'
+            )
+        self.name = signal.name
+        self.unit = 'm' if signal.unit == 'mm' else (signal.unit or '1')
+        self.raw_low, self.raw_high = (_raw_limit(signal, limit) for limit in ('minimum', 'maximum'))
+        self.low, self.high = self.to_si(self.raw_low), self.to_si(self.raw_high)
+
+    def to_raw(self, value: float) -> int:
+        """Return the nearest raw number; raises `OutOfRangeError`, also for infinity; NaN is not allowed."""
+        scaled = value * self.steps
+        if self.raw_low <= scaled <= self.raw_high:
+            return round(scaled)
+        raise OutOfRangeError(
+            f'{self.name} ({value:g} {self.unit}) must lie within {self.low:g} .. {self.high:g} {self.unit}; '
+            f'send a reading outside as not valid (NaN)'
+        )
+
+    def to_si(self, raw: int) -> float:
+        """Return the SI value of a raw number: the nearest float64, because `steps` is a whole number."""
+        return raw / self.steps
+
+    def holds(self, raw: int) -> bool:
+        """Whether a raw number lies within the limits."""
+        return self.raw_low <= raw <= self.raw_high
+
+
+class MessageLayout:
+    """Packs and unpacks the raw numbers of one message, in the order of `names`."""
+
+    def __init__(self, message: Message, names: Sequence[str]):
+        signals = sorted(message.signals, key=lambda signal: signal.start)
+        known = [signal.name for signal in signals]
+        if sorted(known) != sorted(names):
+            raise DatabaseError(f'{message.name} has the signals {known}; this driver needs {list(names)}')
+        self.name = message.name
+        self.names = tuple(names)
+        self.frame_id = message.frame_id
+        self.length = message.length
+        self.data_id = _attribute(message, 'E2EDataId')
+        self._bits = bitstruct.c.compile(_reversed_bit_format(message, signals))
+        # The bit format runs from the last bit to the first.
+        known.reverse()
+        self._to_wire = itemgetter(*(list(names).index(name) for name in known))
+        self._from_wire = itemgetter(*(known.index(name) for name in names))
+
+    def pack(self, raw: Sequence[int]) -> bytearray:
+        """Return the message with these raw numbers, without its CRC; raises `OutOfRangeError`."""
+        try:
+            data = bytearray(self._bits.pack(*self._to_wire(raw)))
+        except OverflowError:
+            numbers = ', '.join(f'{name} {number}' for name, number in zip(self.names, raw, strict=True))
+            raise OutOfRangeError(f'{self.name}: a number does not fit its bits: {numbers}') from None
+        data.reverse()
+        return data
+
+    def unpack(self, data: bytes | bytearray) -> tuple[int, ...]:
+        """Return the raw numbers of a message of the right length."""
+        return self._from_wire(self._bits.unpack(data[::-1]))
+
+
+def _raw_limit(signal: Signal, limit: str) -> int:
+    value = getattr(signal, limit)
+    if value is None:
+        raise DatabaseError(f'{signal.name} has no {limit} in the DBC; every signal needs its limits')
+    return round(Decimal(str(value)) / Decimal(str(signal.scale)))
+
+
+def _attribute(message: Message, name: str) -> Any:
+    attributes = message.dbc.attributes if message.dbc else {}
+    if name not in attributes:
+        raise DatabaseError(f'{message.name} has no attribute {name} in the DBC')
+    return attributes[name].value
+
+
+def _reversed_bit_format(message: Message, signals: list[Signal]) -> str:
+    # Little-endian signals are contiguous bit fields once the order of the bytes is reversed.
+    fields: list[str] = []
+    position = 0
+    for signal in signals:
+        if signal.byte_order != 'little_endian' or signal.start < position or signal.is_float:
+            raise DatabaseError(
+                f'{signal.name} must be a little-endian whole number apart from other signals'
+            )
+        fields.append(f'p{signal.start - position}' if signal.start > position else '')
+        fields.append(f'{"s" if signal.is_signed else "u"}{signal.length}')
+        position = signal.start + signal.length
+    rest = message.length * 8 - position
+    fields.append(f'p{rest}' if rest else '')
+    return ''.join(reversed(fields))

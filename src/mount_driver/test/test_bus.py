@@ -1,0 +1,132 @@
+"""Buses open, filter, hold a burst, and say what is wrong when they do not open."""
+
+import itertools
+import os
+import socket
+
+import can
+import pytest
+
+from mount_driver.bus import MULTICAST_GROUP, CanLinkError, _check_socketcan, open_bus
+
+_ports = itertools.count(20_000 + os.getpid() % 20_000)
+
+
+def frame(number, data=b'\x01' * 24, **options):
+    return can.Message(arbitration_id=number, is_extended_id=False, is_fd=True, data=data, **options)
+
+
+@pytest.fixture(params=['udp_multicast', 'virtual'])
+def pair(request):
+    port = next(_ports)
+    arguments = (request.param, MULTICAST_GROUP if request.param == 'udp_multicast' else f'test-{port}')
+    with (
+        open_bus(*arguments, port=port) as far,
+        open_bus(*arguments, port=port, receive=(0x210, 0x212)) as near,
+    ):
+        yield far, near
+
+
+def test_a_frame_arrives_as_can_fd_with_its_data(pair):
+    far, near = pair
+    far.send(frame(0x210, bytes(range(24)), bitrate_switch=True))
+    message = near.recv(10.0)
+    assert (message.arbitration_id, message.data, message.is_fd) == (0x210, bytes(range(24)), True)
+
+
+def test_frames_with_other_identifiers_are_filtered_out(pair):
+    far, near = pair
+    for number in (0x211, 0x213, 0x212):
+        far.send(frame(number))
+    assert near.recv(10.0).arbitration_id == 0x212
+    assert near.recv(0.0) is None
+
+
+def test_own_frames_do_not_come_back(pair):
+    far, near = pair
+    near.send(frame(0x210))
+    assert far.recv(10.0).arbitration_id == 0x210
+    assert near.recv(0.0) is None
+
+
+def test_a_burst_of_half_a_second_is_held():
+    port = next(_ports)
+    with open_bus('udp_multicast', MULTICAST_GROUP, port=port) as far:
+        near = open_bus('udp_multicast', MULTICAST_GROUP, port=port)
+        for number in range(500):
+            far.send(frame(number))
+        received = [message.arbitration_id for message in iter(lambda: near.recv(0.0), None)]
+        near.shutdown()
+    assert received == list(range(500))
+
+
+def test_the_receive_buffer_is_wider_than_the_kernels_usual_one():
+    near = open_bus('udp_multicast', MULTICAST_GROUP, port=next(_ports))
+    with socket.socket(fileno=os.dup(near.fileno())) as sock, socket.socket(type=socket.SOCK_DGRAM) as usual:
+        widened, before = (s.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) for s in (sock, usual))
+    near.shutdown()
+    assert widened > before
+
+
+def test_error_frames_pass_the_filter():
+    port = next(_ports)
+    with (
+        open_bus('udp_multicast', MULTICAST_GROUP, port=port) as far,
+        open_bus('udp_multicast', MULTICAST_GROUP, port=port, receive=(0x210,)) as near,
+    ):
+        far.send(can.Message(arbitration_id=0x40, is_extended_id=False, is_error_frame=True, dlc=8))
+        assert near.recv(10.0).is_error_frame
+
+
+def test_python_cans_own_multicast_interface_can_listen_in():
+    port = next(_ports)
+    options = {'channel': MULTICAST_GROUP, 'port': port, 'hop_limit': 0, 'fd': True}
+    try:
+        foreign = can.Bus(interface='udp_multicast', ignore_config=True, **options)
+    except can.CanInitializationError:
+        pytest.skip("python-can's own interface needs a network route for multicast, ours does not")
+    with foreign, open_bus('udp_multicast', MULTICAST_GROUP, port=port) as near:
+        near.send(frame(0x211))
+        assert foreign.recv(10.0).arbitration_id == 0x211
+        foreign.send(frame(0x210))
+        assert near.recv(10.0).arbitration_id == 0x210
+
+
+@pytest.mark.parametrize(
+    ('interface', 'channel', 'sentence'),
+    [
+        ('udp_multicast', '192.0.2.1', 'no multicast address; the channel must be an IPv4 multicast address'),
+        ('udp_multicast', 'can0', 'the channel must be an IPv4 multicast address such as 239'),
+        ('socketcan', 'no-such-can', 'ip link set no-such-can up type can bitrate 250000 dbitrate 1000000'),
+        ('carrier_pigeon', 'x', "interface 'carrier_pigeon'.*known interfaces are .*socketcan"),
+        ('pcan', 'PCAN_USBBUS1', 'is the adapter plugged in, its driver installed'),
+        ('kvaser', '0', 'is the adapter plugged in, its driver installed'),
+    ],
+)
+def test_a_bus_that_does_not_open_says_what_was_tried_and_the_remedy(interface, channel, sentence):
+    with pytest.raises(CanLinkError, match=sentence) as caught:
+        open_bus(interface, channel, port=next(_ports), bitrate=250_000, data_bitrate=1_000_000)
+    assert f"CAN interface '{interface}', channel '{channel}'" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('state', 'mtu', 'sentence'),
+    [('down', 72, 'is down'), ('up', 16, 'not in CAN FD mode: its MTU is 16'), ('missing', 72, 'no such')],
+)
+def test_a_socketcan_interface_that_cannot_carry_fd_frames_is_refused(tmp_path, state, mtu, sentence):
+    folder = tmp_path / 'can0'
+    if state != 'missing':
+        folder.mkdir()
+        (folder / 'operstate').write_text(f'{state}\n')
+        (folder / 'mtu').write_text(f'{mtu}\n')
+    with pytest.raises(OSError, match=sentence):
+        _check_socketcan('can0', tmp_path)
+
+
+@pytest.mark.parametrize('state', ['up', 'unknown'])
+def test_a_socketcan_interface_in_fd_mode_is_accepted(tmp_path, state):
+    folder = tmp_path / 'can0'
+    folder.mkdir()
+    (folder / 'operstate').write_text(f'{state}\n')
+    (folder / 'mtu').write_text('72\n')
+    _check_socketcan('can0', tmp_path)
