@@ -1,0 +1,209 @@
+"""Damper characteristics: the friction force that control asks for, as a table over speed.
+
+Each law is one class: it gives the force magnitude above a dead zone, in which no force is asked for, so that
+the pads do not stick (Sec. 5). `damper_curve` turns a name or a law into a table with a uniform grid.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from mount_models.compiled import compiled
+from mount_models.quantity import ParameterError, Quantity, checked
+
+FloatArray = npt.NDArray[np.float64]
+
+HIGHEST_VELOCITY = 1.0
+"""The table ends here (m/s, chosen): twenty times the peak velocity of 8 Hz with 1 mm."""
+SMALLEST_DEAD_ZONE = 0.0001
+"""A dead zone is none at all or at least this wide (m/s, chosen), because it sets the grid of the table."""
+LONGEST_VELOCITY_STEP = 0.0005
+"""Grid of the table (m/s, chosen), so that bent laws are met within 0.01 N."""
+
+
+class DamperError(ValueError):
+    """A damper characteristic cannot be built; the text says why and the remedy."""
+
+
+@dataclass(frozen=True)
+class DamperCurve:
+    """Force magnitudes `table` (n,) in N at the speeds 0, `velocity_step`, 2 `velocity_step`, ... in m/s."""
+
+    name: str
+    table: FloatArray
+    velocity_step: float
+
+    @property
+    def velocities(self) -> FloatArray:
+        """The velocity magnitudes of the table, (n,), m/s."""
+        return np.arange(self.table.size, dtype=np.float64) * self.velocity_step
+
+    def force(self, velocity: npt.ArrayLike) -> FloatArray:
+        """Return the force (N), of the sign of `velocity` (m/s, any shape)."""
+        speeds = np.asarray(velocity, float)
+        forces: FloatArray = np.zeros(speeds.shape)
+        for place in np.ndindex(speeds.shape):
+            forces[place] = damper_force(self.table, self.velocity_step, speeds[place])
+        return forces
+
+
+@compiled
+def damper_force(table, velocity_step, velocity):
+    """Return the force (N) at `velocity` (m/s), odd in it and constant beyond the end of the table."""
+    place = abs(velocity) / velocity_step
+    last = table.size - 1
+    if place >= last:
+        magnitude = table[last]
+    elif place >= 0.0:
+        node = int(place)
+        magnitude = table[node] + (place - node) * (table[node + 1] - table[node])
+    else:  # not a number
+        return velocity
+    return -magnitude if velocity < 0.0 else magnitude
+
+
+_DampingCoefficient = Annotated[
+    float, Quantity('N s/m', 'c_d: slope of force over velocity just above the dead zone', 1.0, 1e5)
+]
+_DeadZone = Annotated[
+    float, Quantity('m/s', 'velocity magnitude up to which no force is asked for', 0.0, 0.1)
+]
+_ForceLimit = Annotated[float, Quantity('N', 'largest force magnitude asked for', 1.0, 1e4)]
+
+
+class ViscousDamper(NamedTuple):
+    """Force c_d (|v| - dead zone), the characteristic of the paper (Sec. 5); values chosen."""
+
+    damping_coefficient: _DampingCoefficient = 2000.0
+    dead_zone: _DeadZone = 0.004
+    force_limit: _ForceLimit = 300.0
+
+    def magnitude(self, excess_velocity: FloatArray) -> FloatArray:
+        """Return the force (N) at velocity magnitudes above the dead zone (m/s, >= 0)."""
+        return self.damping_coefficient * excess_velocity
+
+
+class DegressiveDamper(NamedTuple):
+    """Force F_0 (1 - exp(-c_d (|v| - dead zone) / F_0)), for strong damping of small motions (chosen)."""
+
+    damping_coefficient: _DampingCoefficient = 4000.0
+    dead_zone: _DeadZone = 0.004
+    force_limit: _ForceLimit = 300.0
+    final_force: Annotated[float, Quantity('N', 'F_0: force that high velocities approach', 1.0, 1e4)] = 120.0
+
+    def magnitude(self, excess_velocity: FloatArray) -> FloatArray:
+        """Return the force (N) at velocity magnitudes above the dead zone (m/s, >= 0)."""
+        return -self.final_force * np.expm1(-self.damping_coefficient / self.final_force * excess_velocity)
+
+
+class ProgressiveDamper(NamedTuple):
+    """Force c_d w (1 + w / w_0), w = |v| - dead zone, for soft damping of small motions (chosen)."""
+
+    damping_coefficient: _DampingCoefficient = 1000.0
+    dead_zone: _DeadZone = 0.004
+    force_limit: _ForceLimit = 300.0
+    doubling_velocity: Annotated[
+        float, Quantity('m/s', 'w_0: above the dead zone, velocity with twice the viscous force', 0.001, 10.0)
+    ] = 0.040
+
+    def magnitude(self, excess_velocity: FloatArray) -> FloatArray:
+        """Return the force (N) at velocity magnitudes above the dead zone (m/s, >= 0)."""
+        return self.damping_coefficient * excess_velocity * (1.0 + excess_velocity / self.doubling_velocity)
+
+
+class DamperLaw(Protocol):
+    """What a law must offer to become a table."""
+
+    @property
+    def dead_zone(self) -> float: ...
+
+    @property
+    def force_limit(self) -> float: ...
+
+    def magnitude(self, excess_velocity: FloatArray) -> FloatArray: ...
+
+
+DAMPER_LAWS: dict[str, Any] = {
+    'viscous': ViscousDamper,
+    'degressive': DegressiveDamper,
+    'progressive': ProgressiveDamper,
+}
+
+DAMPERS: dict[str, Any] = {
+    'viscous_1000': ViscousDamper(1000.0),
+    'viscous_2000': ViscousDamper(2000.0),
+    'viscous_3000': ViscousDamper(3000.0),
+    'viscous_4000': ViscousDamper(4000.0),
+    'degressive': DegressiveDamper(),
+    'progressive': ProgressiveDamper(),
+}
+"""The characteristics that can be chosen by name."""
+
+
+def damper_curve(choice: str | Mapping[str, Any] | DamperLaw) -> DamperCurve:
+    """Return the curve of a name in `DAMPERS`, of a law, or of a mapping that names law and parameters.
+
+    A mapping is such as {'law': 'viscous', 'dead_zone': 0.002}; what it leaves out has its default.
+    Raises `DamperError` if name or law is unknown, `ParameterError` for a value outside its range.
+    """
+    if isinstance(choice, str):
+        if choice not in DAMPERS:
+            raise DamperError(f'no damper curve is called {choice!r}; known are {", ".join(DAMPERS)}')
+        return _tabulated(choice, DAMPERS[choice])
+    if isinstance(choice, Mapping):
+        return _tabulated(str(choice.get('law')), _law_of(choice))
+    return _tabulated(type(choice).__name__, choice)
+
+
+def viscous(damping_coefficient: float, dead_zone: float = 0.004, force_limit: float = 300.0) -> DamperCurve:
+    """Return the curve c_d max(|v| - dead zone, 0), c_d in N s/m, dead zone in m/s, limited in N."""
+    law = ViscousDamper(damping_coefficient, dead_zone, force_limit)
+    return _tabulated(f'viscous_{damping_coefficient:g}', law)
+
+
+def _law_of(values: Mapping[str, Any]) -> Any:
+    given = dict(values)
+    name = given.pop('law', None)
+    if name not in DAMPER_LAWS:
+        raise DamperError(f'no damper law is called {name!r}; known are {", ".join(DAMPER_LAWS)}')
+    law = DAMPER_LAWS[name]
+    unknown = sorted(set(given) - set(law._fields))
+    if unknown:
+        raise ParameterError(
+            f'{unknown[0]} is no parameter of the {name} damper; known are {", ".join(law._fields)}'
+        )
+    return law(**given)
+
+
+def _tabulated(name: str, law: Any) -> DamperCurve:
+    law = checked(law)
+    if 0.0 < law.dead_zone < SMALLEST_DEAD_ZONE:
+        raise DamperError(
+            f'dead_zone ({law.dead_zone:g} m/s) of the damper {name} must be 0 or at least '
+            f'{SMALLEST_DEAD_ZONE:g} m/s; choose 0 for none'
+        )
+    step = _velocity_step(law.dead_zone)
+    velocities = np.arange(round(HIGHEST_VELOCITY / step) + 1) * step
+    edge = round(law.dead_zone / step)
+    force = law.magnitude(np.maximum(velocities - edge * step, 0.0))
+    # the table ends below the limit, because a node cut down to it would bend the last piece
+    within = int(np.searchsorted(force, law.force_limit * (1.0 + 1e-12), side='right'))
+    table = force[:within].copy()
+    if not table[-1] > 0.0:
+        raise DamperError(
+            f'force_limit ({law.force_limit:g} N) of the damper {name} must be reached more than one grid '
+            f'step ({step:g} m/s) above the dead zone; raise the limit or lower damping_coefficient'
+        )
+    table.flags.writeable = False
+    return DamperCurve(name, table, step)
+
+
+def _velocity_step(dead_zone: float) -> float:
+    """Return the grid step (m/s) that makes the edge of the dead zone, a corner of the curve, a node."""
+    if dead_zone == 0.0:
+        return LONGEST_VELOCITY_STEP
+    return dead_zone / math.ceil(dead_zone / LONGEST_VELOCITY_STEP)

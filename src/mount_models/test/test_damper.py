@@ -1,0 +1,114 @@
+"""Damper characteristics: tables that equal their law, are odd, saturate, and refuse nonsense."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_models.damper import (
+    DAMPERS,
+    DamperError,
+    DegressiveDamper,
+    ProgressiveDamper,
+    ViscousDamper,
+    damper_curve,
+    damper_force,
+    viscous,
+)
+from mount_models.quantity import ParameterError
+
+
+@given(
+    damping_coefficient=st.floats(10.0, 8000.0),
+    dead_zone=st.one_of(st.just(0.0), st.floats(1e-4, 0.02)),
+    velocity=st.floats(-0.4, 0.4),
+)
+@settings(deadline=None, max_examples=150)
+def test_viscous_curve_equals_its_law_at_and_between_the_nodes(damping_coefficient, dead_zone, velocity):
+    curve = viscous(damping_coefficient, dead_zone, force_limit=10000.0)
+    law = damping_coefficient * max(abs(velocity) - dead_zone, 0.0) * np.sign(velocity)
+    assert damper_force(curve.table, curve.velocity_step, velocity) == pytest.approx(
+        law, rel=1e-12, abs=1e-10
+    )
+    nodes = damping_coefficient * np.maximum(curve.velocities - dead_zone, 0.0)
+    np.testing.assert_allclose(curve.table, nodes, rtol=1e-12, atol=1e-10)
+
+
+@pytest.mark.parametrize('name', DAMPERS)
+def test_every_named_curve_is_odd_rises_and_rests_in_the_dead_zone(name):
+    curve = damper_curve(name)
+    velocity = np.linspace(0.0, 1.5, 3001)
+    force = curve.force(velocity)
+    assert np.array_equal(curve.force(-velocity), -force)
+    assert np.all(np.diff(force) >= 0.0)
+    assert np.all(force[velocity <= 0.004] == 0.0)
+    assert force[velocity > 0.0041].min() > 0.0
+
+
+@pytest.mark.parametrize('damping_coefficient', [1000, 2000, 3000, 4000])
+def test_named_viscous_curves_have_their_slope(damping_coefficient):
+    curve = damper_curve(f'viscous_{damping_coefficient}')
+    assert curve.force(0.0503) == pytest.approx(damping_coefficient * 0.0463, rel=1e-12)
+
+
+def test_curve_saturates_at_the_last_node_below_its_limit():
+    curve = viscous(4000.0, force_limit=150.0)
+    assert curve.table[-1] == pytest.approx(150.0, abs=1e-9)
+    assert curve.force([0.05, 0.5, 1e9, -1e9]) == pytest.approx([150.0, 150.0, 150.0, -150.0], abs=1e-9)
+    uneven = viscous(4000.0, force_limit=151.0)
+    assert 151.0 - 4000.0 * uneven.velocity_step < uneven.force(1.0) <= 151.0
+
+
+def test_degressive_curve_starts_with_its_slope_and_approaches_its_final_force():
+    curve = damper_curve(DegressiveDamper(4000.0, 0.004, 300.0, 120.0))
+    assert curve.force(0.0045) == pytest.approx(2.0, rel=0.01)
+    assert curve.force(0.9) == pytest.approx(120.0, abs=1e-9)
+
+
+def test_progressive_curve_doubles_the_viscous_force_at_its_doubling_velocity():
+    curve = damper_curve(ProgressiveDamper(1000.0, 0.004, 300.0, 0.040))
+    assert curve.force(0.044) == pytest.approx(80.0, rel=1e-9)
+
+
+@pytest.mark.parametrize('law', [DegressiveDamper(), ProgressiveDamper()])
+def test_bent_curves_are_met_between_the_nodes(law):
+    velocity = np.linspace(0.004, 0.09, 4001)
+    assert damper_curve(law).force(velocity) == pytest.approx(law.magnitude(velocity - 0.004), abs=0.01)
+
+
+def test_mapping_chooses_law_and_parameters():
+    curve = damper_curve({'law': 'viscous', 'damping_coefficient': 2500.0, 'dead_zone': 0.002})
+    assert np.array_equal(curve.table, damper_curve(ViscousDamper(2500.0, 0.002)).table)
+
+
+def test_unknown_velocity_gives_unknown_force():
+    curve = damper_curve('viscous_2000')
+    assert np.isnan(damper_force(curve.table, curve.velocity_step, np.nan))
+
+
+def test_table_cannot_be_changed_behind_the_curve():
+    with pytest.raises(ValueError, match='read-only'):
+        damper_curve('viscous_2000').table[3] = 1.0
+
+
+@pytest.mark.parametrize(
+    ('choice', 'error', 'sentence'),
+    [
+        ('viscous_5', DamperError, "no damper curve is called 'viscous_5'; known are viscous_1000"),
+        ({'law': 'magic'}, DamperError, "no damper law is called 'magic'; known are viscous"),
+        ({'damping_coefficient': 5.0}, DamperError, 'no damper law is called None'),
+        ({'law': 'viscous', 'slope': 5.0}, ParameterError, 'slope is no parameter of the viscous damper'),
+        (ViscousDamper(-5.0), ParameterError, r'damping_coefficient \(-5 N s/m\) must lie within 1 \.\.'),
+        (ViscousDamper(2000.0, dead_zone=-0.001), ParameterError, r'dead_zone \(-0.001 m/s\)'),
+        (
+            ViscousDamper(2000.0, dead_zone=1e-9),
+            DamperError,
+            r'dead_zone \(1e-09 m/s\) .* must be 0 or at least',
+        ),
+        (ViscousDamper(2000.0, force_limit=float('nan')), ParameterError, r'force_limit \(nan N\)'),
+        (ViscousDamper(90000.0, force_limit=2.0), DamperError, r'force_limit \(2 N\) of the damper'),
+    ],
+)
+def test_nonsense_is_refused_with_a_sentence(choice, error, sentence):
+    with pytest.raises(error, match=sentence):
+        damper_curve(choice)
