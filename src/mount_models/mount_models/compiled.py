@@ -11,9 +11,10 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import config as numba_config
 
 F = TypeVar('F', bound=Callable[..., Any])
 
@@ -23,12 +24,13 @@ _MODELS = Path(__file__).resolve().parent
 def compiled(function: F) -> F:
     """Return `function` compiled by numba on its first call and cached on disk."""
     package = _package_folder(Path(function.__code__.co_filename).resolve())
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_cache_root() / _sources_digest(package))
+    config: Any = numba_config  # numba reads the folder when it decorates
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(_cache_root() / _sources_digest(package))
     try:
-        return numba.njit(cache=True, error_model='numpy')(function)
+        return cast(F, numba.njit(cache=True, error_model='numpy')(function))
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before
 
 
 def _package_folder(file: Path) -> Path:

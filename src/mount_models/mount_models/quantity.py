@@ -46,7 +46,7 @@ def checked(parameters: P) -> P:
     values = {}
     for name, value in parameters._asdict().items():
         values[name] = _checked_value(name, value, hints[name], notes.get(name))
-    return type(parameters)(**values)
+    return parameters._replace(**values)
 
 
 def with_values(parameters: P, **changes: Any) -> P:

@@ -1,0 +1,73 @@
+"""Band-pass at the eigenfrequency, velocity in the band, and its prediction over the loop's delay."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy import signal
+
+from mount_models.compiled import compiled
+
+
+class BandPass(NamedTuple):
+    """Second-order band-pass, bilinear with prewarping, b = (gain, 0, -gain), and its prediction.
+
+    The predicted velocity is `from_velocity` times the band velocity plus `from_displacement` times
+    the band displacement.
+    """
+
+    gain: float
+    a1: float
+    a2: float
+    sample_time: float
+    from_velocity: float
+    from_displacement: float
+
+
+STATE = np.dtype([('z1', 'f8'), ('z2', 'f8'), ('displacement', 'f8')])
+
+
+def design(eigenfrequency: float, quality: float, lead_time: float, sample_time: float) -> BandPass:
+    """Return the band-pass for an eigenfrequency in Hz that predicts `lead_time` s ahead.
+
+    H(s) = (w0/Q) s / (s^2 + (w0/Q) s + w0^2): gain 1 and phase 0 at the eigenfrequency.
+    """
+    w0 = 2.0 * math.pi * eigenfrequency
+    prewarped_rate = w0 / (2.0 * math.tan(0.5 * w0 * sample_time))
+    b, a = signal.bilinear([w0 / quality, 0.0], [1.0, w0 / quality, w0 * w0], fs=prewarped_rate)
+    # A sine A sin(p) has the band velocity A w0 cos(p - f) because the difference of two samples
+    # stands half a sample back, f = w0 Ts/2. Wanted is A w0 cos(p + l), l = w0 lead_time.
+    lead, half_sample = w0 * lead_time, 0.5 * w0 * sample_time
+    return BandPass(
+        gain=float(b[0]),
+        a1=float(a[1]),
+        a2=float(a[2]),
+        sample_time=sample_time,
+        from_velocity=math.cos(lead) / math.cos(half_sample),
+        from_displacement=-w0 * math.sin(lead + half_sample) / math.cos(half_sample),
+    )
+
+
+@compiled
+def settle(band_pass, state, displacement):
+    """Set the state to that of a mount which has always been at `displacement`."""
+    state.z1 = -band_pass.gain * displacement
+    state.z2 = -band_pass.gain * displacement
+    state.displacement = 0.0
+
+
+@compiled
+def step(band_pass, state, displacement):
+    """Take one sample; return (band displacement m, band velocity m/s, predicted velocity m/s).
+
+    Differentiation and band-pass are linear and may change places: the difference of the filtered
+    displacement is the filtered velocity (Fig. 12), with one filter instead of two.
+    """
+    before = state.displacement
+    banded = band_pass.gain * displacement + state.z1
+    state.z1 = state.z2 - band_pass.a1 * banded
+    state.z2 = -band_pass.gain * displacement - band_pass.a2 * banded
+    state.displacement = banded
+    velocity = (banded - before) / band_pass.sample_time
+    predicted = band_pass.from_velocity * velocity + band_pass.from_displacement * banded
+    return banded, velocity, predicted

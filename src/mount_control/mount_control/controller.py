@@ -1,0 +1,218 @@
+"""From a displacement sample to a coil current: the control of Fig. 12 in reading order."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_control import band_pass, force_to_current, switching
+from mount_control.parameters import SAMPLE_TIME, ControlParameters, checked_parameters
+from mount_models.compiled import compiled
+from mount_models.damper import DamperCurve, damper_force
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.friction.simplified import normal_force_for, simplified_step
+from mount_models.record import record_bytes, record_dtype
+
+TRACE = np.dtype(
+    [
+        (name, 'f8')
+        for name in (
+            'displacement',
+            'velocity',
+            'band_displacement',
+            'band_velocity',
+            'predicted_velocity',
+            'magnitude',
+            'damping_active',
+            'desired_force',
+            'friction_deflection',
+            'friction_coefficient',
+            'normal_force',
+            'current',
+            'bridged_samples',
+        )
+    ]
+)
+"""Every intermediate of one control step, SI; the fields of the topic `control_trace` in its order."""
+
+_STATE = np.dtype(
+    [
+        ('band', band_pass.STATE),
+        ('switching', switching.STATE),
+        ('displacement', 'f8'),
+        ('deflection', 'f8'),
+        ('normal_force', 'f8'),
+    ]
+)
+
+
+class Law(NamedTuple):
+    """The numbers that a control step needs and does not change."""
+
+    band: band_pass.BandPass
+    switching: switching.Switching
+    damper_step: float
+    friction: FrictionCoefficients
+    contact: FrictionContact
+    limits: force_to_current.CurrentLimits
+
+
+_LAW = record_dtype(Law)
+
+
+class Tables(NamedTuple):
+    """The tables that a control step looks up: damper force (N) over velocity, current (A) over force."""
+
+    damper: NDArray[np.float64]
+    current: NDArray[np.float64]
+
+
+class Controller:
+    """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
+
+    def __init__(
+        self,
+        parameters: ControlParameters,
+        damper: DamperCurve,
+        friction: FrictionCoefficients,
+        contact: FrictionContact,
+        table: force_to_current.CurrentTable,
+    ):
+        parameters = checked_parameters(parameters)
+        law = Law(
+            band_pass.design(
+                parameters.eigenfrequency, parameters.quality, parameters.lead_time, SAMPLE_TIME
+            ),
+            switching.Switching(
+                parameters.switch_on_level, parameters.switch_off_level, parameters.period_samples
+            ),
+            damper.velocity_step,
+            friction,
+            contact,
+            table.limits,
+        )
+        self._law = record_bytes(law)
+        self._tables = Tables(damper.table, table.currents)
+        self._state = np.zeros(1, _STATE).view(np.uint8)
+        self._trace = np.zeros(1, TRACE).view(np.uint8)
+        self._window = np.zeros(parameters.period_samples)
+        self.restart(0.0)
+
+    @property
+    def trace(self) -> np.void:
+        """The intermediates of the last step."""
+        return self._trace.view(TRACE)[0]
+
+    @property
+    def trace_bytes(self) -> bytes:
+        """The intermediates of the last step as little-endian float64 numbers."""
+        return self._trace.tobytes()
+
+    def restart(self, displacement: float) -> None:
+        """Forget the past: a mount at rest at `displacement` (m), damping off."""
+        self._state[:] = 0
+        self._window[:] = 0.0
+        start(self._law, self._state, displacement)
+
+    def step(self, displacement: float, bridged_samples: int = 0) -> float:
+        """Take one displacement sample in m and return the current setpoint in A.
+
+        `bridged_samples` samples missing before it are replaced by a straight line.
+        """
+        return step(
+            self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
+        )
+
+    def run(self, displacement: NDArray[np.float64]) -> NDArray[np.void]:
+        """Take n displacement samples in m and return n traces; bit-identical to n calls of `step`."""
+        traces = np.zeros(len(displacement), TRACE)
+        samples = np.ascontiguousarray(displacement, dtype=float)
+        run(self._law, self._tables, self._state, self._window, traces.view(np.uint8), samples)
+        return traces
+
+
+@compiled
+def start(law, state, displacement):
+    """Set a cleared state to a mount at rest at `displacement` (m); arguments as for `step`."""
+    current_state = state.view(_STATE)[0]
+    band_pass.settle(law.view(_LAW)[0].band, current_state.band, displacement)
+    current_state.displacement = displacement
+
+
+@compiled
+def step(law, tables, state, window, trace, displacement, bridged_samples):
+    """Take one displacement sample (m), fill `trace`, return the current setpoint in A.
+
+    `law`, `state` and `trace` are the bytes of their records.
+    """
+    return _step(
+        law.view(_LAW)[0],
+        tables,
+        state.view(_STATE)[0],
+        window,
+        trace.view(TRACE)[0],
+        displacement,
+        bridged_samples,
+    )
+
+
+@compiled
+def run(law, tables, state, window, traces, displacements):
+    """Fill `traces` with one step for each displacement; arguments as for `step`."""
+    law_record, state_record, trace_records = law.view(_LAW)[0], state.view(_STATE)[0], traces.view(TRACE)
+    for index in range(len(displacements)):
+        _step(law_record, tables, state_record, window, trace_records[index], displacements[index], 0)
+
+
+@compiled
+def _step(law, tables, state, window, trace, displacement, bridged_samples):
+    rise = (displacement - state.displacement) / (bridged_samples + 1)
+    for _ in range(bridged_samples):
+        _advance(law, tables, state, window, trace, state.displacement + rise)
+    trace.bridged_samples = bridged_samples
+    return _advance(law, tables, state, window, trace, displacement)
+
+
+@compiled
+def _advance(law, tables, state, window, trace, displacement):
+    trace.displacement = displacement
+    trace.velocity = (displacement - state.displacement) / law.band.sample_time
+    state.displacement = displacement
+
+    banded, velocity, predicted = band_pass.step(law.band, state.band, displacement)
+    magnitude, active = switching.step(law.switching, state.switching, window, banded)
+
+    desired, coefficient, current = 0.0, np.nan, 0.0
+    if active == 1:
+        desired = damper_force(tables.damper, law.damper_step, predicted)
+        force, coefficient = _normal_force(law, tables, state, desired, predicted)
+        current = force_to_current.current_for(tables.current, law.limits, force)
+    else:
+        force = 0.0
+    _, state.deflection, _ = simplified_step(
+        law.contact, law.friction, state.deflection, predicted, force, law.band.sample_time
+    )
+    state.normal_force = force
+
+    trace.band_displacement = banded
+    trace.band_velocity = velocity
+    trace.predicted_velocity = predicted
+    trace.magnitude = magnitude
+    trace.damping_active = active
+    trace.desired_force = desired
+    trace.friction_deflection = state.deflection
+    trace.friction_coefficient = coefficient
+    trace.normal_force = force
+    trace.current = current
+    return current
+
+
+@compiled
+def _normal_force(law, tables, state, desired, velocity):
+    """Return (normal force N, friction coefficient) that make the wanted force, within the table."""
+    direction = -1.0 if velocity < 0.0 else 1.0
+    force, coefficient = normal_force_for(
+        law.friction, desired, velocity, direction * state.deflection, state.normal_force
+    )
+    return min(force, force_to_current.highest_force(tables.current)), coefficient

@@ -1,0 +1,61 @@
+"""The control node's verdict on itself, from counts alone."""
+
+from dataclasses import dataclass
+
+from mount_control.sample_watch import SampleCounts
+from mount_ros.diagnostics import Level, Verdict
+
+
+@dataclass(frozen=True)
+class ControlFigures:
+    """What the verdict is made of; times in s, NaN or None where unknown."""
+
+    counts: SampleCounts
+    silence: float  # s since the last displacement sample
+    longest_silence: float  # s, limit
+    table_refusal: str  # why the table no longer holds, or empty
+    damping_active: bool
+    current: float  # A
+    step_median: float  # s, sample received to setpoint published
+    step_p99: float  # s
+    last_stamp: int | None  # ns
+
+
+def verdict(figures: ControlFigures) -> Verdict:
+    """Return level and sentence, worst first."""
+    values = {
+        'samples': figures.counts.samples,
+        'bridged': figures.counts.bridged,
+        'restarts': figures.counts.restarts,
+        'ignored': figures.counts.ignored,
+        'invalid': figures.counts.invalid,
+        'damping_active': figures.damping_active,
+        'current_a': f'{figures.current:.4f}',
+        'step_median_us': f'{1e6 * figures.step_median:.0f}',
+        'step_p99_us': f'{1e6 * figures.step_p99:.0f}',
+        'last_stamp': figures.last_stamp,
+    }
+    level, sentence = _judgement(figures)
+    return Verdict(level, sentence, values)
+
+
+def _judgement(figures: ControlFigures) -> tuple[Level, str]:
+    if figures.table_refusal:
+        return Level.ERROR, f'0 A: {figures.table_refusal}'
+    if figures.silence > figures.longest_silence:
+        return Level.ERROR, (
+            f'0 A: no displacement for {figures.silence:.2f} s (limit {figures.longest_silence:g} s); '
+            'is mount_driver active and the electronics powered?'
+        )
+    counts = figures.counts
+    if counts.invalid:
+        return Level.WARN, (
+            f'{counts.invalid} of {counts.invalid + counts.samples} displacement samples were invalid '
+            'and answered with 0 A; check the displacement sensor'
+        )
+    if counts.bridged > 0.001 * counts.samples:
+        return Level.WARN, (
+            f'{counts.bridged} of {counts.samples} samples were missing and bridged (limit 0.1 %); '
+            "look at mount_driver's counts of lost frames"
+        )
+    return Level.OK, 'damping on' if figures.damping_active else 'damping off'

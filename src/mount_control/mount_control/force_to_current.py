@@ -1,0 +1,72 @@
+"""Normal force to coil current through the table of this activation."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_models.compiled import compiled
+
+FORCE_STEP = 0.5  # N, chosen: the table's own step
+_FIRST_TOUCH = 1.0  # N, chosen
+
+
+class ForceTableError(ValueError):
+    """A current-force table cannot be used; the text says why."""
+
+
+class CurrentLimits(NamedTuple):
+    """`offset_current` (A) holds the pads ready, `highest_current` (A) limits every setpoint."""
+
+    offset_current: float
+    highest_current: float
+
+
+class CurrentTable(NamedTuple):
+    """Currents in A at the normal forces 0, `FORCE_STEP`, 2 `FORCE_STEP`, ... and their limits."""
+
+    currents: NDArray[np.float64]
+    limits: CurrentLimits
+
+
+def resample(table: NDArray[np.float64], offset_current: float, highest_current: float) -> CurrentTable:
+    """Return a table of shape (2, N), rows current (A) and normal force (N), both rising, on an even grid.
+
+    Raises `ForceTableError` where it does not start at the first touch or the offset current lies outside.
+    """
+    current, normal_force = table
+    if not 0.0 <= normal_force[0] <= _FIRST_TOUCH:
+        raise ForceTableError(
+            f'current_force_table starts at {normal_force[0]:.2f} N (limit {_FIRST_TOUCH:g} N), '
+            'not at the first touch of the pads; activate mount_init again'
+        )
+    if not 0.0 < offset_current < highest_current:
+        raise ForceTableError(
+            f'offset_current ({offset_current:.3f} A) must lie within 0 .. {highest_current:g} A; '
+            'activate mount_init again'
+        )
+    forces = np.arange(0.0, normal_force[-1], FORCE_STEP)
+    return CurrentTable(
+        np.ascontiguousarray(np.interp(forces, normal_force, current)),
+        CurrentLimits(float(offset_current), float(highest_current)),
+    )
+
+
+@compiled
+def highest_force(currents):
+    """Return the largest normal force in N that the table holds."""
+    return FORCE_STEP * (len(currents) - 1)
+
+
+@compiled
+def current_for(currents, limits, normal_force):
+    """Return the current in A for a normal force in N, within `limits`."""
+    place = max(normal_force, 0.0) / FORCE_STEP
+    last = len(currents) - 1
+    if place >= last:
+        current = currents[last]
+    else:
+        left = int(place)
+        share = place - left
+        current = (1.0 - share) * currents[left] + share * currents[left + 1]
+    return min(max(current, limits.offset_current), limits.highest_current)

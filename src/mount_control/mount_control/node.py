@@ -1,0 +1,175 @@
+"""ROS 2 node of the controller: a displacement message arrives, a setpoint leaves."""
+
+import threading
+import time
+
+from mount_control.activation import MeasurementStream, check_belongs
+from mount_control.controller import TRACE, Controller
+from mount_control.diagnosis import ControlFigures, verdict
+from mount_control.force_to_current import resample
+from mount_control.parameters import SAMPLE_TIME, ControlParameters, checked_parameters
+from mount_control.sample_watch import Judgement, SampleWatch
+from mount_models.damper import damper_curve
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_ros import topics
+from mount_ros.diagnostics import Verdict
+from mount_ros.force_table_message import ForceTableMessageError, ReceivedForceTable, from_bytes
+from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.parameters import declare, read
+from mount_ros.process import run_node
+from mount_ros.scalars import ScalarsLayout
+from mount_ros.timing import LatencyHistogram
+
+_OFF = 0.0  # A
+
+
+class MountControl(SafeLifecycleNode):
+    """Answers each displacement sample with a current setpoint, while active."""
+
+    def __init__(self, **arguments):
+        super().__init__('mount_control', **arguments)
+        declare(self, ControlParameters())
+        declare(self, FrictionCoefficients(), 'friction')
+        declare(self, FrictionContact(), 'contact')
+        self.declare_parameter('damper', 'viscous_2000')
+        self._controller: Controller | None = None
+        self._table: ReceivedForceTable | None = None
+        self._air_gap: tuple[int, tuple[float, ...]] | None = None
+        self._stream = MeasurementStream()
+        self._last_message: bytes | None = None
+        self._table_refusal = ''
+        self._answering = threading.Lock()
+
+    def configure(self) -> None:
+        self._parameters = checked_parameters(read(self, ControlParameters()))
+        self._friction = read(self, FrictionCoefficients(), 'friction')
+        self._contact = read(self, FrictionContact(), 'contact')
+        self._damper = damper_curve(self.get_parameter('damper').value)
+        self._displacement = ScalarsLayout(topics.DISPLACEMENT)
+        self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
+        self._trace = ScalarsLayout(topics.CONTROL_TRACE)
+        self._gap_layout = ScalarsLayout(topics.AIR_GAP)
+        if self._trace.names != TRACE.names:
+            raise ValueError('control_trace in the topic registry differs from what the controller traces')
+        path = self.open_data_path()
+        self._setpoint_publisher = path.publisher(topics.CURRENT_SETPOINT)
+        self._trace_publisher = path.publisher(topics.CONTROL_TRACE)
+        path.subscribe(topics.DISPLACEMENT, self._on_displacement)
+        path.subscribe(topics.AIR_GAP, self._on_air_gap)
+        path.subscribe(topics.CURRENT_FORCE_TABLE, self._on_table)
+        path.start()
+
+    def activate(self) -> None:
+        table_stamp = self._table.activation if self._table else None
+        gap_stamp, gap = self._air_gap or (None, ())
+        check_belongs(table_stamp, gap_stamp, self._stream)
+        assert self._table is not None
+        assert gap_stamp is not None
+        offset_current = gap[self._gap_layout.names.index('offset_current')]
+        table = resample(self._table.table, offset_current, self._parameters.highest_current)
+        controller = Controller(self._parameters, self._damper, self._friction, self._contact, table)
+        controller.step(0.0)  # loads the compiled law before the first sample needs it
+        self._watch = SampleWatch(
+            SAMPLE_TIME, self._parameters.longest_bridge, self._parameters.displacement_range
+        )
+        self._watch.last_stamp = None
+        self._latency = LatencyHistogram()
+        self._activation = gap_stamp
+        self._table_refusal = ''
+        self._heard = time.monotonic()
+        self._controller = controller  # from here on samples are answered
+        if self.lockstep and self._last_message is not None:
+            self._answer_waiting_sample()
+
+    def deactivate(self) -> None:
+        self._controller = None
+        if self._stream.last is not None:
+            self._publish_setpoint(self._stream.last, _OFF)
+
+    def cleanup(self) -> None:
+        self._table, self._air_gap = None, None
+        self._stream = MeasurementStream()
+        self._last_message = None
+
+    def judge(self) -> Verdict:
+        trace = self._controller.trace if self._controller else None
+        return verdict(
+            ControlFigures(
+                counts=self._watch.counts,
+                silence=0.0 if self.lockstep else time.monotonic() - self._heard,
+                longest_silence=self._parameters.longest_bridge,
+                table_refusal=self._table_refusal,
+                damping_active=bool(trace is not None and trace['damping_active']),
+                current=float(trace['current']) if trace is not None else _OFF,
+                step_median=self._latency.quantile(0.5),
+                step_p99=self._latency.quantile(0.99),
+                last_stamp=self._stream.last,
+            )
+        )
+
+    def _on_displacement(self, raw: bytes) -> None:
+        begin = time.monotonic()
+        self._last_message = raw
+        stamp, (displacement,), _ = self._displacement.unpack(raw)
+        self._stream.note(stamp)
+        if self._controller is not None:
+            self._answer(stamp, displacement)
+            self._heard = begin
+            self._latency.add(time.monotonic() - begin)
+
+    def _answer(self, stamp: int, displacement: float) -> None:
+        with self._answering:  # in lock-step the first answer may come from the activation's thread
+            self._answer_once(stamp, displacement)
+
+    def _answer_once(self, stamp: int, displacement: float) -> None:
+        controller = self._controller
+        if controller is None or stamp <= self._activation:
+            return
+        judgement, missing = self._watch.judge(stamp, displacement)
+        if judgement is Judgement.IGNORE:
+            return
+        if judgement is Judgement.INVALID or self._table_is_outdated():
+            self._publish_setpoint(stamp, _OFF)
+            return
+        if judgement is Judgement.RESTART:
+            controller.restart(displacement)
+        self._publish_setpoint(stamp, controller.step(displacement, missing))
+        self._trace_publisher.publish(self._trace.pack_record(stamp, controller.trace_bytes))
+
+    def _table_is_outdated(self) -> bool:
+        if not self._table_refusal and self._stream.start > self._activation:
+            self._table_refusal = (
+                'the measurements were interrupted for more than 1 s since the table was made; '
+                'deactivate mount_control and activate mount_init again'
+            )
+        return bool(self._table_refusal)
+
+    def _answer_waiting_sample(self) -> None:
+        """In lock-step the electronics wait for an answer to the sample that came before activation."""
+        raw = self._last_message
+        stamp, (displacement,), _ = self._displacement.unpack(raw)
+        self._answer(stamp, displacement)
+
+    def _publish_setpoint(self, stamp: int, current: float) -> None:
+        self._setpoint_publisher.publish(self._setpoint.pack(stamp, (current,)))
+
+    def _on_air_gap(self, raw: bytes) -> None:
+        stamp, values, _ = self._gap_layout.unpack(raw)
+        self._air_gap = (stamp, values)
+
+    def _on_table(self, raw: bytes) -> None:
+        try:
+            self._table = from_bytes(raw)
+        except ForceTableMessageError as error:
+            self._table = None
+            self.get_logger().error(str(error))
+
+
+def main() -> None:
+    """Run the node as a process."""
+    run_node(MountControl)
+
+
+if __name__ == '__main__':
+    main()

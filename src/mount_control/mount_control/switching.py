@@ -1,0 +1,41 @@
+"""When damping is on: from one period above the switch-on level until longer below the switch-off level."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mount_models.compiled import compiled
+
+
+class Switching(NamedTuple):
+    """Levels in m and the length of one period in samples."""
+
+    on_level: float
+    off_level: float
+    period: int
+
+
+STATE = np.dtype([('place', 'i8'), ('samples_above', 'i8'), ('samples_below', 'i8'), ('active', 'i8')])
+
+
+@compiled
+def step(switching, state, window, band_displacement):
+    """Take one sample; return (magnitude m, damping active 0 or 1).
+
+    `window` holds |band displacement| of the last period; the magnitude is its highest value. Damping
+    is switched on when the magnitude has exceeded the switch-on level for one period, and off when
+    the displacement has stayed below the switch-off level for more than one (section 6).
+    """
+    distance = abs(band_displacement)
+    window[state.place] = distance
+    state.place = (state.place + 1) % switching.period
+    magnitude = window[: switching.period].max()
+
+    state.samples_above = state.samples_above + 1 if magnitude > switching.on_level else 0
+    state.samples_below = state.samples_below + 1 if distance < switching.off_level else 0
+    if state.active == 0 and state.samples_above >= switching.period:
+        state.active = 1
+    elif state.active == 1 and state.samples_below > switching.period:
+        state.active = 0
+        state.samples_above = 0
+    return magnitude, state.active
