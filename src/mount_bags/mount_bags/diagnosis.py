@@ -1,0 +1,83 @@
+"""The recorder's verdict on itself, from its figures alone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from mount_bags.recording import RecorderFigures
+from mount_bags.stamps import StampWatch
+from mount_ros.diagnostics import Level, Verdict
+
+LEAST_FREE = 1 << 30  # bytes, chosen
+LEAST_TIME = 60.0  # s, chosen: how long the disk must last at the present rate
+
+
+class OnFull(Enum):
+    """What a disk without space means for the run."""
+
+    STOP = 'stop'  # an error: the run shall end
+    CONTINUE = 'continue'  # a warning: the run goes on without recording
+
+
+@dataclass(frozen=True)
+class RecorderState:
+    """All that the verdict looks at; sizes in bytes, rate in bytes/s."""
+
+    folder: str
+    figures: RecorderFigures
+    publishers: Mapping[str, int] = field(default_factory=dict)
+    watches: Mapping[str, StampWatch] = field(default_factory=dict)
+    free: int = LEAST_FREE
+    rate: float = 0.0
+
+
+def judge(state: RecorderState, on_full: OnFull) -> Verdict:
+    """Return level, sentence and figures of an active recorder."""
+    level, sentence = _verdict(state, on_full)
+    return Verdict(level, sentence, _figures(state))
+
+
+def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:
+    figures = state.figures
+    if figures.failure and on_full is OnFull.STOP:
+        return Level.ERROR, f'{figures.failure}; free some space and start again'
+    if figures.failure:
+        return Level.WARN, f'the run goes on without recording: {figures.failure}'
+    if figures.lost:
+        return Level.WARN, (
+            f'{figures.lost} of {figures.received} messages lost: the disk is slower than the data; '
+            'record fewer topics or use a faster disk'
+        )
+    missing = {topic: watch.lost for topic, watch in state.watches.items() if watch.lost}
+    if missing:
+        counts = ', '.join(f'{topic} {count}' for topic, count in missing.items())
+        return Level.WARN, f'samples missing between the stamps: {counts}; is the machine overloaded?'
+    if _is_short_of_space(state):
+        return Level.WARN, (
+            f'{state.free / 1e9:.1f} GB left on the disk of {state.folder} at {state.rate / 1e6:.1f} MB/s; '
+            'free some space'
+        )
+    found = sum(count > 0 for count in state.publishers.values())
+    return Level.OK, f'recording; {found} of {len(state.publishers)} topics have a publisher'
+
+
+def _is_short_of_space(state: RecorderState) -> bool:
+    return state.free < LEAST_FREE or state.free < state.rate * LEAST_TIME
+
+
+def _figures(state: RecorderState) -> dict[str, object]:
+    figures = state.figures
+    return {
+        'folder': state.folder,
+        'received': figures.received,
+        'kept': figures.kept,
+        'file_bytes': figures.file_size,
+        'queued': figures.queued,
+        'queued_bytes': figures.queued_bytes,
+        'lost': figures.lost,
+        'free_bytes': state.free,
+        'bytes_per_second': round(state.rate),
+        'last_stamp': max((watch.last_stamp for watch in state.watches.values()), default=0),
+        **{f'publishers.{topic}': count for topic, count in state.publishers.items()},
+        **{f'missing.{topic}': watch.lost for topic, watch in state.watches.items()},
+    }

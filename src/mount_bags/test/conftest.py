@@ -1,0 +1,50 @@
+"""What the tests share: a domain of their own, small recordings, the genuine bags beside the repository."""
+
+import fcntl
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+# The tests are imported one by one (importmode importlib); what they share is found by this path.
+sys.path.insert(0, str(Path(__file__).parent))
+
+from recorded_drive import write_drive
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """Return a domain id that no other test of this machine uses at the same time."""
+    folder = Path(tempfile.gettempdir()) / 'engine_mount_domains'
+    folder.mkdir(exist_ok=True)
+    for number in range(1, 102):
+        handle = os.open(folder / str(number), os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(handle)
+            continue
+        try:
+            yield number
+        finally:
+            os.close(handle)
+        return
+    pytest.fail('all 101 domains are in use')
+
+
+@pytest.fixture
+def drive(tmp_path) -> Path:
+    """Return a recording of 500 samples of three topics."""
+    return write_drive(tmp_path / 'drive', 500)
+
+
+@pytest.fixture
+def genuine() -> Path:
+    """Return the folder of bags that rosbag2 itself wrote."""
+    folder = Path(__file__).parents[4] / 'shared' / 'data' / 'rosbag2'
+    if not folder.is_dir():
+        pytest.skip('no genuine bags: ../shared/data/rosbag2 beside the repository is absent')
+    return folder

@@ -1,0 +1,243 @@
+"""The recorder as a node, with publishers at 1 kHz in the real middleware."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+import rclpy
+from mcap.reader import make_reader
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from recorded_drive import PERIOD, START, sample
+from std_msgs.msg import String
+
+from mount_bags.metadata import read_metadata
+from mount_bags.node import MountRecorder
+from mount_ros.data_path import DataPath
+from mount_ros.environment import prepare_environment
+from mount_ros.qos import publisher_qos
+from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, SESSION
+
+STREAMS = (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT)
+LIMIT = 20.0  # s
+COUNT = 2000
+
+
+@pytest.fixture
+def context(domain):
+    prepare_environment()
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    rclpy.try_shutdown(context=context)
+
+
+@pytest.fixture
+def source(context):
+    """Return a node whose data path publishes."""
+    node = Node('source', context=context)
+    path = DataPath(node)
+    yield path
+    path.start()
+    path.stop()
+    node.destroy_node()
+
+
+@pytest.fixture
+def make_recorder(context, tmp_path):
+    """Return a function that creates a recorder with parameters."""
+    made = []
+
+    def make(**parameters):
+        values = {'uri': str(tmp_path / 'bag'), 'topics': [topic.name for topic in STREAMS], **parameters}
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        made.append(MountRecorder(context=context, parameter_overrides=overrides))
+        return made[-1]
+
+    yield make
+    for node in made:
+        node.close()
+        node.destroy_node()
+
+
+def wait_until(condition, what):
+    limit = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < limit, f'{what}: not within {LIMIT} s'
+        time.sleep(0.005)
+
+
+def publish_streams(publishers, count):
+    """Publish `count` samples of each stream at 1 kHz."""
+    begin = time.monotonic()
+    for index in range(count):
+        for topic, publisher in publishers.items():
+            publisher.publish(sample(topic, index))
+        threading.Event().wait(max(0.0, begin + (index + 1) * 1e-3 - time.monotonic()))
+
+
+def read(folder):
+    with (folder / f'{folder.name}_0.mcap').open('rb') as file:
+        found = {}
+        for _, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+            found.setdefault(channel.topic, []).append(message.data)
+    return found
+
+
+def assert_all_recorded(folder, count):
+    found = read(folder)
+    for topic in STREAMS:
+        assert found[f'/{topic.name}'] == [sample(topic, index) for index in range(count)]
+
+
+def test_three_streams_at_1_khz_are_recorded_without_loss(make_recorder, source, tmp_path):
+    publishers = {topic: source.publisher(topic) for topic in STREAMS}
+    recorder = make_recorder()
+    assert recorder.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    assert recorder.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'matched by publishers')
+    wait_until(lambda: 'recording; 3 of 3' in recorder.judge().sentence, 'matched by recorder')
+    publish_streams(publishers, COUNT)
+    # No wait: deactivation itself takes what is still under way.
+    assert recorder.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    assert_all_recorded(tmp_path / 'bag', COUNT)
+    bag = read_metadata((tmp_path / 'bag' / 'metadata.yaml').read_text())
+    assert bag.message_count == 3 * COUNT
+    assert bag.topics[0].offered_qos[0].reliability == 'reliable'
+    assert bag.topics[0].offered_qos[0].durability == 'volatile'
+
+
+def test_verdict_names_the_last_stamp_and_missing_samples(make_recorder, source):
+    publishers = {topic: source.publisher(topic) for topic in STREAMS}
+    recorder = make_recorder()
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'matched by publishers')
+    wait_until(lambda: 'recording; 3 of 3' in recorder.judge().sentence, 'matched by recorder')
+    for index in (0, 1, 4):
+        publishers[DISPLACEMENT].publish(sample(DISPLACEMENT, index))
+    wait_until(lambda: recorder.judge().figures['last_stamp'] == START + 4 * PERIOD, 'written')
+    assert recorder.judge().figures['missing./displacement'] == 2
+    assert '/displacement 2' in recorder.judge().sentence
+
+
+def test_latched_topic_received_before_activation_is_recorded(make_recorder, source, tmp_path):
+    publisher = source.node.create_publisher(String, SESSION.name, publisher_qos(SESSION))
+    recorder = make_recorder(topics=['session'])
+    recorder.trigger_configure()
+    kept = recorder._recorder._latched
+    publisher.publish(String(data='first'))
+    wait_until(lambda: '/session' in kept, 'latched message')
+    recorder.trigger_activate()
+    recorder.trigger_deactivate()
+    assert b'first' in read(tmp_path / 'bag')['/session'][0]
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'word'),
+    [
+        ({'uri': ''}, 'uri is empty'),
+        ({'uri': '/'}, 'names no folder'),
+        ({'topics': ['no_such_topic']}, 'no_such_topic'),
+        ({'on_full': 'explode'}, 'stop or continue'),
+    ],
+)
+def test_wrong_parameter_is_refused_with_a_sentence(make_recorder, parameters, word):
+    recorder = make_recorder(**parameters)
+    assert recorder.trigger_configure() == TransitionCallbackReturn.FAILURE
+    assert word in recorder._refusal
+
+
+def test_existing_recording_is_never_written_over(make_recorder, tmp_path):
+    (tmp_path / 'bag').mkdir()
+    recorder = make_recorder()
+    assert recorder.trigger_configure() == TransitionCallbackReturn.FAILURE
+    assert 'exists already' in recorder._refusal
+    assert (tmp_path / 'bag').is_dir()
+
+
+def test_recorder_that_never_began_leaves_nothing_behind(make_recorder, tmp_path):
+    recorder = make_recorder()
+    recorder.trigger_configure()
+    recorder.trigger_cleanup()
+    assert not (tmp_path / 'bag').exists()
+
+
+def test_sigint_closes_the_recording_and_exits_with_code_0(context, domain, source, tmp_path):
+    publishers = {topic: source.publisher(topic) for topic in STREAMS}
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            '-c',
+            _AUTONOMOUS,
+            '--ros-args',
+            '-p',
+            f'uri:={tmp_path / "bag"}',
+            '-p',
+            f'topics:={[topic.name for topic in STREAMS]}',
+        ],
+        env={**os.environ, 'ROS_DOMAIN_ID': str(domain)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'matched')
+        wait_for_line(process, '3 of 3')
+        publish_streams(publishers, COUNT)
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=LIMIT)
+    finally:
+        process.kill()
+    assert process.returncode == 0, output
+    assert_all_recorded(tmp_path / 'bag', COUNT)
+
+
+def wait_for_line(process, word):
+    for line in process.stdout:
+        if word in line:
+            return
+    pytest.fail(f'the recorder ended without {word!r}')
+
+
+def test_executor_of_the_node_publishes_the_matches(make_recorder, source, context):
+    publishers = {topic: source.publisher(topic) for topic in STREAMS}
+    recorder = make_recorder()
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    seen = []
+    recorder._diagnostics.publish = seen.append
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(recorder)
+    wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'matched')
+    limit = time.monotonic() + LIMIT
+    while time.monotonic() < limit and not any('3 of 3' in verdict.sentence for verdict in seen):
+        executor.spin_once(0.1)
+    assert seen[-1].figures['publishers./displacement'] == 1
+    executor.shutdown()
+
+
+# The process of the node, which takes itself through its transitions as a supervisor would.
+_AUTONOMOUS = """
+from mount_bags.node import MountRecorder
+from mount_ros.process import run_node
+
+class Recorder(MountRecorder):
+    def __init__(self):
+        super().__init__()
+        self.trigger_configure()
+        self.trigger_activate()
+
+    def judge(self):
+        verdict = super().judge()
+        print(verdict.sentence, flush=True)
+        return verdict
+
+run_node(Recorder)
+"""

@@ -1,0 +1,174 @@
+"""The queue between the receiving and the writing thread, and the recorder's verdict on itself."""
+
+import threading
+
+import pytest
+from mcap.reader import make_reader
+from recorded_drive import PERIOD, START, sample
+from small_disk import small_disk
+
+from mount_bags.diagnosis import OnFull, RecorderState, judge
+from mount_bags.recording import Recorder
+from mount_bags.writer import BagWriter, RecordingError
+from mount_ros.diagnostics import Level
+from mount_ros.scalars import stamp_of
+from mount_ros.topics import DISPLACEMENT
+
+STRING = 'std_msgs/msg/String'
+
+
+def recorder_of(folder, clock=None, memory_limit=1 << 20, **options):
+    writer = BagWriter(folder, **options)
+    writer.add_topic('/displacement', DISPLACEMENT.type)
+    writer.add_topic('/latched', STRING)
+    times = iter(range(START, START + 10**9))
+    return Recorder(writer, memory_limit=memory_limit, clock=clock or (lambda: next(times)))
+
+
+def messages_of(folder):
+    with (folder / f'{folder.name}_0.mcap').open('rb') as file:
+        return [
+            (channel.topic, message.data, message.log_time)
+            for _, channel, message in make_reader(file, validate_crcs=True).iter_messages(
+                log_time_order=False
+            )
+        ]
+
+
+def verdict_of(recorder, on_full=OnFull.STOP, **state):
+    return judge(RecorderState('/data/bag', recorder.figures(), watches=recorder.watches, **state), on_full)
+
+
+def test_every_message_between_begin_and_end_is_written(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    receive = recorder.receiver('/displacement')
+    recorder.begin()
+    for index in range(5000):
+        receive(sample(DISPLACEMENT, index))
+    recorder.end()
+    assert [data for _, data, _ in messages_of(tmp_path / 'bag')] == [
+        sample(DISPLACEMENT, index) for index in range(5000)
+    ]
+    assert recorder.figures().lost == 0
+
+
+def test_stream_before_begin_is_dropped_and_latched_message_is_written_first(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    receive, receive_latched = recorder.receiver('/displacement'), recorder.latched_receiver('/latched')
+    receive_latched(b'first')
+    receive_latched(b'last')
+    receive(sample(DISPLACEMENT, 0))
+    recorder.begin()
+    receive(sample(DISPLACEMENT, 1))
+    receive_latched(b'later')
+    recorder.end()
+    assert messages_of(tmp_path / 'bag') == [
+        ('/latched', b'last', START + 1),
+        ('/displacement', sample(DISPLACEMENT, 1), START + 2),
+        ('/latched', b'later', START + 3),
+    ]
+
+
+def test_messages_after_the_end_are_dropped(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    receive, receive_latched = recorder.receiver('/displacement'), recorder.latched_receiver('/latched')
+    recorder.begin()
+    recorder.end()
+    receive(sample(DISPLACEMENT, 0))
+    receive_latched(b'late')
+    assert messages_of(tmp_path / 'bag') == []
+
+
+def test_recording_cannot_begin_twice(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    recorder.begin()
+    recorder.end()
+    with pytest.raises(RecordingError, match='configure a new one'):
+        recorder.begin()
+
+
+def test_full_queue_loses_and_counts_without_waiting(tmp_path):
+    size = len(sample(DISPLACEMENT, 0))
+    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size)
+    stuck = threading.Event()
+    recorder._writer.write = lambda *_: stuck.wait()
+    receive = recorder.receiver('/displacement')
+    recorder.begin()
+    for index in range(1000):
+        receive(sample(DISPLACEMENT, index))
+    figures = recorder.figures()
+    stuck.set()
+    assert figures.received == 1000
+    assert figures.lost >= 980
+    assert figures.queued_bytes <= 10 * size
+    verdict = verdict_of(recorder)
+    assert verdict.level is Level.WARN
+    assert 'of 1000 messages lost' in verdict.sentence
+    recorder.end()
+
+
+def test_missing_samples_are_seen_while_they_are_recorded(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    recorder.watch('/displacement', DISPLACEMENT.rate, stamp_of)
+    receive = recorder.receiver('/displacement')
+    recorder.begin()
+    for index in (0, 1, 2, 5, 6, 10):
+        receive(sample(DISPLACEMENT, index))
+    recorder.end()
+    verdict = verdict_of(recorder)
+    assert verdict.level is Level.WARN
+    assert '/displacement 5' in verdict.sentence
+    assert verdict.figures['missing./displacement'] == 5
+    assert verdict.figures['last_stamp'] == START + 10 * PERIOD
+
+
+@pytest.mark.parametrize(('on_full', 'level'), [(OnFull.STOP, Level.ERROR), (OnFull.CONTINUE, Level.WARN)])
+def test_full_disk_is_an_error_or_a_warning_as_wished(tmp_path, on_full, level):
+    recorder = recorder_of(tmp_path / 'bag', open_file=small_disk((1 << 20) + 100_000))
+    receive = recorder.receiver('/displacement')
+    recorder.begin()
+    index = 0
+    while not recorder.figures().failure:
+        receive(sample(DISPLACEMENT, index))
+        index += 1
+    recorder.end()
+    verdict = verdict_of(recorder, on_full)
+    assert verdict.level is level
+    assert 'no space left' in verdict.sentence
+    figures = recorder.figures()
+    assert figures.kept == len(messages_of(tmp_path / 'bag'))
+    assert figures.kept + figures.lost == figures.received
+    assert figures.queued_bytes == 0
+
+
+def test_rare_messages_reach_the_disk_without_waiting_for_a_full_chunk(tmp_path, monkeypatch):
+    monkeypatch.setattr('mount_bags.recording._FLUSH_PERIOD', 0.0)
+    recorder = recorder_of(tmp_path / 'bag')
+    recorder.begin()
+    recorder.receiver('/displacement')(sample(DISPLACEMENT, 0))
+    waited = threading.Event()
+    for _ in range(1000):
+        if recorder.figures().kept:
+            break
+        waited.wait(0.01)
+    assert recorder.figures().kept == 1
+    recorder.end()
+
+
+def test_little_space_is_a_warning_with_what_is_left(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    verdict = verdict_of(recorder, free=500_000_000, rate=2e6)
+    assert verdict.level is Level.WARN
+    assert '0.5 GB left' in verdict.sentence
+    verdict = verdict_of(recorder, free=5_000_000_000, rate=1e8)
+    assert verdict.level is Level.WARN
+    recorder.end()
+
+
+def test_sound_recorder_says_how_many_topics_have_a_publisher(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    verdict = verdict_of(recorder, publishers={'/displacement': 1, '/latched': 0})
+    assert verdict.level is Level.OK
+    assert '1 of 2 topics have a publisher' in verdict.sentence
+    assert verdict.figures['publishers./latched'] == 0
+    recorder.end()
