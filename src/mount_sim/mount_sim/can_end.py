@@ -1,0 +1,114 @@
+"""The far end of the CAN bus: sends what the electronics measure, receives and judges setpoints."""
+
+import threading
+import time
+from dataclasses import dataclass
+
+import can
+
+from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
+from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
+from mount_sim.electronics import Reading
+
+_COUNTER_MASK = 0xFFFF
+_MICROSECOND_MASK = 0xFFFFFFFF
+_RECEIVE_PATIENCE = 0.1  # s: how often the receiving thread looks whether it shall end
+
+
+@dataclass(frozen=True)
+class ReceivedSetpoint:
+    """A setpoint with the steady time (s) of its arrival."""
+
+    setpoint: Setpoint
+    arrival: float
+
+
+class CanEnd:
+    """Electronics' side of `mount.dbc` on an open bus."""
+
+    def __init__(self, bus: can.BusABC):
+        self._bus = bus
+        self._codec = MountCodec()
+        self._measurement_alive = AliveCounter()
+        self._status_alive = AliveCounter()
+        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint)
+        self._latest: ReceivedSetpoint | None = None
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+
+    @property
+    def corrupt_setpoints(self) -> int:
+        """Setpoint frames that were not used."""
+        return self._receiver.corrupt
+
+    @property
+    def latest(self) -> ReceivedSetpoint | None:
+        """The newest good setpoint."""
+        return self._latest
+
+    def send_measurement(self, number: int, microseconds: int, reading: Reading, enabled: bool) -> None:
+        """Send sample `number`, taken at `microseconds` of the electronics' clock."""
+        self.send_frame(self.measurement_frame(number, microseconds, reading, enabled))
+
+    def measurement_frame(
+        self, number: int, microseconds: int, reading: Reading, enabled: bool
+    ) -> can.Message:
+        """Return the frame of a sample, ready to be sent."""
+        measurement = Measurement(
+            number & _COUNTER_MASK, microseconds & _MICROSECOND_MASK, *reading, enabled=enabled
+        )
+        data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
+        return self._frame(self._codec.measurement.frame_id, data)
+
+    def send_status(self, status: Status) -> None:
+        """Send the slow health message."""
+        data = self._codec.encode_status(status, self._status_alive.next())
+        self.send_frame(self._frame(self._codec.status.frame_id, data))
+
+    def send_frame(self, frame: can.Message) -> None:
+        """Send a frame as it is."""
+        self._bus.send(frame)
+
+    def wait_for_answer(self, number: int, limit: float) -> ReceivedSetpoint | None:
+        """Return the setpoint that answers sample `number`, or None after `limit` s without it."""
+        end = time.monotonic() + limit
+        while (remaining := end - time.monotonic()) > 0.0:
+            received = self._receive(min(remaining, _RECEIVE_PATIENCE))
+            if received is not None and received.setpoint.answered_counter == number & _COUNTER_MASK:
+                return received
+            if self._ending.is_set():
+                return None
+        return None
+
+    def listen(self) -> None:
+        """Receive setpoints in a thread from now on; `latest` is the newest."""
+        self._thread = threading.Thread(target=self._listen, name='can_end', daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread and the bus; safe to call twice."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        self._bus.shutdown()
+
+    def _listen(self) -> None:
+        while not self._ending.is_set():
+            self._receive(_RECEIVE_PATIENCE)
+
+    def _receive(self, limit: float) -> ReceivedSetpoint | None:
+        frame = self._bus.recv(limit)
+        if frame is None or frame.arbitration_id != self._codec.setpoint.frame_id:
+            return None
+        setpoint = self._receiver.receive(frame.data)
+        if setpoint is None:
+            return None
+        self._latest = ReceivedSetpoint(setpoint, time.monotonic())
+        return self._latest
+
+    @staticmethod
+    def _frame(identifier: int, data: bytearray) -> can.Message:
+        return can.Message(
+            arbitration_id=identifier, data=data, is_fd=True, is_extended_id=False, bitrate_switch=True
+        )

@@ -1,0 +1,53 @@
+"""What shakes the mount: a series of numbers at the plant's step, and what they stand for."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_models.road import Gap, RandomRoad, gap_in_road, random_road
+
+
+class Seat(IntEnum):
+    """Where the mount sits, and so what the excitation means."""
+
+    BENCH = 0  # displacement of the mount, m
+    ACCELERATED_CHASSIS = 1  # vertical acceleration of the chassis under the engine, m/s^2
+    VEHICLE = 2  # height of the road under the wheel, m
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Numbers at the plant's step from `start` (s of simulated time) on; before it: rest.
+
+    `values` (n,) in the unit of the seat.
+    """
+
+    seat: Seat
+    values: NDArray[np.float64]
+    step_time: float
+    start: float
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return len(self.values) * self.step_time
+
+
+def bench_sine(
+    frequency: float, amplitude: float, duration: float, start: float, step_time: float
+) -> Excitation:
+    """Return a sine of the mount's displacement (Hz, m), faded in over its first period."""
+    time = np.arange(round(duration / step_time)) * step_time
+    fade = np.clip(time * frequency, 0.0, 1.0)
+    # A half cosine has no corner at either end, so the fade adds no impact of its own.
+    values = amplitude * np.sin(2.0 * np.pi * frequency * time) * 0.5 * (1.0 - np.cos(np.pi * fade))
+    return Excitation(Seat.BENCH, values, step_time, start)
+
+
+def motorway(motorway: RandomRoad, gap: Gap, duration: float, start: float, step_time: float) -> Excitation:
+    """Return the height of a road with a gap in it under the wheel."""
+    time = np.arange(round(duration / step_time)) * step_time
+    height = random_road(time, motorway) if motorway.roughness > 0.0 else np.zeros_like(time)
+    return Excitation(Seat.VEHICLE, height + gap_in_road(time, gap), step_time, start)

@@ -1,0 +1,208 @@
+"""The simulated truth in one compiled step: coil, actuator, friction contact, and what moves around them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_models.actuator.reluctance import ReluctanceActuator, gap_flux_density
+from mount_models.closing import ClosingMechanics, checked_closing, closed_state
+from mount_models.coil.ripple import RippleCoil
+from mount_models.compiled import compiled
+from mount_models.elastomer import branch_step, elastomer_force
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.friction.full import full_step
+from mount_models.quantity import checked
+from mount_models.record import record_bytes, record_dtype
+from mount_models.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
+from mount_sim.electronics import ElectronicsParameters, advance_current, read_sensors
+from mount_sim.excitation import Seat
+
+_BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
+
+
+class Plant(NamedTuple):
+    """All parameters of the simulated truth; none of them is known to the controller."""
+
+    actuator: ReluctanceActuator = ReluctanceActuator()
+    coil: RippleCoil = RippleCoil()
+    mechanics: ClosingMechanics = ClosingMechanics()
+    friction: FrictionCoefficients = FrictionCoefficients()
+    contact: FrictionContact = FrictionContact()
+    vehicle: Vehicle = Vehicle()
+    engine: Engine = Engine()
+    electronics: ElectronicsParameters = ElectronicsParameters()
+
+
+_PLANT = record_dtype(Plant)
+
+_STATE = np.dtype(
+    [
+        ('vehicle', VEHICLE_STATE),
+        ('engine', ENGINE_STATE),
+        *(
+            (name, 'f8')
+            for name in (
+                'current',
+                'wanted_current',
+                'gap',
+                'normal_force',
+                'slider_position',
+                'deflection',
+                'displacement',
+                'velocity',
+                'slow_force',
+                'middle_force',
+                'fast_force',
+                'friction_force',
+                'mount_force',
+                'chassis_acceleration',
+                'road_height',
+            )
+        ),
+    ]
+)
+
+TRUTH = np.dtype(
+    [
+        (name, 'f8')
+        for name in (
+            'displacement',
+            'velocity',
+            'coil_current',
+            'current_setpoint',
+            'gap',
+            'flux_density',
+            'normal_force',
+            'friction_force',
+            'mount_force',
+            'road_height',
+            'engine_displacement',
+            'chassis_displacement',
+            'chassis_acceleration',
+            'rest_gap',
+            'contact_gap',
+            'setpoint_latency',
+        )
+    ]
+)
+"""What no sensor sees, SI; the fields of the topic `sim/truth` in its order."""
+
+
+class PlantSimulation:
+    """The plant with its state; `read` looks at it, `advance` moves it on by some steps."""
+
+    def __init__(self, plant: Plant, seat: Seat, step_time: float):
+        plant = Plant(*(checked(part) for part in plant))
+        checked_closing(plant.mechanics, plant.actuator)
+        self._plant = record_bytes(plant)
+        self._seat = int(seat)
+        self._step_time = step_time
+        self._state = np.zeros(1, _STATE).view(np.uint8)
+        self._truth = np.zeros(1, TRUTH).view(np.uint8)
+        self._state.view(_STATE)['gap'] = plant.mechanics.rest_gap
+
+    @property
+    def truth(self) -> np.void:
+        """The truth at the last `read`."""
+        return self._truth.view(TRUTH)[0]
+
+    @property
+    def truth_bytes(self) -> bytes:
+        """The truth at the last `read` as little-endian float64 numbers."""
+        return self._truth.tobytes()
+
+    def read(self, noise: NDArray[np.float64]) -> tuple[float, float, float, float]:
+        """Return the sensors' readings (displacement, current, di/dt, dB/dt; SI) and note the truth."""
+        return read(self._plant, self._state, self._truth, noise)
+
+    def advance(self, values: NDArray[np.float64], wanted_current: float) -> None:
+        """Advance by one step for each of the excitation's `values`, with a current setpoint in A."""
+        advance(self._plant, self._state, self._seat, values, wanted_current, self._step_time)
+
+
+@compiled
+def read(plant, state, truth, noise):
+    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` four numbers."""
+    law, now, seen = plant.view(_PLANT)[0], state.view(_STATE)[0], truth.view(TRUTH)[0]
+    seen.displacement = now.displacement
+    seen.velocity = now.velocity
+    seen.coil_current = now.current
+    seen.current_setpoint = now.wanted_current
+    seen.gap = now.gap
+    seen.flux_density = gap_flux_density(law.actuator, now.current, now.gap)
+    seen.normal_force = now.normal_force
+    seen.friction_force = now.friction_force
+    seen.mount_force = now.mount_force
+    seen.road_height = now.road_height
+    seen.engine_displacement = now.vehicle.engine_height
+    seen.chassis_displacement = now.vehicle.chassis_height
+    seen.chassis_acceleration = now.chassis_acceleration
+    seen.rest_gap = law.mechanics.rest_gap
+    seen.contact_gap = law.mechanics.contact_gap
+    seen.setpoint_latency = np.nan
+    return read_sensors(
+        law.electronics, law.coil, law.actuator, now.displacement, now.current, now.gap, noise
+    )
+
+
+@compiled
+def advance(plant, state, seat, values, wanted_current, dt):
+    """Advance the state by one step of `dt` s for each excitation value; see `PlantSimulation.advance`."""
+    law, now = plant.view(_PLANT)[0], state.view(_STATE)[0]
+    now.wanted_current = wanted_current
+    for index in range(len(values)):
+        _advance_magnet(law, now, dt)
+        if seat == _BENCH:
+            _advance_bench(law, now, values[index], dt)
+        elif seat == _ACCELERATED_CHASSIS:
+            _rub(law, now, now.displacement, dt)
+            _take_motion(now, engine_step(law.engine, now.engine, values[index], 0.0, now.friction_force, dt))
+        else:
+            now.road_height = values[index]
+            _rub(law, now, now.displacement, dt)
+            _take_motion(
+                now, vehicle_step(law.vehicle, now.vehicle, values[index], 0.0, now.friction_force, dt)
+            )
+
+
+@compiled
+def _advance_magnet(law, now, dt):
+    now.current = advance_current(
+        law.electronics, law.coil, law.actuator, now.current, now.gap, now.wanted_current, dt
+    )
+    gap, normal_force = closed_state(law.mechanics, law.actuator, now.current, now.gap)
+    now.gap = gap
+    now.normal_force = normal_force
+
+
+@compiled
+def _rub(law, now, displacement, dt):
+    force, slider, deflection, _ = full_step(
+        law.contact, law.friction, now.slider_position, now.deflection, displacement, now.normal_force, dt
+    )
+    now.friction_force = force
+    now.slider_position = slider
+    now.deflection = deflection
+
+
+@compiled
+def _advance_bench(law, now, displacement, dt):
+    """The rack imposes the displacement; the mount answers with its force."""
+    elastomer = law.engine.elastomer
+    change = displacement - now.displacement
+    branches = branch_step(elastomer, (now.slow_force, now.middle_force, now.fast_force), change, dt)
+    now.slow_force, now.middle_force, now.fast_force = branches
+    now.velocity = change / dt
+    now.displacement = displacement
+    _rub(law, now, displacement, dt)
+    now.mount_force = elastomer_force(elastomer, displacement, branches) + now.friction_force
+
+
+@compiled
+def _take_motion(now, motion):
+    now.displacement = motion.displacement
+    now.velocity = motion.velocity
+    now.mount_force = motion.mount_force
+    now.chassis_acceleration = motion.chassis_acceleration

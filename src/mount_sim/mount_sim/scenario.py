@@ -1,0 +1,131 @@
+"""Scenarios of the simulated drive: what can be set, and the excitation that comes of it."""
+
+from collections.abc import Callable
+from typing import Annotated, NamedTuple
+
+from mount_models.quantity import ParameterError, Quantity
+from mount_models.road import Gap, RandomRoad
+from mount_sim import excitation
+from mount_sim.excitation import Excitation, Seat
+from mount_sim.recorded import load_signal, resample
+
+SCENARIO_NAMES = ('motorway', 'bench', 'recorded')
+STEP_TIME = 5e-5  # s, chosen: step of the plant, 20 in each sample
+
+
+class Timeline(NamedTuple):
+    """When the excitation happens, in simulated time."""
+
+    start: Annotated[
+        float,
+        Quantity('s', 'rest before the excitation, in which the mount is initialised', 0.0, 60.0, 'chosen'),
+    ] = 5.0
+    duration: Annotated[
+        float,
+        Quantity('s', 'length of the excitation; 0: that of the recording, else 15 s', 0.0, 7200.0, 'chosen'),
+    ] = 0.0
+
+
+class BenchScenario(NamedTuple):
+    """A test rack that moves the mount on a sine."""
+
+    frequency: Annotated[float, Quantity('Hz', 'frequency of the sine', 0.1, 100.0, 'paper, section 6')] = 8.0
+    amplitude: Annotated[float, Quantity('m', 'amplitude of the sine', 0.0, 0.010, 'chosen')] = 0.001
+
+
+class MotorwayScenario(NamedTuple):
+    """A car on a road with a gap in it."""
+
+    speed: Annotated[float, Quantity('m/s', 'speed of the car', 5.0, 90.0, 'chosen: 119 km/h')] = 33.0
+    roughness: Annotated[
+        float, Quantity('m^3', 'ISO 8608 roughness G_d at 0.1 cycles/m', 0.0, 1e-3, 'chosen: a good class A')
+    ] = 2e-6
+    gap_depth: Annotated[float, Quantity('m', 'depth of the gap', 0.0, 0.1, 'chosen')] = 0.020
+    gap_length: Annotated[
+        float, Quantity('m', 'effective length of the gap, after the tyre', 0.1, 5.0, 'chosen')
+    ] = 1.0
+    gap_time: Annotated[float, Quantity('s', 'when the wheel meets the gap', 0.0, 3600.0, 'chosen')] = 5.0
+
+
+class RecordedScenario(NamedTuple):
+    """A recorded vertical acceleration of the chassis, upwards."""
+
+    file: str = ''
+    column: str = ''
+    time_column: str = ''
+    topic: str = ''
+    scale: Annotated[
+        float, Quantity('1', 'factor to m/s^2 upwards; -1 for an axis that points down', -1e4, 1e4, 'chosen')
+    ] = 1.0
+
+
+_DEFAULT_DURATION = 15.0  # s, chosen
+
+
+class Scenarios(NamedTuple):
+    """The parameters of all scenarios; one of them is chosen by its name."""
+
+    timeline: Timeline = Timeline()
+    bench: BenchScenario = BenchScenario()
+    motorway: MotorwayScenario = MotorwayScenario()
+    recorded: RecordedScenario = RecordedScenario()
+
+
+def build_excitation(
+    name: str, scenarios: Scenarios, seed: int, decode: Callable | None = None
+) -> Excitation:
+    """Return the excitation of the scenario `name`, or raise `ValueError` with what is wrong."""
+    if name == 'bench':
+        return _bench(scenarios)
+    if name == 'motorway':
+        return _motorway(scenarios, seed)
+    if name == 'recorded':
+        return _recorded(scenarios, decode)
+    raise ParameterError(f'scenario {name!r} is unknown; known are {", ".join(SCENARIO_NAMES)}')
+
+
+def _bench(scenarios: Scenarios) -> Excitation:
+    timeline, bench = scenarios.timeline, scenarios.bench
+    duration = timeline.duration or _DEFAULT_DURATION
+    return excitation.bench_sine(bench.frequency, bench.amplitude, duration, timeline.start, STEP_TIME)
+
+
+def _motorway(scenarios: Scenarios, seed: int) -> Excitation:
+    timeline, motorway = scenarios.timeline, scenarios.motorway
+    duration = timeline.duration or _DEFAULT_DURATION
+    if motorway.gap_depth > 0.0 and motorway.gap_time >= duration:
+        raise ParameterError(
+            f'gap_time ({motorway.gap_time:g} s) must lie before the end of the drive ({duration:g} s); '
+            'make the drive longer, the gap earlier, or gap_depth 0'
+        )
+    road = RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=seed)
+    gap = Gap(
+        depth=motorway.gap_depth,
+        position=motorway.speed * motorway.gap_time,
+        length=motorway.gap_length,
+        speed=motorway.speed,
+    )
+    return excitation.motorway(road, gap, duration, timeline.start, STEP_TIME)
+
+
+def _recorded(scenarios: Scenarios, decode: Callable | None) -> Excitation:
+    timeline, recorded = scenarios.timeline, scenarios.recorded
+    if not recorded.file:
+        raise ParameterError('scenario recorded needs a file: CSV, NPY or MCAP (recorded.file, or --file)')
+    signal = load_signal(
+        recorded.file,
+        column=recorded.column,
+        time_column=recorded.time_column,
+        topic=recorded.topic,
+        decode=decode,
+    )
+    values = recorded.scale * resample(signal, STEP_TIME)
+    if timeline.duration:
+        available = len(values) * STEP_TIME
+        if timeline.duration > available + 0.001:
+            raise ParameterError(
+                f'duration ({timeline.duration:g} s) is longer than the recording {signal.name} '
+                f'({available:.3f} s); ask for at most that'
+            )
+        values = values[: round(timeline.duration / STEP_TIME)]
+    return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, timeline.start)

@@ -1,0 +1,86 @@
+"""Electronics and plant together, sample by sample, without bus or clock."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_sim.electronics import Noise, Reading
+from mount_sim.excitation import Excitation
+from mount_sim.plant import Plant, PlantSimulation
+
+SAMPLE_TIME = 0.001  # s, chosen: the electronics' measurement period
+
+
+@dataclass(frozen=True)
+class Run:
+    """Length of a simulated run in samples and where the excitation begins in it."""
+
+    samples: int
+    excitation_start: int
+
+
+class SimulatedMount:
+    """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again.
+
+    A setpoint takes effect at the sample instant after the one that it answers, as the electronics' own
+    sampled current loop takes it over. Without a setpoint for `setpoint_timeout` the current goes to 0 A.
+    """
+
+    def __init__(self, plant: Plant, excitation: Excitation, seed: int):
+        self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
+        self._noise = Noise(seed)
+        self._steps = round(SAMPLE_TIME / excitation.step_time)
+        self._patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
+        start = round(excitation.start / SAMPLE_TIME)
+        self._values = _per_sample(excitation, start, self._steps)
+        self.run = Run(len(self._values), start)
+        self.sample = 0
+        self._silent = 0
+        self._current = 0.0
+
+    @property
+    def time(self) -> float:
+        """Simulated time in s."""
+        return self.sample * SAMPLE_TIME
+
+    @property
+    def finished(self) -> bool:
+        """Whether all samples of the run were taken."""
+        return self.sample >= self.run.samples
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the coil driver is on: setpoints come in time."""
+        return self._silent <= self._patience
+
+    @property
+    def truth(self) -> np.void:
+        """What no sensor saw at the last `measure`."""
+        return self._plant.truth
+
+    @property
+    def truth_bytes(self) -> bytes:
+        """The same as little-endian float64 numbers in the order of `sim/truth`."""
+        return self._plant.truth_bytes
+
+    def measure(self) -> Reading:
+        """Return what the sensors read now."""
+        return Reading(*self._plant.read(self._noise.next()))
+
+    def advance(self, setpoint: float | None) -> None:
+        """Go on to the next sample with a new setpoint (A), or None if none has come since the last one."""
+        if setpoint is None:
+            self._silent += 1
+        else:
+            self._silent, self._current = 0, setpoint
+        current = self._current if self.enabled else 0.0
+        self._plant.advance(self._values[self.sample], current)
+        self.sample += 1
+
+
+def _per_sample(excitation: Excitation, start: int, steps: int) -> NDArray[np.float64]:
+    """Return the excitation as one row of values for each sample, with the rest before its start."""
+    whole = len(excitation.values) // steps
+    rows = excitation.values[: whole * steps].reshape(whole, steps)
+    return np.ascontiguousarray(np.vstack([np.zeros((start, steps)), rows]))
