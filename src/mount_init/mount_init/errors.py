@@ -1,0 +1,45 @@
+"""Why an initialisation is refused; every text says the value, the limit and what to do."""
+
+
+class InitialisationError(ValueError):
+    """The air gap was not estimated, so there is no current-force table."""
+
+
+class TooFewRipplesError(InitialisationError):
+    """Not enough valid ripple samples arrived."""
+
+
+class CurrentNotFollowingError(InitialisationError):
+    """The coil current does not follow its setpoint."""
+
+
+class UnusableReadingsError(InitialisationError):
+    """The ripple readings cannot be those of a working coil: wrong sign, stuck, or scattered."""
+
+
+class AmbiguousCurveError(InitialisationError):
+    """The inductance does not fall through the crossing exactly once and monotonically."""
+
+
+class OutsideCalibrationError(InitialisationError):
+    """A gap estimate lies where the specimen was never calibrated."""
+
+
+class NoContactError(InitialisationError):
+    """The pads never came into contact, or never left it."""
+
+
+class ContradictionError(InitialisationError):
+    """Two estimates of the same thing disagree by more than their scatter allows."""
+
+
+class ImpreciseError(InitialisationError):
+    """The standard deviation of an estimate is too large."""
+
+
+class SpecimenMismatchError(InitialisationError):
+    """The parameters of the ramp do not fit the specimen."""
+
+
+class CoilBusyError(InitialisationError):
+    """Somebody else sends setpoints to the coil."""

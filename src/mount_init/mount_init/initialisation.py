@@ -1,0 +1,233 @@
+"""One initialisation of the actuator (Fig 5): ripple samples in, setpoints out, at the end gaps and table.
+
+It knows neither clock nor middleware: the same samples give the same results to the bit.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mount_init.errors import (
+    CurrentNotFollowingError,
+    InitialisationError,
+    OutsideCalibrationError,
+    TooFewRipplesError,
+)
+from mount_init.estimation import (
+    ContactGap,
+    Dwell,
+    FloatArray,
+    InductanceCurve,
+    RestGap,
+    contact_gap,
+    dwell_inductance,
+    inductance_crossing,
+    inductance_curve,
+    rest_gap,
+)
+from mount_init.parameters import InitParameters
+from mount_init.plausibility import (
+    check_contact,
+    check_peak_force,
+    check_precision,
+    check_rest_current,
+    check_same_crossing,
+    check_same_rest_gap,
+    check_single_crossing,
+    check_steady_fall,
+)
+from mount_init.ramp import Ramp, current_ramp
+from mount_init.readings import Readings, check_readings
+from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
+from mount_models.coil.crossing import Crossing
+from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
+from mount_models.specimen import Specimen
+
+OFF = 0.0  # A: the safe state
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a result rests on."""
+
+    dwell_before: Dwell
+    dwell_after: Dwell
+    crossing_up: Crossing
+    crossing_down: Crossing
+    rest: RestGap
+    contact: ContactGap
+    curve: InductanceCurve
+    samples: int
+    skipped: int
+
+
+@dataclass(frozen=True)
+class InitialisationResult:
+    """Gaps and their standard deviations (m), contact force (N), offset current (A), table (2, N) in A and N.
+
+    The standard deviations come from the scatter of the ripples; errors of the calibration are not in them.
+    """
+
+    rest_gap: float
+    contact_gap: float
+    rest_gap_std: float
+    contact_gap_std: float
+    contact_force: float
+    offset_current: float
+    table: FloatArray
+    evidence: Evidence
+
+
+class Initialisation:
+    """Drives one current ramp, sample by sample, and estimates at its end."""
+
+    def __init__(self, specimen: Specimen, parameters: InitParameters):
+        self.specimen = specimen
+        self.parameters = parameters
+        self.ramp: Ramp = current_ramp(parameters, specimen.rest_current)
+        self.readings = Readings(self.ramp.setpoints.size)
+        self.last_stamp: int | None = None
+        self._setpoints: list[float] = self.ramp.setpoints.tolist()
+        self._failure: InitialisationError | None = None
+        self._deviating = 0
+        self._invalid = 0
+
+    @property
+    def length(self) -> int:
+        """Number of samples of the whole ramp."""
+        return len(self._setpoints)
+
+    @property
+    def finished(self) -> bool:
+        """Whether no further sample is wanted: the ramp is over, or given up."""
+        return self._failure is not None or self.readings.received >= self.length
+
+    def step(self, stamp: int, current: float, current_rate: float, flux_rate: float) -> float:
+        """Return the setpoint (A) for the sample of time `stamp` (ns), in A, A/s, T/s; 0 A when finished.
+
+        A sample with NaN is counted and not used. If the current does not follow its setpoint, or the samples
+        stay invalid, the ramp is given up at once and `result` tells why.
+        """
+        if self.finished:
+            return OFF
+        number = self.readings.received
+        self.last_stamp = stamp
+        valid = self.readings.add(current, current_rate, flux_rate)
+        self._watch(valid, current, self._setpoints[number - 1] if number else OFF)
+        return OFF if self._failure is not None else self._setpoints[number]
+
+    def silence(self, duration: float) -> TooFewRipplesError:
+        """Return the refusal for samples that stopped to come for `duration` (s)."""
+        return TooFewRipplesError(
+            f'air gap not estimated: {self.readings.valid} of {self.length} ripple samples, none in the last '
+            f'{duration:.1f} s; is mount_driver active?'
+        )
+
+    def result(self) -> InitialisationResult:
+        """Return gaps, force and table, or raise the `InitialisationError` that says why there are none."""
+        if self._failure is not None:
+            raise self._failure
+        if not self.finished:
+            raise TooFewRipplesError(
+                f'air gap not estimated: {self.readings.received} of {self.length} ripple samples '
+                'received; is mount_driver active?'
+            )
+        check_readings(self.readings, self.ramp, self.parameters)
+        evidence = _estimate(self.specimen, self.parameters, self.ramp, self.readings)
+        return _complete(self.specimen, self.parameters, evidence)
+
+    def _watch(self, valid: bool, current: float, setpoint: float) -> None:
+        parameters = self.parameters
+        if not valid:
+            self._invalid += 1
+            if self._invalid > parameters.invalid_duration * parameters.sample_rate:
+                self._failure = TooFewRipplesError(
+                    f'air gap not estimated: {self._invalid} ripple samples in a row were invalid, more than '
+                    f'{parameters.invalid_duration:g} s; check the coil ripple measurement'
+                )
+            return
+        self._invalid = 0
+        deviates = abs(current - setpoint) > parameters.following_error
+        self._deviating = self._deviating + 1 if deviates else 0
+        if self._deviating > parameters.following_duration * parameters.sample_rate:
+            self._failure = CurrentNotFollowingError(
+                f'coil current ({current:.3f} A) must follow its setpoint ({setpoint:.3f} A) within '
+                f'{parameters.following_error:g} A; is the coil connected, and the supply at its voltage?'
+            )
+
+
+def load_compiled_laws(specimen: Specimen) -> None:
+    """Run the compiled laws once, so that an activation need not wait for the compiler."""
+    law = specimen.force_law
+    middle = 0.5 * (law.gap_low + law.gap_high)
+    checked_current_for_force(law, float(checked_force(law, specimen.rest_current, middle)), middle)
+
+
+def _estimate(specimen: Specimen, parameters: InitParameters, ramp: Ramp, readings: Readings) -> Evidence:
+    current, inductance = readings.current, readings.inductance(specimen.turns_area)
+    level = specimen.crossing_inductance
+
+    dwells = [
+        dwell_inductance(current[part], inductance[part], parameters)
+        for part in (ramp.dwell_before, ramp.dwell_after)
+    ]
+    for dwell in dwells:
+        check_rest_current(specimen, dwell, parameters)
+    before, after = (rest_gap(specimen, dwell.inductance, dwell.inductance_std) for dwell in dwells)
+    check_same_rest_gap(before, after, parameters)
+    rest = rest_gap(specimen, *_mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells]))
+
+    curve = inductance_curve(current, inductance, ramp.up, ramp.down, parameters.peak_current)
+    check_single_crossing(curve, level, specimen.rest_current)
+    crossings = [
+        inductance_crossing(current[part], inductance[part], level, parameters)
+        for part in (ramp.up, ramp.down)
+    ]
+    up, down = (contact_gap(specimen, rest, crossing.current, crossing.current_std) for crossing in crossings)
+    check_same_crossing(up.at_crossing, down.at_crossing, parameters)
+    crossing_current, crossing_std = _mean([(c.current, c.current_std) for c in crossings])
+    contact = contact_gap(specimen, rest, crossing_current, crossing_std)
+
+    check_steady_fall(curve, level, specimen.rest_current, parameters)
+    check_contact(specimen, rest, contact, crossing_current, parameters)
+    check_precision(rest, contact, parameters)
+    return Evidence(
+        dwell_before=dwells[0],
+        dwell_after=dwells[1],
+        crossing_up=crossings[0],
+        crossing_down=crossings[1],
+        rest=rest,
+        contact=contact,
+        curve=curve,
+        samples=readings.valid,
+        skipped=readings.skipped,
+    )
+
+
+def _complete(specimen: Specimen, parameters: InitParameters, evidence: Evidence) -> InitialisationResult:
+    law, spring = specimen.force_law, specimen.spring_stiffness
+    rest, contact = evidence.rest, evidence.contact
+    try:
+        table = current_force_table(
+            law, spring, specimen.pad_stiffness, rest.gap, contact.gap, parameters.peak_current
+        )
+        offset = offset_current(law, spring, rest.gap, contact.gap, parameters.light_pressure)
+    except (ForceTableError, OutsideLawError) as error:
+        raise OutsideCalibrationError(f'current-force table: {error}') from error
+    check_peak_force(table, parameters)
+    return InitialisationResult(
+        rest_gap=rest.gap,
+        contact_gap=contact.gap,
+        rest_gap_std=rest.std,
+        contact_gap_std=contact.std,
+        contact_force=contact_force(spring, rest.gap, contact.gap),
+        offset_current=offset,
+        table=table,
+        evidence=evidence,
+    )
+
+
+def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
+    """Return the plain mean of equally good estimates and its standard deviation."""
+    values = np.array(estimates)
+    return float(values[:, 0].mean()), float(np.sqrt(np.sum(values[:, 1] ** 2))) / len(estimates)
