@@ -6,6 +6,7 @@ source)] = default``.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
@@ -58,6 +59,30 @@ def with_values(parameters: P, **changes: Any) -> P:
             f'known are {", ".join(parameters._fields)}'
         )
     return checked(parameters._replace(**changes))
+
+
+def flattened(parameters: NamedTuple, prefix: str = '') -> dict[str, Any]:
+    """Return {name: value} with nested sets as `outer.inner`, all behind `prefix.` where one is given."""
+    flat: dict[str, Any] = {}
+    for name, value in parameters._asdict().items():
+        full = f'{prefix}.{name}' if prefix else name
+        flat.update(flattened(value, full) if hasattr(value, '_asdict') else {full: value})
+    return flat
+
+
+def with_flattened(defaults: P, values: Mapping[str, Any], prefix: str = '') -> P:
+    """Return the checked set `defaults` with those of `values` that name its fields as `flattened` does."""
+    changes = {}
+    for name, value in defaults._asdict().items():
+        full = f'{prefix}.{name}' if prefix else name
+        if hasattr(value, '_asdict'):
+            changes[name] = with_flattened(value, values, full)
+        elif full in values:
+            changes[name] = values[full]
+    try:
+        return checked(defaults._replace(**changes))
+    except ParameterError as error:
+        raise ParameterError(f'{prefix}.{error}' if prefix else str(error)) from None
 
 
 def _checked_value(name: str, value: Any, kind: Any, quantity: Quantity | None) -> Any:

@@ -1,5 +1,7 @@
 """A lifecycle node that fails closed: every error ends in the safe state, with a sentence that says why."""
 
+import threading
+
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mount_ros.data_path import DataPath
@@ -18,6 +20,7 @@ class SafeLifecycleNode(LifecycleNode):
         super().__init__(name, **arguments)
         self.declare_parameter('lockstep', False)
         self.data_path: DataPath | None = None
+        self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
         self._diagnostics = Diagnostics(self, self._present_verdict)
@@ -131,7 +134,9 @@ class SafeLifecycleNode(LifecycleNode):
     def _present_verdict(self) -> Verdict:
         verdict = self._verdict_without_matches()
         unmatched = ', '.join(self.data_path.unmatched()) if self.data_path is not None else 'not configured'
-        return Verdict(verdict.level, verdict.sentence, {**verdict.figures, 'unmatched': unmatched})
+        state = 'active' if self._active else 'inactive'
+        figures = {**verdict.figures, 'state': state, 'unmatched': unmatched}
+        return Verdict(verdict.level, verdict.sentence, figures)
 
     def _verdict_without_matches(self) -> Verdict:
         if self._refusal:

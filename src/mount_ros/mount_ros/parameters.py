@@ -1,38 +1,35 @@
 """Node parameters declared from parameter sets: unit, sentence and range travel with the value."""
 
 import math
-from typing import Any, NamedTuple, TypeVar, get_type_hints
+from typing import NamedTuple, TypeVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from mount_models.quantity import ParameterError, Quantity, checked, quantities
+from mount_models.quantity import ParameterError, Quantity, flattened, quantities, with_flattened
 
 P = TypeVar('P', bound=NamedTuple)
 
 
-def declare(node: Node, defaults: P, prefix: str = '') -> None:
-    """Declare every field of the parameter set `defaults` on `node`, as `prefix.field` where given."""
+def declare(node: Node, defaults: NamedTuple, prefix: str = '') -> None:
+    """Declare every field of the parameter set `defaults` on `node`; nested ones as `outer.inner`."""
     notes = quantities(defaults)
     kinds = get_type_hints(type(defaults))
     for name, value in defaults._asdict().items():
-        descriptor = _descriptor(notes.get(name), kinds[name])
-        node.declare_parameter(_full_name(prefix, name), value, descriptor)
+        full = f'{prefix}.{name}' if prefix else name
+        if hasattr(value, '_asdict'):
+            declare(node, value, full)
+        else:
+            node.declare_parameter(full, value, _descriptor(notes.get(name), kinds[name]))
 
 
 def read(node: Node, defaults: P, prefix: str = '') -> P:
     """Return the declared parameter set with the node's present values, or raise `ParameterError`."""
-    values: dict[str, Any] = {
-        name: node.get_parameter(_full_name(prefix, name)).value for name in defaults._fields
-    }
+    values = {name: node.get_parameter(name).value for name in flattened(defaults, prefix)}
     try:
-        return checked(defaults._replace(**values))
+        return with_flattened(defaults, values, prefix)
     except ParameterError as error:
-        raise ParameterError(f'{node.get_name()}: {prefix + "." if prefix else ""}{error}') from None
-
-
-def _full_name(prefix: str, name: str) -> str:
-    return f'{prefix}.{name}' if prefix else name
+        raise ParameterError(f'{node.get_name()}: {error}') from None
 
 
 def _descriptor(quantity: Quantity | None, kind: type) -> ParameterDescriptor:

@@ -2,7 +2,6 @@
 
 import gc
 import signal
-import threading
 from collections.abc import Callable
 
 import rclpy
@@ -18,16 +17,15 @@ _SPIN_PERIOD = 0.1  # s: how soon a signal is noticed
 def run_node(create: Callable[[], SafeLifecycleNode], args: list[str] | None = None) -> None:
     """Run one lifecycle node until the process is told to end by SIGINT or SIGTERM."""
     prepare_environment()
-    ending = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ending.set())
     # Our own handlers: the context must still be valid while the node takes the current to 0 A.
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node = create()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: node.ending.set())
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     gc.freeze()  # what stands after set-up need not be looked at again
-    while rclpy.ok() and not ending.is_set():
+    while rclpy.ok() and not node.ending.is_set():
         executor.spin_once(_SPIN_PERIOD)
     # This order ends with code 0: the node leaves its work, threads are joined, then the context ends.
     node.close()

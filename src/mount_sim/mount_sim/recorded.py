@@ -7,7 +7,6 @@ unknown column, NaN, time that does not rise and gaps; each with the place where
 
 import csv
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -46,12 +45,11 @@ def load_signal(
     column: str = '',
     time_column: str = '',
     topic: str = '',
-    decode: Callable[[Path, str, str], tuple[NDArray[np.float64], NDArray[np.float64]]] | None = None,
 ) -> RecordedSignal:
     """Return the chosen signal of `file`, checked.
 
     `column` is a header name or number (CSV), a number or `signal.number` (NPY), or the field of the
-    message such as `linear_acceleration.z` (MCAP, with `topic`; `decode` reads it).
+    message such as `linear_acceleration.z` (MCAP, with `topic`).
     """
     path = Path(file)
     if not path.exists():
@@ -59,14 +57,12 @@ def load_signal(
             f'{path} does not exist; give an existing CSV, NPY or MCAP file, or a folder of NPY files'
         )
     if (path.is_dir() and any(path.glob('*.mcap'))) or path.suffix == '.mcap':
-        if decode is None:
-            raise RecordedInputError(f'{path} is an MCAP recording, and nothing here can decode it')
         if not topic or not column:
             raise RecordedInputError(
                 f'{path} is an MCAP recording: name a topic and a field, '
                 'such as --topic /imu --column linear_acceleration.z'
             )
-        name, (times, values) = f'{topic}.{column}', decode(path, topic, column)
+        name, (times, values) = f'{topic}.{column}', _load_mcap(path, topic, column)
     elif path.is_dir() or path.suffix == '.npy':
         name, times, values = _load_npy(path, column)
     elif path.suffix.lower() in ('.csv', '.txt'):
@@ -152,6 +148,15 @@ def _load_npy(path: Path, column: str) -> tuple[str, NDArray[np.float64], NDArra
             f'{wanted} in {path} has the columns 0 to {table.shape[1] - 1}; column {column!r} is none of them'
         )
     return f'{wanted}.{number}', _numbers(pairs[wanted][1]).ravel(), table[:, number]
+
+
+def _load_mcap(path: Path, topic: str, field: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    from mount_sim.recorded_mcap import NoSuchSignalError, read_field  # needs ROS, the rest does not
+
+    try:
+        return read_field(path, topic, field)
+    except NoSuchSignalError as error:
+        raise RecordedInputError(str(error)) from None
 
 
 def _npy_pairs(path: Path) -> dict[str, tuple[Path, Path]]:

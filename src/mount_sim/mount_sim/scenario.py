@@ -1,7 +1,6 @@
 """Scenarios of the simulated drive: what can be set, and the excitation that comes of it."""
 
-from collections.abc import Callable
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, Protocol
 
 from mount_models.quantity import ParameterError, Quantity
 from mount_models.road import Gap, RandomRoad
@@ -62,26 +61,38 @@ class RecordedScenario(NamedTuple):
 _DEFAULT_DURATION = 15.0  # s, chosen
 
 
-class Scenarios(NamedTuple):
+class Scenarios(Protocol):
     """The parameters of all scenarios; one of them is chosen by its name."""
 
-    timeline: Timeline = Timeline()
-    bench: BenchScenario = BenchScenario()
-    motorway: MotorwayScenario = MotorwayScenario()
-    recorded: RecordedScenario = RecordedScenario()
+    @property
+    def scenario(self) -> str: ...
+
+    @property
+    def seed(self) -> int: ...
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def bench(self) -> BenchScenario: ...
+
+    @property
+    def motorway(self) -> MotorwayScenario: ...
+
+    @property
+    def recorded(self) -> RecordedScenario: ...
 
 
-def build_excitation(
-    name: str, scenarios: Scenarios, seed: int, decode: Callable | None = None
-) -> Excitation:
-    """Return the excitation of the scenario `name`, or raise `ValueError` with what is wrong."""
-    if name == 'bench':
+def build_excitation(scenarios: Scenarios) -> Excitation:
+    """Return the excitation of the chosen scenario, or raise `ValueError` with what is wrong."""
+    if scenarios.scenario == 'bench':
         return _bench(scenarios)
-    if name == 'motorway':
-        return _motorway(scenarios, seed)
-    if name == 'recorded':
-        return _recorded(scenarios, decode)
-    raise ParameterError(f'scenario {name!r} is unknown; known are {", ".join(SCENARIO_NAMES)}')
+    if scenarios.scenario == 'motorway':
+        return _motorway(scenarios)
+    if scenarios.scenario == 'recorded':
+        return _recorded(scenarios)
+    known = ', '.join(SCENARIO_NAMES)
+    raise ParameterError(f'scenario {scenarios.scenario!r} is unknown; known are {known}')
 
 
 def _bench(scenarios: Scenarios) -> Excitation:
@@ -90,7 +101,7 @@ def _bench(scenarios: Scenarios) -> Excitation:
     return excitation.bench_sine(bench.frequency, bench.amplitude, duration, timeline.start, STEP_TIME)
 
 
-def _motorway(scenarios: Scenarios, seed: int) -> Excitation:
+def _motorway(scenarios: Scenarios) -> Excitation:
     timeline, motorway = scenarios.timeline, scenarios.motorway
     duration = timeline.duration or _DEFAULT_DURATION
     if motorway.gap_depth > 0.0 and motorway.gap_time >= duration:
@@ -98,7 +109,7 @@ def _motorway(scenarios: Scenarios, seed: int) -> Excitation:
             f'gap_time ({motorway.gap_time:g} s) must lie before the end of the drive ({duration:g} s); '
             'make the drive longer, the gap earlier, or gap_depth 0'
         )
-    road = RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=seed)
+    road = RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=scenarios.seed)
     gap = Gap(
         depth=motorway.gap_depth,
         position=motorway.speed * motorway.gap_time,
@@ -108,7 +119,7 @@ def _motorway(scenarios: Scenarios, seed: int) -> Excitation:
     return excitation.motorway(road, gap, duration, timeline.start, STEP_TIME)
 
 
-def _recorded(scenarios: Scenarios, decode: Callable | None) -> Excitation:
+def _recorded(scenarios: Scenarios) -> Excitation:
     timeline, recorded = scenarios.timeline, scenarios.recorded
     if not recorded.file:
         raise ParameterError('scenario recorded needs a file: CSV, NPY or MCAP (recorded.file, or --file)')
@@ -117,7 +128,6 @@ def _recorded(scenarios: Scenarios, decode: Callable | None) -> Excitation:
         column=recorded.column,
         time_column=recorded.time_column,
         topic=recorded.topic,
-        decode=decode,
     )
     values = recorded.scale * resample(signal, STEP_TIME)
     if timeline.duration:

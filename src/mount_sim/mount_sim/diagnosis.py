@@ -1,0 +1,36 @@
+"""The simulator's verdict on itself, from figures alone."""
+
+from mount_ros.diagnostics import Level, Verdict
+from mount_sim.loop import LoopFigures
+from mount_sim.simulated_mount import SAMPLE_TIME, Run
+
+DRIVING, FINISHED = 'driving', 'finished'
+
+
+def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
+    """Return level and sentence; the figures carry the progress of the run."""
+    simulated = figures.samples * SAMPLE_TIME
+    values = {
+        'samples': figures.samples,
+        'samples_of_run': run.samples,
+        'simulated_s': f'{simulated:.3f}',
+        'excitation_start_s': f'{run.excitation_start * SAMPLE_TIME:.3f}',
+        'real_time_factor': f'{simulated / figures.wall_time:.4f}' if figures.wall_time > 0.0 else 'nan',
+        'answered': figures.answered,
+        'overruns': figures.overruns,
+        'latency_median_s': f'{figures.latency.quantile(0.5):.7f}',
+        'latency_p99_s': f'{figures.latency.quantile(0.99):.7f}',
+        'fatal': bool(figures.failure),
+    }
+    if figures.failure:
+        return Verdict(Level.ERROR, figures.failure, values)
+    if figures.samples >= run.samples:
+        return Verdict(Level.OK, FINISHED, values)
+    if not lockstep and figures.overruns > 0.05 * max(figures.samples, 1000):
+        return Verdict(
+            Level.WARN,
+            f'{figures.overruns} of {figures.samples} samples were late (limit 5 %): this machine is too '
+            'busy for real time; close other programs, or use lock-step',
+            values,
+        )
+    return Verdict(Level.OK, DRIVING, values)

@@ -1,0 +1,133 @@
+"""ROS 2 node of the simulator: parameters in, CAN frames and the rack's instruments out."""
+
+import threading
+
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import Imu
+
+from mount_driver.bus import open_bus
+from mount_driver.parameters import DriverParameters
+from mount_ros import topics
+from mount_ros.diagnostics import Verdict
+from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.parameters import declare, read
+from mount_ros.process import run_node
+from mount_ros.scalars import OneNumberLayout, ScalarsLayout
+from mount_sim.can_end import CanEnd
+from mount_sim.diagnosis import verdict
+from mount_sim.faults import Fault
+from mount_sim.loop import ElectronicsLoop, NoAnswerError
+from mount_sim.parameters import SimParameters
+from mount_sim.plant import TRUTH
+from mount_sim.scenario import build_excitation
+from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
+
+_SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
+_UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
+
+
+class MountSim(SafeLifecycleNode):
+    """Stands in for the hardware: everything behind the CAN connector."""
+
+    def __init__(self, **arguments):
+        super().__init__('mount_sim', **arguments)
+        declare(self, SimParameters())
+        self.declare_parameter('interface', 'udp_multicast')
+        self.declare_parameter('channel', DriverParameters().channel)
+        self.declare_parameter('port', DriverParameters().port)
+        self.declare_parameter('answer_patience', 10.0)
+        self._ending = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._loop: ElectronicsLoop | None = None
+        self._can_end: CanEnd | None = None
+
+    def configure(self) -> None:
+        self._parameters = read(self, SimParameters())
+        self._excitation = build_excitation(self._parameters)
+        self._fault = Fault(self._parameters.fault)
+        self._truth = ScalarsLayout(topics.SIM_TRUTH)
+        if self._truth.names != TRUTH.names:
+            raise ValueError('sim/truth in the topic registry differs from what the plant gives')
+        self._acceleration = OneNumberLayout(_level_imu(), 'linear_acceleration.z')
+        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        path = self.open_data_path()
+        self._truth_publisher = path.publisher(topics.SIM_TRUTH)
+        self._acceleration_publisher = path.publisher(topics.SIM_CHASSIS_ACCELERATION)
+        self._force_publisher = path.publisher(topics.SIM_MOUNT_FORCE)
+        path.start()
+        self._prepare_mount()
+
+    def activate(self) -> None:
+        bus = open_bus(
+            self.get_parameter('interface').value,
+            self.get_parameter('channel').value,
+            port=self.get_parameter('port').value,
+        )
+        if self._mount.sample:
+            self._prepare_mount()
+        self._can_end = CanEnd(bus)
+        self._loop = ElectronicsLoop(
+            self._mount, self._can_end, self._parameters.electronics, self._fault, self._publish
+        )
+        self._ending.clear()
+        self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
+        self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
+        self._thread.start()
+
+    def deactivate(self) -> None:
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        if self._can_end is not None:
+            self._can_end.close()
+            self._can_end = None
+
+    def judge(self) -> Verdict:
+        assert self._loop is not None
+        return verdict(self._loop.figures, self._mount.run, lockstep=self.lockstep)
+
+    def _prepare_mount(self) -> None:
+        self._mount = SimulatedMount(self._parameters.plant, self._excitation, self._parameters.seed)
+        rehearsal = SimulatedMount(self._parameters.plant, self._excitation, self._parameters.seed)
+        rehearsal.measure()  # loads the compiled plant before time begins to run
+        rehearsal.advance(0.0)
+
+    def _run(self) -> None:
+        loop = self._loop
+        assert loop is not None
+        try:
+            if self.lockstep:
+                loop.run_in_lockstep(self._ending, self.get_parameter('answer_patience').value)
+            else:
+                loop.run_in_real_time(self._ending)
+        except (NoAnswerError, OSError) as error:
+            loop.figures.failure = str(error)
+            self.get_logger().error(str(error))
+
+    def _publish(self, number: int) -> None:
+        stamp = self._time_zero + number * _SAMPLE_NANOSECONDS
+        truth = self._mount.truth
+        if self._loop is not None and not self.lockstep:
+            truth['setpoint_latency'] = self._loop.last_latency
+        self._truth_publisher.publish(self._truth.pack_record(stamp, self._mount.truth_bytes))
+        self._acceleration_publisher.publish(self._acceleration.pack(stamp, truth['chassis_acceleration']))
+        self._force_publisher.publish(self._force.pack(stamp, truth['mount_force']))
+
+
+def _level_imu() -> Imu:
+    """Return the message of an accelerometer that knows neither orientation nor rotation."""
+    message = Imu()
+    message.header.frame_id = 'mount_chassis'
+    message.orientation_covariance[0] = _UNKNOWN_ORIENTATION
+    message.angular_velocity_covariance[0] = _UNKNOWN_ORIENTATION
+    return message
+
+
+def main() -> None:
+    """Run the node as a process."""
+    run_node(MountSim)
+
+
+if __name__ == '__main__':
+    main()

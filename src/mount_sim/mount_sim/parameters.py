@@ -1,0 +1,48 @@
+"""Everything that can be set on the simulated mount."""
+
+from typing import Annotated, NamedTuple
+
+from mount_models.actuator.reluctance import ReluctanceActuator
+from mount_models.closing import ClosingMechanics
+from mount_models.coil.ripple import RippleCoil
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.quantity import Quantity
+from mount_models.vehicle import Engine, Vehicle
+from mount_sim.electronics import ElectronicsParameters
+from mount_sim.faults import FaultParameters
+from mount_sim.plant import Plant
+from mount_sim.scenario import BenchScenario, MotorwayScenario, RecordedScenario, Timeline
+
+
+class SimParameters(NamedTuple):
+    """Scenario, truth and faults of one simulated run."""
+
+    scenario: str = 'motorway'
+    seed: Annotated[int, Quantity('1', 'seed of noise and road', 0, 2**31 - 1, 'chosen')] = 1
+    timeline: Timeline = Timeline()
+    bench: BenchScenario = BenchScenario()
+    motorway: MotorwayScenario = MotorwayScenario()
+    recorded: RecordedScenario = RecordedScenario()
+    actuator: ReluctanceActuator = ReluctanceActuator()
+    coil: RippleCoil = RippleCoil()
+    mechanics: ClosingMechanics = ClosingMechanics()
+    friction: FrictionCoefficients = FrictionCoefficients()
+    contact: FrictionContact = FrictionContact()
+    vehicle: Vehicle = Vehicle()
+    electronics: ElectronicsParameters = ElectronicsParameters()
+    fault: FaultParameters = FaultParameters()
+
+    @property
+    def plant(self) -> Plant:
+        """The simulated truth."""
+        return Plant(
+            actuator=self.actuator,
+            coil=self.coil,
+            mechanics=self.mechanics,
+            friction=self.friction,
+            contact=self.contact,
+            vehicle=self.vehicle,
+            engine=Engine(self.vehicle.engine_mass, self.vehicle.elastomer),
+            electronics=self.electronics,
+        )
