@@ -27,6 +27,7 @@ class LoopbackMulticastBus(can.BusABC):
     def __init__(self, channel: str, port: int, can_filters: Any = None, **_: Any):
         self.channel_info = f'udp_multicast {channel}:{port} on the loopback interface'
         self._can_protocol = can.CanProtocol.CAN_FD
+        self.foreign_datagrams = 0
         self._destination = (channel, port)
         self._socket = _receiving_socket(channel, port)
         self._sender = _sending_socket()
@@ -63,8 +64,9 @@ class LoopbackMulticastBus(can.BusABC):
             raise can.CanOperationError(f'receiving failed: {error.strerror}', error.errno) from error
         try:
             message = unpack_message(datagram, replace={'timestamp': time.time()})
-        except (TypeError, ValueError) as error:
-            raise can.CanOperationError(f'a datagram on {self.channel_info} is no CAN frame') from error
+        except (TypeError, ValueError):
+            self.foreign_datagrams += 1  # somebody else uses this group and port; no reason to stop
+            return None, False
         # Like SocketCAN: error frames pass the filter, because they tell the state of the bus.
         return message, message.is_error_frame
 

@@ -1,0 +1,210 @@
+"""The verdict on the link, from what was counted now and a second ago."""
+
+from collections import deque
+from typing import NamedTuple
+
+from mount_driver.codec import Status
+from mount_driver.exchange import Exchange
+from mount_driver.link import Arrival, Refusal
+from mount_driver.parameters import DriverParameters
+from mount_ros.diagnostics import Level, Verdict
+
+_PERIOD = 1.0  # s: rates are taken over this long
+_SERIOUS_FAULTS = ('over_temperature', 'over_current', 'under_voltage', 'displacement_sensor')
+
+
+class Snapshot(NamedTuple):
+    """What is known of the link at one time; counts are since the activation."""
+
+    time: float = 0.0  # s, steady clock
+    frame_age: float = 0.0  # s since the last sound sample, or since the activation
+    samples: int = 0
+    lost: int = 0
+    corrupt: int = 0
+    late: int = 0
+    resent: int = 0
+    invalid_displacements: int = 0
+    setpoints: int = 0
+    limited: int = 0
+    refused: int = 0
+    timeouts: int = 0
+    unsent: int = 0
+    restarts: int = 0
+    gaps: int = 0
+    recoveries: int = 0
+    error_frames: int = 0
+    latest_stamp: int = 0  # ns
+    last_refusal: Refusal | None = None
+    driving: bool = False
+    unheard: bool = False  # the electronics say that no setpoint reaches them
+    bus_off: bool = False
+    trouble: str = ''
+    failure: str = ''
+    status: Status | None = None
+
+
+def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
+    """Return what `exchange` has counted; `now_ns` and `started_ns` are on the steady clock."""
+    link, clock = exchange.link, exchange.clock
+    return Snapshot(
+        time=now_ns * 1e-9,
+        frame_age=(now_ns - (exchange.last_received or started_ns)) * 1e-9,
+        samples=link.arrivals[Arrival.NEW],
+        lost=link.lost,
+        corrupt=link.arrivals[Arrival.CORRUPT] + link.statuses.corrupt,
+        late=link.arrivals[Arrival.LATE],
+        resent=link.arrivals[Arrival.RESENT],
+        invalid_displacements=link.invalid_displacements,
+        setpoints=link.setpoints,
+        limited=link.limited,
+        refused=sum(link.refusals.values()),
+        timeouts=link.timeouts,
+        unsent=exchange.unsent,
+        restarts=clock.restarts,
+        gaps=clock.gaps,
+        recoveries=exchange.recoveries,
+        error_frames=exchange.error_frames,
+        latest_stamp=link.latest_stamp,
+        last_refusal=link.last_refusal,
+        driving=link.driving,
+        unheard=link.last_sample is not None and link.last_sample.setpoint_timeout,
+        bus_off=exchange.bus_off,
+        trouble=exchange.trouble,
+        failure=exchange.failure,
+        status=link.status,
+    )
+
+
+class LinkWatch:
+    """Keeps the snapshots of the last second."""
+
+    def __init__(self) -> None:
+        self._past: deque[Snapshot] = deque()
+
+    def earlier(self, now: Snapshot) -> Snapshot:
+        """Note `now` and return the snapshot of about a second ago, or the oldest there is."""
+        self._past.append(now)
+        while len(self._past) > 1 and now.time - self._past[1].time >= _PERIOD:
+            self._past.popleft()
+        return self._past[0]
+
+
+def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, lockstep: bool) -> Verdict:
+    """Return the verdict: the gravest finding speaks, all figures follow."""
+    where = f'{parameters.interface} {parameters.channel}'
+    for level, sentence in (
+        *_bus_findings(now, where, parameters),
+        *(() if lockstep else _silence_findings(now, where, parameters)),
+        *_fault_findings(now, parameters),
+        *_quality_findings(now, earlier, parameters),
+        *_setpoint_findings(now, earlier, parameters),
+    ):
+        return Verdict(level, sentence, _figures(now))
+    return Verdict(Level.OK, 'link to the electronics is up', _figures(now))
+
+
+Findings = list[tuple[Level, str]]
+
+
+def _bus_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Findings:
+    if now.failure:
+        return [(Level.ERROR, f'driver has stopped at 0 A: {now.failure}')]
+    if now.trouble:
+        wait = f'trying again for {parameters.recovery_time:g} s'
+        return [(Level.ERROR, f'CAN bus lost: {now.trouble}; setpoints are dropped, {wait}')]
+    if now.bus_off:
+        remedy = 'check wiring, termination and bit rates; `ip link set <channel> type can restart-ms 100`'
+        return [(Level.ERROR, f'{where} is bus off: setpoints are dropped; {remedy}')]
+    return []
+
+
+def _silence_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Findings:
+    if now.frame_age <= parameters.frame_timeout:
+        return []
+    # Whole seconds, so that the sentence does not change with every look.
+    age = int(now.frame_age)
+    silent = f'{age} s' if age else f'more than {1e3 * parameters.frame_timeout:g} ms'
+    remedy = f'are the electronics powered, is {where} up?'
+    return [(Level.ERROR, f'no frames from the electronics for {silent}; {remedy}')]
+
+
+def _fault_findings(now: Snapshot, parameters: DriverParameters) -> Findings:
+    status = now.status
+    if status is None:
+        return []
+    figures = f'{status.coil_temperature_celsius:.1f} degC, {status.supply_voltage:.2f} V'
+    found: Findings = []
+    serious = [fault for fault in status.faults if fault in _SERIOUS_FAULTS]
+    if serious:
+        found.append((Level.ERROR, f'the electronics report {", ".join(serious)} ({figures})'))
+    if 'e2e_error' in status.faults:
+        found.append((Level.WARN, 'the electronics report damaged or missing setpoints; check the bus'))
+    limit = parameters.temperature_warning_celsius
+    if status.coil_temperature_celsius > limit:
+        text = f'coil temperature ({status.coil_temperature_celsius:.1f} degC) is above {limit:g} degC'
+        found.append((Level.WARN, f'{text}; lower the current or cool the mount'))
+    return found
+
+
+def _quality_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
+    samples = now.samples - earlier.samples
+    lost, corrupt = now.lost - earlier.lost, now.corrupt - earlier.corrupt
+    invalid = now.invalid_displacements - earlier.invalid_displacements
+    found: Findings = []
+    share = (lost + corrupt) / max(samples + lost + corrupt, 1)
+    if share > parameters.loss_warning:
+        text = f'{lost} samples lost and {corrupt} frames corrupt in the last second'
+        limit = f'{100 * share:.2f} %, limit {100 * parameters.loss_warning:g} %'
+        found.append((Level.WARN, f'{text} ({limit}); check wiring, bus load and load of this machine'))
+    if invalid:
+        text = f'displacement not valid in {invalid} samples of the last second'
+        found.append((Level.WARN, f'{text}; check the displacement sensor'))
+    if now.restarts > earlier.restarts:
+        found.append((Level.WARN, 'the electronics have restarted; activate the graph again'))
+    if now.unsent > earlier.unsent:
+        text = f'{now.unsent - earlier.unsent} setpoint frames were not taken by the bus in the last second'
+        found.append((Level.WARN, f'{text}; does another node acknowledge?'))
+    return found
+
+
+def _setpoint_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
+    found: Findings = []
+    refused = now.refused - earlier.refused
+    if refused and now.last_refusal is not None:
+        text = f'{refused} setpoints refused in the last second'
+        found.append((Level.WARN, f'{text}, the last because {now.last_refusal.value}'))
+    if now.setpoints and not now.driving:
+        limit = f'{1e3 * parameters.setpoint_timeout:g} ms'
+        found.append((Level.WARN, f'coil at 0 A: no setpoint for {limit}; is mount_control active?'))
+    if now.driving and earlier.driving and now.unheard and earlier.unheard:
+        found.append((Level.WARN, 'the electronics do not take the setpoints; check the bus'))
+    if now.limited > earlier.limited:
+        text = f'{now.limited - earlier.limited} setpoints limited to 3 A in the last second'
+        found.append((Level.WARN, text))
+    return found
+
+
+def _figures(now: Snapshot) -> dict[str, object]:
+    figures: dict[str, object] = {
+        'last_stamp': now.latest_stamp,
+        'frame_age_s': round(now.frame_age, 4),
+        'samples': now.samples,
+        'lost': now.lost,
+        'corrupt': now.corrupt,
+        'late': now.late,
+        'resent': now.resent,
+        'invalid_displacements': now.invalid_displacements,
+        'setpoints': now.setpoints,
+        'limited': now.limited,
+        'refused': now.refused,
+        'setpoint_timeouts': now.timeouts,
+        'unsent': now.unsent,
+        'restarts': now.restarts,
+        'gaps': now.gaps,
+        'recoveries': now.recoveries,
+        'error_frames': now.error_frames,
+    }
+    if now.status is not None:
+        figures['supply_voltage'] = now.status.supply_voltage
+        figures['coil_temperature_celsius'] = now.status.coil_temperature_celsius
+    return figures

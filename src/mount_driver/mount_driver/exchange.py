@@ -1,0 +1,230 @@
+"""The exchange of frames with the electronics: one thread that receives, decodes, stamps and watches.
+
+No ROS here: samples leave by a callback, setpoints come in by `send_setpoint` from any thread.
+"""
+
+import atexit
+import threading
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import can
+
+from mount_driver.bus import CanLinkError, open_bus
+from mount_driver.codec import Measurement, MountCodec, Setpoint
+from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.link import Arrival, Link, Refusal
+from mount_driver.parameters import DriverParameters
+
+_WAKE = 0.005  # s: how often the watch looks at the clock when no frames come
+_REOPEN_PERIOD = 0.2  # s, chosen
+_OFF_FRAMES = 3  # chosen: so that one lost frame does not leave the coil on until the electronics' own watch
+_BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
+
+
+class Clock(Protocol):
+    """Maps the electronics' counter to stamps: see `mount_driver.clock`."""
+
+    restarts: int
+    gaps: int
+
+    def stamp(self, microseconds: int, received_monotonic_ns: int) -> int: ...
+
+
+class Exchange:
+    """Owns the bus between `start` and `stop`; every way out of it sends 0 A first.
+
+    `on_sample(stamp_ns, measurement)` is called in the receiving thread for every new sample.
+    """
+
+    def __init__(
+        self,
+        parameters: DriverParameters,
+        codec: MountCodec,
+        clock: Clock,
+        on_sample: Callable[[int, Measurement], None],
+        *,
+        lockstep: bool,
+    ):
+        self.clock = clock
+        self.link = Link(codec, round(parameters.setpoint_timeout * 1e9))
+        self.failure = ''
+        """Why the exchange has ended on its own; empty while it runs."""
+        self.trouble = ''
+        """What is wrong with the bus at present; empty when nothing is."""
+        self.bus_off = False
+        self.recoveries = 0
+        self.error_frames = 0
+        self.unsent = 0
+        """Setpoint frames that the bus did not take."""
+        self.last_received = 0
+        """Steady clock at the last sound measurement frame, ns; 0 before the first."""
+        self._parameters = parameters
+        self._codec = codec
+        self._on_sample = on_sample
+        self._lockstep = lockstep
+        self._ids = (codec.measurement.frame_id, codec.status.frame_id)
+        self._bus: can.BusABC | None = None
+        self._alive = AliveCounter()
+        self._frame = can.Message(
+            arbitration_id=codec.setpoint.frame_id,
+            is_extended_id=False,
+            is_fd=True,
+            bitrate_switch=True,
+            data=bytes(codec.setpoint.length),
+        )
+        self._sending = threading.Lock()  # between setpoints, the watch and the end
+        self._accepting = False
+        self._ending = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Open the bus and begin to receive; raises `CanLinkError`."""
+        self._bus = self._open()
+        self._accepting = True
+        self._thread = threading.Thread(target=self._serve, name='can_receive', daemon=True)
+        self._thread.start()
+        atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
+
+    def stop(self) -> None:
+        """Send 0 A, end the thread, close the bus; safe to call twice."""
+        self._ending.set()
+        self._leave_off()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join()
+            self._thread = None
+        self._close()
+        atexit.unregister(self.stop)
+
+    def send_setpoint(self, stamp: int, current: float) -> bool:
+        """Send the current (A) that answers the sample of `stamp` (ns) at once; False if it was refused."""
+        with self._sending:
+            if not self._accepting or self.bus_off or self.trouble:
+                self.link.refuse(Refusal.BUS_LOST)
+                return False
+            setpoint = self.link.answer(stamp, current, self._now())
+            return setpoint is not None and self._send(setpoint)
+
+    def _serve(self) -> None:
+        try:
+            while not self._ending.is_set():
+                try:
+                    self._receive()
+                except can.CanError as error:
+                    self._recover(error)
+        except Exception as error:
+            # The border of the thread: whatever the reason, say it and be safe.
+            known = isinstance(error, CanLinkError)
+            self.failure = str(error) if known else f'{type(error).__name__}: {error}'
+        finally:
+            self._leave_off()
+
+    def _receive(self) -> None:
+        bus = self._bus
+        if bus is None:
+            return
+        message = bus.recv(_WAKE)
+        received = time.monotonic_ns()
+        if message is not None:
+            if message.is_error_frame:
+                self._take_error_frame(message)
+            elif message.arbitration_id == self._ids[0]:
+                self._take_measurement(message, received)
+            elif message.arbitration_id == self._ids[1]:
+                self.link.take_status(message.data)
+        self._watch()
+
+    def _take_measurement(self, message: can.Message, received: int) -> None:
+        link = self.link
+        sample = link.take_measurement(message.data)
+        if sample is None:
+            if link.arrival is Arrival.RESENT:
+                self._answer_again()
+            return
+        self.bus_off = False
+        self.last_received = received
+        stamp = self.clock.stamp(sample.microseconds, received)
+        link.remember(stamp, sample.sample_counter)
+        self._on_sample(stamp, sample)
+
+    def _take_error_frame(self, message: can.Message) -> None:
+        self.error_frames += 1
+        if message.arbitration_id & _BUS_OFF:
+            self.bus_off = True
+
+    def _watch(self) -> None:
+        if self._lockstep and self.link.last_sample is None:
+            return  # time has not begun
+        with self._sending:
+            if self._accepting and self.link.off_is_due(self._now()):
+                self._send(self.link.off())
+
+    def _answer_again(self) -> None:
+        with self._sending:
+            last = self.link.last_sample
+            setpoint = self.link.answer_again(last.sample_counter) if last and self._accepting else None
+            if setpoint is not None:
+                self._send(setpoint)
+
+    def _now(self) -> int:
+        # In lock-step the stamps are all the time there is.
+        return self.link.latest_stamp if self._lockstep else time.monotonic_ns()
+
+    def _send(self, setpoint: Setpoint) -> bool:
+        """Send one frame; call it with the lock held."""
+        if self._bus is None:
+            return False
+        self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
+        try:
+            self._bus.send(self._frame)
+        except can.CanError:
+            self.unsent += 1
+            return False
+        return True
+
+    def _leave_off(self) -> None:
+        with self._sending:
+            if not self._accepting:
+                return
+            self._accepting = False
+            for _ in range(_OFF_FRAMES):
+                self._send(self.link.off())
+
+    def _recover(self, error: can.CanError) -> None:
+        """Open the bus again and again until it works, we are told to end, or the time is over."""
+        self.trouble = str(error)
+        deadline = time.monotonic() + self._parameters.recovery_time
+        while not self._ending.is_set():
+            with self._sending:
+                self._close()
+                try:
+                    self._bus = self._open()
+                except CanLinkError as refused:
+                    self.trouble = str(refused)
+                else:
+                    self.trouble = ''
+                    self.recoveries += 1
+                    return
+            if time.monotonic() > deadline:
+                raise CanLinkError(
+                    f'{self.trouble}; given up after {self._parameters.recovery_time:g} s, '
+                    f'activate the driver again when the bus is back'
+                ) from error
+            self._ending.wait(_REOPEN_PERIOD)
+
+    def _open(self) -> can.BusABC:
+        p = self._parameters
+        return open_bus(
+            p.interface,
+            p.channel,
+            receive=self._ids,
+            port=p.port,
+            bitrate=p.bitrate,
+            data_bitrate=p.data_bitrate,
+        )
+
+    def _close(self) -> None:
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            bus.shutdown()

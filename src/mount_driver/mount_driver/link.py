@@ -1,0 +1,191 @@
+"""The state of the link to the electronics: what came, what was missing, which setpoint may leave.
+
+No bus and no clock here: frames and times come in, decisions go out. Times are ns; whoever calls decides
+whether they are the steady clock (real time) or the stamps (lock-step).
+"""
+
+from enum import Enum, IntEnum
+
+from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
+from mount_driver.e2e_receiver import E2EReceiver
+
+_REMEMBERED = 64  # chosen: samples that a setpoint may name; setpoints older than 20 ms are refused anyway
+_COUNTER_MASK = 0xFFFF
+_MICROSECOND_MASK = 0xFFFF_FFFF
+_LATE_US = 1_000_000  # chosen: a sample that is older than this is no late one but a restart
+
+
+class Arrival(IntEnum):
+    """What a measurement frame was."""
+
+    NEW = 0
+    RESENT = 1  # the sample that came last, once more
+    LATE = 2  # older than the last one: not used
+    CORRUPT = 3  # wrong CRC or length: not used
+
+
+class Refusal(Enum):
+    """Why a setpoint was not sent."""
+
+    NOT_A_NUMBER = 'it is NaN'
+    NEGATIVE = 'it is below 0 A'
+    UNKNOWN_SAMPLE = 'its stamp is that of none of the last 64 samples'
+    STALE = 'it answers a sample that is older than the setpoint timeout'
+    SUPERSEDED = 'a later sample is already answered'
+    MALFORMED = 'the message lacks the coil current'
+    BUS_LOST = 'the CAN bus is not there'
+
+
+class Link:
+    """Judges every measurement and every setpoint, and counts."""
+
+    def __init__(self, codec: MountCodec, setpoint_timeout_ns: int):
+        self.samples = E2EReceiver(codec.decode_measurement)
+        self.statuses = E2EReceiver(codec.decode_status)
+        self.arrival = Arrival.NEW
+        self.arrivals = [0] * len(Arrival)
+        """Measurement frames by `Arrival`."""
+        self.lost = 0
+        """Samples missing by their SampleCounter."""
+        self.invalid_displacements = 0
+        self.last_sample: Measurement | None = None
+        self.latest_stamp = 0
+        """Stamp of the newest sample, ns; 0 before the first."""
+        self.status: Status | None = None
+
+        self.setpoints = 0
+        """Setpoints that were let through."""
+        self.limited = 0
+        """Of these, limited to the greatest current."""
+        self.refusals = dict.fromkeys(Refusal, 0)
+        self.last_refusal: Refusal | None = None
+        self.timeouts = 0
+        """Times that setpoints stopped for longer than the timeout."""
+
+        self._highest_current = codec.current.high
+        self._timeout = setpoint_timeout_ns
+        self._counters: dict[int, int] = {}  # stamp -> SampleCounter of the last samples
+        self._stamps = [-1] * _REMEMBERED
+        self._place = 0
+        self._answered_stamp = -1
+        self._last_setpoint = Setpoint(0.0, 0, False)
+        self._fed = -1  # time of the last setpoint
+        self._off_sent = -1
+
+    # From the electronics.
+
+    def take_measurement(self, data: bytes | bytearray) -> Measurement | None:
+        """Return the sample of a frame if it is a new one, else None; `arrival` says what it was."""
+        sample = self.samples.receive(data)
+        arrival = Arrival.CORRUPT if sample is None else self._order(sample)
+        self.arrival = arrival
+        self.arrivals[arrival] += 1
+        if arrival is not Arrival.NEW or sample is None:
+            return None
+        if sample.displacement != sample.displacement:
+            self.invalid_displacements += 1
+        self.last_sample = sample
+        return sample
+
+    def remember(self, stamp: int, sample_counter: int) -> None:
+        """Note the stamp under which a sample is published, so that a setpoint can name it."""
+        place = self._place
+        self._counters.pop(self._stamps[place], None)
+        self._stamps[place] = stamp
+        self._counters[stamp] = sample_counter
+        self._place = (place + 1) % _REMEMBERED
+        self.latest_stamp = stamp
+
+    def take_status(self, data: bytes | bytearray) -> None:
+        """Keep the status of a frame if it is sound."""
+        status = self.statuses.receive(data)
+        if status is not None:
+            self.status = status
+
+    # To the electronics.
+
+    def answer(self, stamp: int, current: float, now: int) -> Setpoint | None:
+        """Return the setpoint that answers the sample of `stamp` (ns), or None: see `last_refusal`.
+
+        `current` in A; above the limit of 3 A it is limited.
+        """
+        counter = self._counters.get(stamp)
+        reason = self._objection(stamp, current, counter)
+        if reason is not None or counter is None:
+            self.refuse(reason or Refusal.UNKNOWN_SAMPLE)
+            return None
+        if current > self._highest_current:
+            self.limited += 1
+            current = self._highest_current
+        self.setpoints += 1
+        self._answered_stamp = stamp
+        self._fed = now
+        self._off_sent = -1
+        self._last_setpoint = Setpoint(current, counter, True)
+        return self._last_setpoint
+
+    def refuse(self, reason: Refusal) -> None:
+        """Count a setpoint that is not sent."""
+        self.refusals[reason] += 1
+        self.last_refusal = reason
+
+    def answer_again(self, sample_counter: int) -> Setpoint | None:
+        """Return the last setpoint if it answered this sample, for electronics that did not get it."""
+        last = self._last_setpoint
+        return last if last.enable and last.answered_counter == sample_counter else None
+
+    def off(self) -> Setpoint:
+        """Return the setpoint that switches the coil off; it answers no new sample."""
+        self._last_setpoint = Setpoint(0.0, self._last_setpoint.answered_counter, False)
+        return self._last_setpoint
+
+    def off_is_due(self, now: int) -> bool:
+        """Whether no setpoint came for longer than the timeout, so that 0 A must be sent.
+
+        True once when setpoints stop and then once per timeout, so that a lost frame does no harm.
+        """
+        if self._fed < 0:
+            self._fed = now  # the watch begins with its first look
+        if now - self._fed <= self._timeout or (
+            self._off_sent >= 0 and now - self._off_sent <= self._timeout
+        ):
+            return False
+        if self._last_setpoint.enable:
+            self.timeouts += 1
+        self._off_sent = now
+        return True
+
+    @property
+    def driving(self) -> bool:
+        """Whether the last frame to the electronics was a setpoint and not 0 A from here."""
+        return self._last_setpoint.enable
+
+    def _objection(self, stamp: int, current: float, counter: int | None) -> Refusal | None:
+        if current != current:
+            return Refusal.NOT_A_NUMBER
+        if current < 0.0:
+            return Refusal.NEGATIVE
+        if counter is None:
+            return Refusal.UNKNOWN_SAMPLE
+        if self.latest_stamp - stamp > self._timeout:
+            return Refusal.STALE
+        if stamp < self._answered_stamp:
+            return Refusal.SUPERSEDED
+        return None
+
+    def _order(self, sample: Measurement) -> Arrival:
+        last = self.last_sample
+        if last is None:
+            return Arrival.NEW
+        step = (sample.sample_counter - last.sample_counter) & _COUNTER_MASK
+        step_us = (sample.microseconds - last.microseconds) & _MICROSECOND_MASK
+        if step == 1 and step_us < _LATE_US:
+            return Arrival.NEW
+        if step == 0 and step_us == 0:
+            return Arrival.RESENT
+        back_us = _MICROSECOND_MASK + 1 - step_us
+        if back_us < _LATE_US and _COUNTER_MASK + 1 - step <= _REMEMBERED:
+            return Arrival.LATE
+        if step > 1 and step_us <= _MICROSECOND_MASK // 2:  # else a restart, whose counters say nothing
+            self.lost += step - 1
+        return Arrival.NEW

@@ -1,0 +1,95 @@
+"""The driver's node: CAN on one side, topics on the other."""
+
+import gc
+import math
+import time
+
+from mount_driver.clock import CounterClock, ElectronicsClock
+from mount_driver.codec import Measurement, MountCodec
+from mount_driver.diagnosis import LinkWatch, judge, snapshot
+from mount_driver.exchange import Exchange
+from mount_driver.link import Refusal
+from mount_driver.parameters import DriverParameters
+from mount_ros.diagnostics import Level, Verdict
+from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.parameters import declare, read
+from mount_ros.process import run_node
+from mount_ros.scalars import ScalarsError, ScalarsLayout
+from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
+
+
+class MountDriver(SafeLifecycleNode):
+    """Publishes `displacement` and `coil_ripple`, sends `current_setpoint`; away from active: 0 A."""
+
+    def __init__(self, **arguments):
+        super().__init__('mount_driver', **arguments)
+        declare(self, DriverParameters())
+        self._parameters = DriverParameters()
+        self._codec: MountCodec | None = None
+        self._exchange: Exchange | None = None
+        self._watch = LinkWatch()
+        self._started_ns = 0
+        self._displacement_layout = ScalarsLayout(DISPLACEMENT)
+        self._ripple_layout = ScalarsLayout(COIL_RIPPLE)
+        self._setpoint_layout = ScalarsLayout(CURRENT_SETPOINT)
+
+    def configure(self) -> None:
+        self._parameters = read(self, DriverParameters())
+        self._codec = MountCodec()
+        path = self.open_data_path()
+        self._publish_displacement = path.publisher(DISPLACEMENT).publish
+        self._publish_ripple = path.publisher(COIL_RIPPLE).publish
+        path.subscribe(CURRENT_SETPOINT, self._on_setpoint)
+        path.start()
+
+    def activate(self) -> None:
+        assert self._codec is not None
+        # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
+        epoch_offset = time.time_ns() - time.monotonic_ns()
+        clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
+        exchange = Exchange(self._parameters, self._codec, clock, self._on_sample, lockstep=self.lockstep)
+        self._watch = LinkWatch()
+        self._started_ns = time.monotonic_ns()
+        exchange.start()
+        self._exchange = exchange
+        gc.freeze()  # what stands now need not be looked at again on the 1 kHz path
+
+    def deactivate(self) -> None:
+        exchange, self._exchange = self._exchange, None
+        if exchange is not None:
+            exchange.stop()
+
+    def cleanup(self) -> None:
+        self._codec = None
+
+    def judge(self) -> Verdict:
+        exchange = self._exchange
+        if exchange is None:
+            return Verdict(Level.OK, 'inactive')
+        now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
+        return judge(now, self._watch.earlier(now), self._parameters, lockstep=self.lockstep)
+
+    def _on_sample(self, stamp: int, sample: Measurement) -> None:
+        # The displacement first: the setpoint waits for it.
+        self._publish_displacement(self._displacement_layout.pack(stamp, (sample.displacement,)))
+        self._publish_ripple(
+            self._ripple_layout.pack(
+                stamp, (sample.coil_current, math.nan), (sample.current_rate, sample.flux_rate)
+            )
+        )
+
+    def _on_setpoint(self, raw: bytes) -> None:
+        exchange = self._exchange
+        if exchange is None:
+            return
+        try:
+            stamp, (current,), _ = self._setpoint_layout.unpack(raw)
+        except ScalarsError:
+            exchange.link.refuse(Refusal.MALFORMED)
+            return
+        exchange.send_setpoint(stamp, current)
+
+
+def main() -> None:
+    """Run the driver's process."""
+    run_node(MountDriver)

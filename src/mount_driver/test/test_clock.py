@@ -1,0 +1,197 @@
+"""Stamps are true, evenly spaced and rising: over the wrap, with drift, delays, pauses and restarts."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_driver.clock import CounterClock, ElectronicsClock
+
+EPOCH = 1_700_000_000_000_000_000  # ns, ROS time minus steady clock
+START = 5_000_000_000  # ns, steady clock at the first sample
+WRAP = 1 << 32
+
+
+def run(delays_ns, *, first_us=1000, drift=0.0, clock=None, start=START):
+    """Return (stamps - true times, stamps) of samples 1 ms apart whose frames take `delays_ns`.
+
+    `drift` > 0: the electronics' clock is fast.
+    """
+    clock = clock or ElectronicsClock(EPOCH)
+    errors, stamps = [], []
+    received = 0
+    for index, delay in enumerate(delays_ns):
+        true_time = start + index * 1_000_000
+        counter = first_us + round(index * 1000 * (1 + drift))
+        received = max(received, true_time + int(delay))  # frames keep their order
+        stamp = clock.stamp(counter % WRAP, received)
+        stamps.append(stamp)
+        errors.append(stamp - EPOCH - true_time)
+    return np.array(errors), np.array(stamps)
+
+
+def usual_delays(count, seed=1):
+    """Delays of 60 us and more, as measured on one machine: an exponential tail and rare long ones."""
+    random = np.random.default_rng(seed)
+    delays = 60_000 + random.exponential(30_000, count)
+    delays[random.random(count) < 0.01] += 5_000_000
+    return delays
+
+
+def test_a_stamp_is_the_time_of_the_sample_and_not_of_its_arrival():
+    errors, _ = run(usual_delays(20_000))
+    assert np.all(np.abs(errors[5000:]) < 70_000)
+
+
+def test_stamps_are_evenly_spaced_however_late_the_frames_are():
+    _, stamps = run(usual_delays(20_000))
+    assert np.all(np.abs(np.diff(stamps) - 1_000_000) <= 1_000)
+
+
+@pytest.mark.parametrize('ppm', [-200, -50, 50, 200])
+def test_the_drift_of_the_electronics_is_followed(ppm):
+    clock = ElectronicsClock(EPOCH)
+    errors, stamps = run(usual_delays(60_000), drift=ppm * 1e-6, clock=clock)
+    assert clock.drift == pytest.approx(-ppm * 1e-6, abs=15e-6)
+    assert np.all(np.abs(errors[20_000:]) < 80_000)
+    assert np.max(np.abs(errors)) < 400_000
+    assert np.all(np.abs(np.diff(stamps) - 1_000_000) <= 2_000)
+
+
+def test_the_wrap_of_the_counter_leaves_no_trace():
+    across, _ = run(usual_delays(4_000), first_us=WRAP - 2_000_000)
+    without, _ = run(usual_delays(4_000), first_us=0)
+    assert np.array_equal(across, without)
+
+
+@pytest.mark.parametrize('pause_ms', [100, 900, 3000])
+def test_a_burst_after_a_pause_of_our_process_does_not_move_the_stamps(pause_ms):
+    delays = usual_delays(12_000)
+    delays[6000] = pause_ms * 1e6  # all later frames queue up behind this one
+    clock = ElectronicsClock(EPOCH)
+    errors, stamps = run(delays, clock=clock)
+    assert np.all(np.abs(errors[5000:]) < 70_000)
+    assert np.all(np.abs(np.diff(stamps) - 1_000_000) <= 1_000)
+    assert (clock.restarts, clock.gaps, clock.remappings) == (0, 0, 0)
+
+
+def test_a_late_first_frame_is_made_good_without_a_step_back():
+    delays = usual_delays(60_000)
+    delays[0] = 300_000_000
+    errors, stamps = run(delays)
+    assert errors[0] == 300_000_000
+    assert np.all(np.diff(stamps) >= 800_000)
+    assert np.all(np.abs(errors[30_000:]) < 100_000)
+
+
+def test_a_path_that_becomes_slower_for_good_is_believed_after_a_while():
+    delays = usual_delays(40_000)
+    delays[10_000:] += 50_000_000
+    clock = ElectronicsClock(EPOCH)
+    errors, stamps = run(delays, clock=clock)
+    assert clock.remappings == 1
+    assert np.all(np.diff(stamps) > 0)
+    assert np.all(np.abs(errors[20_000:] - 50_000_000) < 200_000)
+
+
+def test_a_restart_begins_a_new_mapping_ahead_of_the_last_stamp():
+    clock = ElectronicsClock(EPOCH)
+    _, before = run(usual_delays(5_000), clock=clock)
+    errors, after = run(usual_delays(5_000), clock=clock, first_us=0, start=START + 5_300_000_000)
+    assert clock.restarts == 1
+    assert after[0] > before[-1]
+    assert np.all(np.abs(errors) < 1_000_000)
+
+
+def test_a_restart_after_more_than_half_the_counters_range_is_no_gap():
+    clock = ElectronicsClock(EPOCH)
+    run(usual_delays(10), first_us=3 << 30, clock=clock)
+    run(usual_delays(10), first_us=0, clock=clock, start=START + 2_000_000_000)
+    assert (clock.restarts, clock.gaps) == (1, 0)
+
+
+def test_a_gap_of_more_than_a_second_is_a_gap():
+    clock = ElectronicsClock(EPOCH)
+    run(usual_delays(10), first_us=0, clock=clock)
+    errors, _ = run(usual_delays(10), first_us=1_500_000, clock=clock, start=START + 1_500_000_000)
+    assert (clock.restarts, clock.gaps) == (0, 1)
+    assert np.all(np.abs(errors) < 1_000_000)
+
+
+def test_lost_samples_leave_the_others_where_they_are():
+    clock = ElectronicsClock(EPOCH)
+    kept = [index for index in range(5000) if index % 7 not in (2, 3, 4)]
+    stamps = {index: clock.stamp(index * 1000, START + index * 1_000_000 + 60_000) for index in kept}
+    for left, right in itertools.pairwise(kept):
+        assert abs(stamps[right] - stamps[left] - (right - left) * 1_000_000) <= 4_000
+
+
+def test_the_same_sample_again_has_the_same_stamp():
+    clock = ElectronicsClock(EPOCH)
+    clock.stamp(1000, START)
+    assert clock.stamp(2000, START + 1_100_000) == clock.stamp(2000, START + 9_000_000)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.one_of(st.integers(1, 3000), st.integers(0, WRAP - 1)),  # step of the counter, us
+            st.integers(0, 2_000_000_000),  # step of the steady clock, ns
+        ),
+        max_size=300,
+    ),
+    st.integers(0, WRAP - 1),
+)
+def test_stamps_never_go_back_whatever_arrives(steps, first):
+    clock = ElectronicsClock(EPOCH)
+    counter, received = first, START
+    last = clock.stamp(counter, received)
+    for step, waited in steps:
+        counter, received = (counter + step) % WRAP, received + waited
+        stamp = clock.stamp(counter, received)
+        assert stamp > last if step else stamp == last
+        last = stamp
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(-200e-6, 200e-6),
+    st.integers(0, WRAP - 1),
+    st.integers(20_000, 300_000),
+    st.integers(0, 2**32 - 1),
+)
+def test_stamps_settle_on_the_fastest_frames(drift, first, fastest, seed):
+    random = np.random.default_rng(seed)
+    delays = fastest + random.exponential(100_000, 15_000)
+    errors, _ = run(delays, first_us=first, drift=drift)
+    assert np.all(np.abs(errors[10_000:] - fastest) < 80_000)
+
+
+def test_in_lock_step_stamps_are_the_counter():
+    clock = CounterClock()
+    assert [clock.stamp(us) for us in (0, 1000, 2000)] == [0, 1_000_000, 2_000_000]
+
+
+def test_in_lock_step_the_time_of_arrival_has_no_say():
+    left, right = CounterClock(), CounterClock()
+    for us in range(500, 100_000, 1000):
+        assert left.stamp(us, 0) == right.stamp(us, us * 77_777) == us * 1000
+
+
+def test_in_lock_step_the_counter_is_unwrapped():
+    clock = CounterClock()
+    stamps = [clock.stamp(us % WRAP) for us in range(WRAP - 5000, WRAP + 5000, 1000)]
+    assert set(np.diff(stamps)) == {1_000_000}
+    stamps = [clock.stamp(us % WRAP) for us in range(WRAP + 5000, 3 * WRAP, WRAP // 4)]
+    assert np.all(np.diff(stamps) == WRAP // 4 * 1000)
+
+
+def test_in_lock_step_a_restart_goes_on_behind_the_last_stamp():
+    clock = CounterClock()
+    clock.stamp(5_000_000)
+    assert clock.stamp(1000) == 5_001_000_000
+    assert clock.stamp(2000) == 5_002_000_000
+    assert clock.restarts == 1

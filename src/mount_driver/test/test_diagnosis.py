@@ -1,0 +1,85 @@
+"""The verdict says what is wrong, how much, and what to do."""
+
+import re
+
+import pytest
+
+from mount_driver.codec import Status
+from mount_driver.diagnosis import LinkWatch, Snapshot, judge
+from mount_driver.link import Refusal
+from mount_driver.parameters import DriverParameters
+from mount_ros.diagnostics import Level
+
+PARAMETERS = DriverParameters(interface='socketcan', channel='can0')
+BEFORE = Snapshot(time=9.0, samples=9_000, setpoints=9_000, driving=True, status=Status(13.8, 40.0))
+NOW = BEFORE._replace(time=10.0, samples=10_000, setpoints=10_000, latest_stamp=10_000_000_000)
+
+
+def verdict(*, lockstep=False, **changes):
+    return judge(NOW._replace(**changes), BEFORE, PARAMETERS, lockstep=lockstep)
+
+
+def test_a_sound_link_is_ok_with_its_figures():
+    sound = verdict()
+    assert (sound.level, sound.sentence) == (Level.OK, 'link to the electronics is up')
+    assert sound.figures['last_stamp'] == 10_000_000_000
+    assert sound.figures['samples'] == 10_000
+    assert sound.figures['supply_voltage'] == 13.8
+
+
+@pytest.mark.parametrize(
+    ('changes', 'level', 'sentence'),
+    [
+        ({'failure': 'gone'}, Level.ERROR, 'stopped at 0 A: gone'),
+        ({'trouble': 'network down'}, Level.ERROR, 'CAN bus lost: network down; setpoints are dropped'),
+        ({'bus_off': True}, Level.ERROR, 'socketcan can0 is bus off'),
+        ({'frame_age': 0.15}, Level.ERROR, 'no frames .* more than 100 ms; .*powered, is socketcan can0 up'),
+        ({'frame_age': 7.6}, Level.ERROR, 'no frames from the electronics for 7 s'),
+        ({'status': Status(13.8, 150.0, over_temperature=True)}, Level.ERROR, r'over_temperature \(150'),
+        ({'status': Status(8.9, 40.0, under_voltage=True)}, Level.ERROR, r'under_voltage .*8\.90 V'),
+        ({'status': Status(13.8, 40.0, e2e_error=True)}, Level.WARN, 'damaged or missing setpoints'),
+        ({'status': Status(13.8, 120.1)}, Level.WARN, r'120\.1 degC\) is above 120 degC; lower'),
+        ({'lost': 2}, Level.WARN, r'2 samples lost and 0 frames corrupt .*0\.20 %, limit 0\.1 %'),
+        ({'corrupt': 5}, Level.WARN, '0 samples lost and 5 frames corrupt'),
+        ({'invalid_displacements': 3}, Level.WARN, 'not valid in 3 samples'),
+        ({'restarts': 1}, Level.WARN, 'have restarted'),
+        ({'unsent': 4}, Level.WARN, '4 setpoint frames were not taken'),
+        ({'refused': 6, 'last_refusal': Refusal.STALE}, Level.WARN, '6 setpoints refused.*older than'),
+        ({'driving': False, 'timeouts': 1}, Level.WARN, 'no setpoint for 20 ms; is mount_control active'),
+        ({'limited': 2}, Level.WARN, '2 setpoints limited to 3 A'),
+    ],
+)
+def test_a_finding_has_its_level_and_sentence(changes, level, sentence):
+    found = verdict(**changes)
+    assert found.level == level
+    assert re.search(sentence, found.sentence)
+
+
+@pytest.mark.parametrize('changes', [{'lost': 1}, {'frame_age': 0.09}, {'status': Status(13.8, 119.9)}])
+def test_what_lies_within_the_limits_is_ok(changes):
+    assert verdict(**changes).level == Level.OK
+
+
+def test_setpoints_that_do_not_reach_the_electronics_are_noticed():
+    found = judge(NOW._replace(unheard=True), BEFORE._replace(unheard=True), PARAMETERS, lockstep=False)
+    assert 'do not take the setpoints' in found.sentence
+
+
+def test_the_gravest_finding_speaks():
+    assert verdict(lost=500, frame_age=3.0).sentence.startswith('no frames')
+
+
+def test_in_lock_step_waiting_is_no_fault():
+    assert verdict(frame_age=100.0, lockstep=True).level == Level.OK
+
+
+def test_before_the_first_setpoint_0_ampere_is_no_fault():
+    assert verdict(setpoints=0, driving=False).level == Level.OK
+
+
+def test_old_losses_are_forgotten_after_a_second():
+    watch = LinkWatch()
+    for tenth in range(30):
+        now = Snapshot(time=tenth / 10, samples=100 * tenth, lost=50 if tenth >= 5 else 0)
+        level = judge(now, watch.earlier(now), PARAMETERS, lockstep=False).level
+        assert level == (Level.WARN if 5 <= tenth < 15 else Level.OK), tenth

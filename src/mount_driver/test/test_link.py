@@ -1,0 +1,211 @@
+"""The link counts what comes and lets only sound setpoints leave."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
+from mount_driver.link import Arrival, Link, Refusal
+
+CODEC = MountCodec()
+MS = 1_000_000
+SAMPLE = Measurement(0, 0, 0.001, 0.5, 10.0, 20.0)
+
+
+@pytest.fixture
+def link():
+    return Link(CODEC, 20 * MS)
+
+
+def frame(index, alive=None, **changes):
+    sample = SAMPLE._replace(sample_counter=index % 65536, microseconds=index * 1000 % 2**32)
+    return CODEC.encode_measurement(sample._replace(**changes), (index if alive is None else alive) & 0xFF)
+
+
+def feed(link, indices):
+    """Let samples arrive and be stamped: sample k at k ms."""
+    arrivals = []
+    for index in indices:
+        if link.take_measurement(frame(index)) is not None:
+            link.remember(index * MS, index % 65536)
+        arrivals.append(link.arrival)
+    return arrivals
+
+
+def test_samples_in_order_are_new_across_the_wrap_of_their_counter(link):
+    assert set(feed(link, range(65_500, 65_600))) == {Arrival.NEW}
+    assert link.lost == 0
+
+
+@pytest.mark.parametrize('missing', [1, 3, 500])
+def test_missing_samples_are_counted_by_their_number(link, missing):
+    feed(link, [10, 11, 12 + missing])
+    assert link.lost == missing
+
+
+def test_the_alive_counter_alone_could_not_have_counted_300_missing_samples(link):
+    feed(link, [10, 311])
+    assert (link.lost, link.samples.lost) == (300, 300 % 256)
+
+
+def test_the_same_sample_again_is_resent_and_not_handed_on(link):
+    feed(link, [10, 11])
+    assert link.take_measurement(frame(11)) is None
+    assert link.take_measurement(frame(11, alive=12)) is None
+    assert link.arrivals[Arrival.RESENT] == 2
+
+
+def test_a_late_sample_is_not_handed_on(link):
+    assert feed(link, [10, 12, 11, 13]) == [Arrival.NEW, Arrival.NEW, Arrival.LATE, Arrival.NEW]
+
+
+def test_a_restart_of_the_electronics_loses_nothing_and_goes_on(link):
+    feed(link, range(30_000, 30_010))
+    assert set(feed(link, range(10))) == {Arrival.NEW}
+    assert link.lost == 0
+
+
+def test_a_corrupt_frame_is_counted_and_not_handed_on(link):
+    data = frame(0)
+    data[12] ^= 4
+    assert link.take_measurement(data) is None
+    assert link.arrivals[Arrival.CORRUPT] == 1
+    assert link.last_sample is None
+
+
+def test_displacements_that_are_not_valid_are_counted(link):
+    sample = link.take_measurement(frame(0, displacement=math.nan))
+    assert math.isnan(sample.displacement)
+    assert link.invalid_displacements == 1
+
+
+def test_a_status_is_kept_and_a_corrupt_one_is_not(link):
+    link.take_status(CODEC.encode_status(Status(13.5, 40.0), 0))
+    damaged = CODEC.encode_status(Status(1.5, 99.0), 1)
+    damaged[3] ^= 1
+    link.take_status(damaged)
+    assert link.status == Status(13.5, 40.0)
+    assert link.statuses.corrupt == 1
+
+
+def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
+    feed(link, range(65_530, 65_540))
+    assert link.answer(65_537 * MS, 1.25, now=0) == Setpoint(1.25, 1, True)
+
+
+@pytest.mark.parametrize(
+    ('stamp', 'current', 'reason'),
+    [
+        (99 * MS, math.nan, Refusal.NOT_A_NUMBER),
+        (99 * MS, -1e-9, Refusal.NEGATIVE),
+        (99 * MS, -math.inf, Refusal.NEGATIVE),
+        (99 * MS + 1, 1.0, Refusal.UNKNOWN_SAMPLE),
+        (100 * MS, 1.0, Refusal.UNKNOWN_SAMPLE),
+        (20 * MS, 1.0, Refusal.UNKNOWN_SAMPLE),
+        (78 * MS, 1.0, Refusal.STALE),
+    ],
+)
+def test_a_doubtful_setpoint_is_refused_counted_and_the_reason_kept(link, stamp, current, reason):
+    feed(link, range(100))
+    assert link.answer(stamp, current, now=0) is None
+    assert link.refusals[reason] == 1
+    assert link.last_refusal is reason
+    assert link.setpoints == 0
+
+
+def test_a_setpoint_20_ms_old_is_still_sent(link):
+    feed(link, range(100))
+    assert link.answer(79 * MS, 1.0, now=0) is not None
+
+
+def test_a_setpoint_for_an_older_sample_than_the_last_answered_is_refused(link):
+    feed(link, range(100))
+    link.answer(99 * MS, 1.0, now=0)
+    assert link.answer(98 * MS, 2.0, now=0) is None
+    assert link.last_refusal is Refusal.SUPERSEDED
+
+
+def test_before_the_first_sample_every_setpoint_is_refused(link):
+    assert link.answer(0, 1.0, now=0) is None
+    assert link.last_refusal is Refusal.UNKNOWN_SAMPLE
+
+
+@pytest.mark.parametrize('current', [3.001, 100.0, math.inf])
+def test_more_than_3_ampere_is_limited_and_counted(link, current):
+    feed(link, [0])
+    assert link.answer(0, current, now=0).current == 3.0
+    assert link.limited == 1
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(allow_nan=True, allow_infinity=True), st.integers(-200 * MS, 200 * MS))
+def test_no_setpoint_outside_0_to_3_ampere_ever_leaves(current, stamp):
+    link = Link(CODEC, 20 * MS)
+    feed(link, range(100))
+    setpoint = link.answer(stamp, current, now=0)
+    assert setpoint is None or 0.0 <= setpoint.current <= 3.0
+
+
+def test_only_the_last_64_samples_are_remembered(link):
+    feed(link, range(1000))
+    assert len(link._counters) == 64
+
+
+def test_off_is_due_when_setpoints_stop_for_longer_than_the_timeout(link):
+    feed(link, [0])
+    assert not link.off_is_due(0)
+    link.answer(0, 1.0, now=5 * MS)
+    assert not link.off_is_due(25 * MS)
+    assert link.off_is_due(25 * MS + 1)
+    assert link.off() == Setpoint(0.0, 0, False)
+    assert link.timeouts == 1
+    assert not link.driving
+
+
+def test_off_is_repeated_once_per_timeout_and_counted_once(link):
+    feed(link, [0])
+    link.answer(0, 1.0, now=0)
+    due = []
+    for now in range(0, 100 * MS, MS):
+        if link.off_is_due(now):
+            link.off()
+            due.append(now // MS)
+    assert due == [21, 42, 63, 84]
+    assert link.timeouts == 1
+
+
+def test_a_new_setpoint_ends_the_timeout(link):
+    feed(link, [0, 1])
+    link.answer(0, 1.0, now=0)
+    assert link.off_is_due(30 * MS)
+    link.off()
+    assert link.answer(1 * MS, 1.0, now=31 * MS).enable
+    assert not link.off_is_due(51 * MS)
+    assert link.off_is_due(52 * MS)
+    assert link.driving
+
+
+def test_without_any_setpoint_off_is_sent_but_no_timeout_is_counted(link):
+    assert not link.off_is_due(0)
+    assert link.off_is_due(21 * MS)
+    link.off()
+    assert link.timeouts == 0
+
+
+def test_a_refused_setpoint_does_not_feed_the_watch(link):
+    feed(link, [0])
+    link.answer(0, 1.0, now=0)
+    link.answer(0, math.nan, now=15 * MS)
+    assert link.off_is_due(21 * MS)
+
+
+def test_the_last_setpoint_is_given_again_only_for_the_sample_that_it_answered(link):
+    feed(link, [6, 7])
+    assert link.answer_again(7) is None
+    link.answer(7 * MS, 1.5, now=0)
+    assert link.answer_again(7) == Setpoint(1.5, 7, True)
+    assert link.answer_again(8) is None
+    link.off()
+    assert link.answer_again(7) is None
