@@ -1,0 +1,172 @@
+"""What the wheel runs over, as heights over time: random road, gap in the road, sinusoidal sweep.
+
+Times in, heights out, both in SI units; a positive height lifts the wheel. The height at one time does not
+depend on the other times of the array.
+"""
+
+from collections.abc import Iterator
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mount_models.quantity import Quantity, checked
+
+FloatArray = npt.NDArray[np.float64]
+_Speed = Annotated[float, Quantity('m/s', 'speed of the vehicle', 0.1, 100.0)]
+_RampIn = Annotated[float, Quantity('s', 'the height grows linearly from zero for so long', 0.0, 100.0)]
+
+ROAD_CLASSES = {'motorway': 2e-6, 'A': 16e-6, 'B': 64e-6, 'C': 256e-6, 'D': 1024e-6}
+"""Roughness G_d(n0) in m^3 by name: ISO 8608, geometric means of classes A to D; a good motorway (chosen)."""
+REFERENCE_FREQUENCY = 0.1
+"""n0 of ISO 8608 in cycles/m."""
+
+
+class RoadError(ValueError):
+    """A road cannot be built; the text says why and the remedy."""
+
+
+class RandomRoad(NamedTuple):
+    """Stationary random road with the density G_d(n) = G_d(n0) (n / n0)^-waviness of ISO 8608."""
+
+    roughness: Annotated[
+        float, Quantity('m^3', 'G_d(n0): displacement density at 0.1 cycles/m', 0.0, 0.1)
+    ] = ROAD_CLASSES['motorway']
+    waviness: Annotated[float, Quantity('1', 'fall of the density with frequency', 0.0, 4.0, 'ISO 8608')] = (
+        2.0
+    )
+    lowest_frequency: Annotated[
+        float, Quantity('cycles/m', 'longest wave; 0.33 Hz at 33 m/s', 1e-3, 10.0)
+    ] = 0.01
+    highest_frequency: Annotated[
+        float, Quantity('cycles/m', 'shortest wave; 99 Hz at 33 m/s', 1e-3, 10.0)
+    ] = 3.0
+    speed: _Speed = 33.0
+    ramp_in: _RampIn = 1.0
+    seed: Annotated[int, Quantity('1', 'another seed is another road of the same kind', 0, 2**31)] = 1
+
+
+class Gap(NamedTuple):
+    """One half sine down into the road: a gap as the wheel feels it, after the tyre has rounded it."""
+
+    depth: Annotated[float, Quantity('m', 'deepest point below the road', 0.0, 0.2)] = 0.020
+    position: Annotated[float, Quantity('m', 'distance at which the gap begins', 0.0, 1e6)] = 100.0
+    length: Annotated[float, Quantity('m', 'extent along the road', 0.05, 100.0)] = 1.0
+    speed: _Speed = 33.0
+
+
+class Sweep(NamedTuple):
+    """Sinusoidal test of Sec. 6: the frequency rises by 1 Hz each second at a constant velocity amplitude."""
+
+    velocity_amplitude: Annotated[float, Quantity('m/s', 'V0: largest vertical velocity', 0.0, 10.0)] = 0.12
+    first_frequency: Annotated[float, Quantity('Hz', 'frequency at time 0', 0.01, 1000.0, 'Sec. 6')] = 1.0
+    rate: Annotated[float, Quantity('Hz/s', 'rise of the frequency', 0.0, 1000.0, 'Sec. 6')] = 1.0
+    ramp_in: _RampIn = 1.0
+
+
+def named_road(name: str, speed: float = 33.0, seed: int = 1) -> RandomRoad:
+    """Return the road of a name in `ROAD_CLASSES`; raises `RoadError` for an unknown one."""
+    if name not in ROAD_CLASSES:
+        raise RoadError(f'no road class is called {name!r}; known are {", ".join(ROAD_CLASSES)}')
+    return checked(RandomRoad(roughness=ROAD_CLASSES[name], speed=speed, seed=seed))
+
+
+def random_road(times: npt.ArrayLike, road: RandomRoad) -> FloatArray:
+    """Return heights (n,) in m at `times` (n,) in s: a sum of waves with random phases.
+
+    Taken with its slope at points of a fixed grid along the road, 16 to the shortest wave, and joined by cubic
+    pieces, which leaves 1e-4 of that wave's amplitude. Raises `RoadError` or `ParameterError`.
+    """
+    road = checked(road)
+    seconds = _times(times)
+    frequencies, amplitudes, phases = _waves(road)
+    spacing = 1.0 / (_POINTS_PER_WAVE * road.highest_frequency)
+    places = road.speed * seconds / spacing
+    first = int(np.floor(places.min()))
+    height, slope = _waves_on_grid(
+        2.0 * np.pi * frequencies * spacing, amplitudes, phases, first, int(places.max()) + 2 - first
+    )
+    node = np.floor(places).astype(np.int64) - first
+    return _cubic(height, slope, node, places - first - node) * _ramp(seconds, road.ramp_in)
+
+
+def gap_in_road(times: npt.ArrayLike, gap: Gap) -> FloatArray:
+    """Return heights (n,) in m at `times` (n,) in s, negative in the gap, else 0. Raises `ParameterError`."""
+    gap = checked(gap)
+    along = (gap.speed * _times(times) - gap.position) / gap.length
+    return np.where((along > 0.0) & (along < 1.0), -gap.depth * np.sin(np.pi * along), 0.0)
+
+
+def sweep_road(times: npt.ArrayLike, sweep: Sweep) -> FloatArray:
+    """Return heights (n,) in m at `times` (n,) in s: -(V0 / 2 pi f) cos(phase). Raises `ParameterError`."""
+    sweep = checked(sweep)
+    seconds = _times(times)
+    frequency = sweep.first_frequency + sweep.rate * seconds
+    phase = 2.0 * np.pi * (sweep.first_frequency + 0.5 * sweep.rate * seconds) * seconds
+    height = -sweep.velocity_amplitude / (2.0 * np.pi * frequency) * np.cos(phase)
+    return np.asarray(height * _ramp(seconds, sweep.ramp_in), dtype=np.float64)
+
+
+_POINTS_PER_WAVE = 16
+_WIDEST_CELL = 0.004  # cycles/m, 0.13 Hz at 33 m/s: finer than the analyses that look at it
+_WIDEST_CELL_RATIO = 1.05
+_BLOCK = 256
+
+
+def _waves(road: RandomRoad) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return frequency (cycles/m), amplitude (m) and phase of the waves, one in each cell of the band."""
+    if not road.highest_frequency > road.lowest_frequency:
+        raise RoadError(
+            f'highest_frequency ({road.highest_frequency:g} cycles/m) must lie above lowest_frequency '
+            f'({road.lowest_frequency:g} cycles/m)'
+        )
+    edges = np.array(list(_cell_edges(road)))
+    random = np.random.default_rng(road.seed)
+    frequencies = edges[:-1] + np.diff(edges) * random.random(edges.size - 1)
+    middle = np.sqrt(edges[:-1] * edges[1:])
+    density = road.roughness * (middle / REFERENCE_FREQUENCY) ** -road.waviness
+    amplitudes = np.sqrt(2.0 * density * np.diff(edges))
+    return frequencies, amplitudes, random.uniform(0.0, 2.0 * np.pi, middle.size)
+
+
+def _cell_edges(road: RandomRoad) -> Iterator[float]:
+    edge = road.lowest_frequency
+    while edge < road.highest_frequency:
+        yield edge
+        edge = min(edge * _WIDEST_CELL_RATIO, edge + _WIDEST_CELL)
+    yield road.highest_frequency
+
+
+def _waves_on_grid(
+    turns: FloatArray, amplitudes: FloatArray, phases: FloatArray, first: int, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the sum and its slope per grid step from its point `first` on; `turns` in rad per step."""
+    starts = first + _BLOCK * np.arange(-(-count // _BLOCK))
+    at_start = amplitudes * np.exp(1j * (np.outer(starts, turns) + phases))
+    within = np.exp(1j * np.outer(turns, np.arange(_BLOCK)))
+    height = (at_start @ within).real.ravel()
+    slope = ((1j * turns * at_start) @ within).real.ravel()
+    return height, slope
+
+
+def _cubic(
+    height: FloatArray, slope: FloatArray, node: npt.NDArray[np.int64], part: FloatArray
+) -> FloatArray:
+    """Return the cubic Hermite curve at `part` (0 .. 1) of the way from each `node` to the next."""
+    rest = 1.0 - part
+    ends = rest**2 * (1.0 + 2.0 * part) * height[node] + part**2 * (1.0 + 2.0 * rest) * height[node + 1]
+    bend = part * rest * (rest * slope[node] - part * slope[node + 1])
+    return np.asarray(ends + bend, dtype=np.float64)
+
+
+def _ramp(seconds: FloatArray, ramp_in: float) -> FloatArray:
+    if ramp_in == 0.0:
+        return np.ones_like(seconds)
+    return np.clip(seconds / ramp_in, 0.0, 1.0)
+
+
+def _times(times: npt.ArrayLike) -> FloatArray:
+    seconds = np.asarray(times, float)
+    if seconds.ndim != 1 or seconds.size == 0 or not np.all(np.isfinite(seconds)) or seconds.min() < 0.0:
+        raise RoadError('times must be one row of finite seconds, none of them negative and at least one')
+    return seconds
