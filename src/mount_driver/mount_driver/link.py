@@ -68,7 +68,8 @@ class Link:
         self._stamps = [-1] * _REMEMBERED
         self._place = 0
         self._answered_stamp = -1
-        self._last_setpoint = Setpoint(0.0, 0, False)
+        # No sample of the first minute bears this number: 0 A sent before any answer answers nothing.
+        self._last_setpoint = Setpoint(0.0, _COUNTER_MASK, False)
         self._fed = -1  # time of the last setpoint
         self._off_sent = -1
 

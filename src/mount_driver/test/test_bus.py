@@ -1,15 +1,12 @@
 """Buses open, filter, hold a burst, and say what is wrong when they do not open."""
 
-import itertools
 import os
 import socket
 
 import can
 import pytest
 
-from mount_driver.bus import MULTICAST_GROUP, CanLinkError, _check_socketcan, open_bus
-
-_ports = itertools.count(20_000 + os.getpid() % 20_000)
+from mount_driver.bus import CanLinkError, _check_socketcan, open_bus
 
 
 def frame(number, data=b'\x01' * 24, **options):
@@ -17,9 +14,9 @@ def frame(number, data=b'\x01' * 24, **options):
 
 
 @pytest.fixture(params=['udp_multicast', 'virtual'])
-def pair(request):
-    port = next(_ports)
-    arguments = (request.param, MULTICAST_GROUP if request.param == 'udp_multicast' else f'test-{port}')
+def pair(request, multicast):
+    group, port = multicast
+    arguments = (request.param, group if request.param == 'udp_multicast' else f'test-{port}')
     with (
         open_bus(*arguments, port=port) as far,
         open_bus(*arguments, port=port, receive=(0x210, 0x212)) as near,
@@ -49,10 +46,10 @@ def test_own_frames_do_not_come_back(pair):
     assert near.recv(0.0) is None
 
 
-def test_a_burst_of_half_a_second_is_held():
-    port = next(_ports)
-    with open_bus('udp_multicast', MULTICAST_GROUP, port=port) as far:
-        near = open_bus('udp_multicast', MULTICAST_GROUP, port=port)
+def test_a_burst_of_half_a_second_is_held(multicast):
+    group, port = multicast
+    with open_bus('udp_multicast', group, port=port) as far:
+        near = open_bus('udp_multicast', group, port=port)
         for number in range(500):
             far.send(frame(number))
         received = [message.arbitration_id for message in iter(lambda: near.recv(0.0), None)]
@@ -60,32 +57,33 @@ def test_a_burst_of_half_a_second_is_held():
     assert received == list(range(500))
 
 
-def test_the_receive_buffer_is_wider_than_the_kernels_usual_one():
-    near = open_bus('udp_multicast', MULTICAST_GROUP, port=next(_ports))
+def test_the_receive_buffer_is_wider_than_the_kernels_usual_one(multicast):
+    group, port = multicast
+    near = open_bus('udp_multicast', group, port=port)
     with socket.socket(fileno=os.dup(near.fileno())) as sock, socket.socket(type=socket.SOCK_DGRAM) as usual:
         widened, before = (s.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) for s in (sock, usual))
     near.shutdown()
     assert widened > before
 
 
-def test_error_frames_pass_the_filter():
-    port = next(_ports)
+def test_error_frames_pass_the_filter(multicast):
+    group, port = multicast
     with (
-        open_bus('udp_multicast', MULTICAST_GROUP, port=port) as far,
-        open_bus('udp_multicast', MULTICAST_GROUP, port=port, receive=(0x210,)) as near,
+        open_bus('udp_multicast', group, port=port) as far,
+        open_bus('udp_multicast', group, port=port, receive=(0x210,)) as near,
     ):
         far.send(can.Message(arbitration_id=0x40, is_extended_id=False, is_error_frame=True, dlc=8))
         assert near.recv(10.0).is_error_frame
 
 
-def test_python_cans_own_multicast_interface_can_listen_in():
-    port = next(_ports)
-    options = {'channel': MULTICAST_GROUP, 'port': port, 'hop_limit': 0, 'fd': True}
+def test_python_cans_own_multicast_interface_can_listen_in(multicast):
+    group, port = multicast
+    options = {'channel': group, 'port': port, 'hop_limit': 0, 'fd': True}
     try:
         foreign = can.Bus(interface='udp_multicast', ignore_config=True, **options)
     except can.CanInitializationError:
         pytest.skip("python-can's own interface needs a network route for multicast, ours does not")
-    with foreign, open_bus('udp_multicast', MULTICAST_GROUP, port=port) as near:
+    with foreign, open_bus('udp_multicast', group, port=port) as near:
         near.send(frame(0x211))
         assert foreign.recv(10.0).arbitration_id == 0x211
         foreign.send(frame(0x210))
@@ -105,7 +103,7 @@ def test_python_cans_own_multicast_interface_can_listen_in():
 )
 def test_a_bus_that_does_not_open_says_what_was_tried_and_the_remedy(interface, channel, sentence):
     with pytest.raises(CanLinkError, match=sentence) as caught:
-        open_bus(interface, channel, port=next(_ports), bitrate=250_000, data_bitrate=1_000_000)
+        open_bus(interface, channel, bitrate=250_000, data_bitrate=1_000_000)
     assert f"CAN interface '{interface}', channel '{channel}'" in str(caught.value)
 
 

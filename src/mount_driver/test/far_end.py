@@ -1,0 +1,90 @@
+"""The electronics' end of the bus for tests: sends samples, reads setpoints."""
+
+import threading
+import time
+
+import can
+
+from mount_driver.bus import open_bus
+from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
+from mount_driver.e2e_receiver import AliveCounter
+
+LIMIT = 20.0  # s: what has not come by then does not come
+CODEC = MountCodec()
+
+
+def sample(index: int, **changes) -> Measurement:
+    """Return sample number `index`, taken at `index` ms."""
+    values = {'displacement': 1e-6 * index, 'coil_current': 0.5, 'current_rate': 250.0, 'flux_rate': 80.0}
+    return Measurement(index % 65536, index * 1000 % 2**32, **(values | changes))
+
+
+def wait_until(condition, what: str) -> None:
+    """Wait for a condition; fail with a sentence if it does not come true."""
+    limit = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < limit, f'{what}: not within {LIMIT} s'
+        time.sleep(0.002)
+
+
+class FarEnd:
+    """Sends measurements and collects setpoints."""
+
+    def __init__(self, interface: str, channel: str, port: int):
+        self.bus = open_bus(interface, channel, port=port, receive=(CODEC.setpoint.frame_id,))
+        self._alive = AliveCounter()
+        self._streaming = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def send(self, measurement: Measurement, damage: int = 0) -> None:
+        """Send a sample; `damage` is laid over its 13th byte."""
+        data = CODEC.encode_measurement(measurement, self._alive.next())
+        data[12] ^= damage
+        self.send_raw(CODEC.measurement.frame_id, data)
+
+    def send_status(self, status: Status) -> None:
+        """Send a status."""
+        self.send_raw(CODEC.status.frame_id, CODEC.encode_status(status, self._alive.next()))
+
+    def send_raw(self, number: int, data: bytes | bytearray, **options) -> None:
+        """Send any frame."""
+        options = {'is_fd': True} | options
+        self.bus.send(can.Message(arbitration_id=number, is_extended_id=False, data=data, **options))
+
+    def setpoint(self) -> Setpoint:
+        """Return the next setpoint that arrives."""
+        message = self.bus.recv(LIMIT)
+        assert message is not None, f'no setpoint frame within {LIMIT} s'
+        return CODEC.decode_setpoint(message.data)
+
+    def setpoint_where(self, condition) -> Setpoint:
+        """Return the next setpoint that fulfils a condition."""
+        limit = time.monotonic() + LIMIT
+        while time.monotonic() < limit:
+            setpoint = self.setpoint()
+            if condition(setpoint):
+                return setpoint
+        raise AssertionError(f'no such setpoint within {LIMIT} s')
+
+    def nothing_for(self, seconds: float) -> bool:
+        """Whether no setpoint arrives for so long."""
+        return self.bus.recv(seconds) is None
+
+    def stream(self, first: int = 0) -> None:
+        """Send samples at about 1 kHz in a thread until `close`."""
+
+        def send_all():
+            index, begin = first, time.monotonic()
+            while not self._streaming.wait(max(0.0, begin + (index - first) * 1e-3 - time.monotonic())):
+                self.send(sample(index))
+                index += 1
+
+        self._thread = threading.Thread(target=send_all, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the stream and the bus."""
+        self._streaming.set()
+        if self._thread is not None:
+            self._thread.join()
+        self.bus.shutdown()
