@@ -100,8 +100,8 @@ def calibrate(
     Raises `CalibrationError`, `ForceLawRefusedError`, `GapCurvesRefusedError` or `CrossingError`.
     """
     design = ClosingMechanics() if mechanics is None else mechanics
-    law_fit = _force_law(measurements, law_gaps)
     curves_fit = _gap_curves(measurements, rest_current, crossing_inductance)
+    law_fit = _force_law(measurements, law_gaps)
     return checked_specimen(
         Specimen(
             name=name,

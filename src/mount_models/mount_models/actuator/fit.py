@@ -1,5 +1,6 @@
 """Fit the force law (Eqs 3, 4) to measured forces, as the authors did for Table 1."""
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -8,8 +9,9 @@ import numpy.typing as npt
 from numpy.polynomial import Polynomial
 from scipy.optimize import least_squares
 
-from mount_models.actuator.law import TABLE_1, ForceLaw, checked_force
+from mount_models.actuator.law import TABLE_1, ForceLaw, checked_force, coefficients
 from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
+from mount_models.compiled import compiled
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -49,13 +51,28 @@ def fit_force_law(
     domain = ((centre - half) * 1e6, (centre + half) * 1e6)
     weight = 1.0 / (2.0 + 0.02 * np.abs(forces))
 
+    powers = _powers(gaps, orders, centre, half)
+    belongs_to = np.repeat(np.arange(5), orders)
+
     def misfit(unknowns: FloatArray) -> FloatArray:
         law = _law_from(unknowns, orders, domain, box)
         return np.asarray((checked_force(law, currents, gaps) - forces) * weight)
 
-    start = _start(orders, domain)
+    def slopes(unknowns: FloatArray) -> FloatArray:
+        law = _law_from(unknowns, orders, domain, box)
+        return np.asarray(
+            _coefficient_slopes(law, currents, gaps)[:, belongs_to] * powers * weight[:, np.newaxis]
+        )
+
     found = least_squares(
-        misfit, start, jac='3-point', x_scale='jac', ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=2000
+        misfit,
+        _start(orders, domain),
+        slopes,
+        x_scale='jac',
+        ftol=1e-15,
+        xtol=1e-15,
+        gtol=1e-15,
+        max_nfev=2000,
     )
     law = _law_from(found.x, orders, domain, box)
     check_force_law(law)
@@ -90,6 +107,30 @@ def _start(orders: tuple[int, ...], domain: tuple[float, float]) -> FloatArray:
         mapped = Polynomial(table).convert(domain=domain, window=(-1.0, 1.0), kind=Polynomial).coef
         parts.append(np.pad(mapped, (0, max(0, order - mapped.size)))[:order])
     return np.concatenate(parts)
+
+
+def _powers(gap: FloatArray, orders: tuple[int, ...], centre: float, half: float) -> FloatArray:
+    """Return the powers of the mapped gap that stand beside each unknown, shape (points, unknowns)."""
+    mapped = (gap - centre) / half
+    return np.concatenate([mapped[:, np.newaxis] ** np.arange(order) for order in orders], axis=1)
+
+
+@compiled
+def _coefficient_slopes(law, current, gap):
+    """Return the derivatives of Eq (3) with respect to a1 .. a5, shape (points, 5)."""
+    slopes = np.empty((gap.size, 5))
+    for k in range(gap.size):
+        i = current[k]
+        a1, a2, a3, a4, a5 = coefficients(law, gap[k])
+        line, parabola = a1 + a2 * i, a5 * i * i
+        knee, bend = math.atan(a3 * a4), math.atan(a3 * (i - a4))
+        knee_fall, bend_fall = 1.0 / (1.0 + (a3 * a4) ** 2), 1.0 / (1.0 + (a3 * (i - a4)) ** 2)
+        slopes[k, 0] = knee + bend
+        slopes[k, 1] = i * (knee + bend)
+        slopes[k, 2] = (line + parabola) * a4 * knee_fall + (line - parabola) * (i - a4) * bend_fall
+        slopes[k, 3] = ((line + parabola) * knee_fall - (line - parabola) * bend_fall) * a3
+        slopes[k, 4] = i * i * (knee - bend)
+    return slopes
 
 
 def _law_from(

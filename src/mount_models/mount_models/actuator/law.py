@@ -58,7 +58,7 @@ TABLE_1 = ForceLaw(
 """The authors' prototype as printed in Table 1; the guarded range lies well within the hard limits."""
 
 TABLE_1_HARD_LIMITS = (148e-6, 546e-6)
-"""Gaps (m) beyond which Table 1 no longer rises with current and falls with gap over 0 .. 3 A (derived)."""
+"""Gaps (m) beyond which Table 1 no longer rises with current and falls with gap, 1 mA .. 3 A (derived)."""
 
 
 @compiled
@@ -66,7 +66,7 @@ def force(law, current, gap):
     """Return the magnetic force (N) at `current` (A) and `gap` (m), Eq (3); NaN outside the guarded range."""
     if not (_gap_inside(law, gap) and _current_inside(law, current)):
         return math.nan
-    return _force_and_slope(_coefficients(law, gap), current)[0]
+    return _force_and_slope(coefficients(law, gap), current)[0]
 
 
 @compiled
@@ -79,7 +79,7 @@ def current_for_force(law, force, gap):
         return math.nan
     if force == 0.0:
         return 0.0
-    a = _coefficients(law, gap)
+    a = coefficients(law, gap)
     low, high = 0.0, law.current_high
     highest_force = _force_and_slope(a, high)[0]
     if not force <= highest_force * (1.0 + _ROUNDING):
@@ -98,6 +98,19 @@ def current_for_force(law, force, gap):
             return following
         current = following
     return current
+
+
+@compiled
+def coefficients(law, gap):
+    """Return a1 .. a5 at `gap` (m), Eq (4)."""
+    gap_um = gap * 1e6
+    return (
+        _polynomial(law.a1, gap_um),
+        _polynomial(law.a2, gap_um),
+        _polynomial(law.a3, gap_um),
+        _polynomial(law.a4, gap_um),
+        _polynomial(law.a5, gap_um),
+    )
 
 
 def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> npt.NDArray[np.float64]:
@@ -159,19 +172,6 @@ def _force_and_slope(a, current):
     force = line * (knee + bend) + parabola * (knee - bend)
     slope = a2 * (knee + bend) + 2.0 * a5 * current * (knee - bend) + (line - parabola) * bend_slope
     return force, slope
-
-
-@compiled
-def _coefficients(law, gap):
-    """Return a1 .. a5 at `gap` (m), Eq (4)."""
-    gap_um = gap * 1e6
-    return (
-        _polynomial(law.a1, gap_um),
-        _polynomial(law.a2, gap_um),
-        _polynomial(law.a3, gap_um),
-        _polynomial(law.a4, gap_um),
-        _polynomial(law.a5, gap_um),
-    )
 
 
 @compiled

@@ -83,8 +83,8 @@ def _local_crossing(
     different = np.unique(currents).size
     if different < _FEWEST_SAMPLES:
         raise CrossingError(
-            f'different currents within {half_width:.3f} A of the crossing at {centre:.3f} A ({different}) must '
-            f'be at least {_FEWEST_SAMPLES}; ramp the current more slowly'
+            f'different currents within {half_width:.3f} A of the crossing at {centre:.3f} A ({different}) '
+            f'must be at least {_FEWEST_SAMPLES}; ramp the current more slowly'
         )
     z = (currents - centre) / half_width
     powers = np.stack([np.ones_like(z), z, z * z], axis=1)
@@ -98,7 +98,7 @@ def _local_crossing(
         )
     place = np.array([1.0, at, at * at])
     spread = np.linalg.solve(powers.T @ (powers * weights[:, np.newaxis]), place)
-    std = noise * float(np.sqrt(place @ spread)) / abs(slope)
+    std = noise * math.sqrt(float(place @ spread)) / abs(float(slope))
     return Crossing(centre + at * half_width, std * half_width, float(slope / half_width), int(currents.size))
 
 

@@ -1,0 +1,238 @@
+"""The controller's estimates: contact gap, offset current and force table against the simulated truth."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_models.actuator.law import ForceOutsideLaw, GapOutsideLaw, OutsideLawError, force
+from mount_models.actuator.reluctance import ReluctanceActuator
+from mount_models.closing import ClosingMechanics, closed_state
+from mount_models.closing import contact_force as true_contact_force
+from mount_models.coil.crossing import find_crossing
+from mount_models.coil.gap import gap_from_crossing_current, rest_gap_from_inductance
+from mount_models.coil.ripple import RippleCoil, incremental_inductance
+from mount_models.force_table import (
+    ForceTableError,
+    checked_table,
+    checked_table_current,
+    contact_force,
+    current_force_table,
+    offset_current,
+    table_current,
+    table_normal_force,
+    zero_current_rest_gap,
+    zero_load_contact_gap,
+)
+from mount_models.specimen import default_specimen
+
+MAGNET, COIL, MOUNT = ReluctanceActuator(), RippleCoil(), ClosingMechanics()
+KNOWN = default_specimen()
+LAW, SPRING, PADS = KNOWN.force_law, KNOWN.spring_stiffness, KNOWN.pad_stiffness
+REST, CONTACT = 508e-6, 349e-6
+TABLE = current_force_table(LAW, SPRING, PADS, REST, CONTACT)
+
+
+@pytest.fixture(scope='module')
+def initialised():
+    """Return what an initialisation without noise finds: raw contact gap, corrected contact gap, rest gap."""
+    currents = np.linspace(0.0, 3.0, 1501)
+    gap, inductances = MOUNT.rest_gap, []
+    for current in currents:
+        gap, _ = closed_state(MOUNT, MAGNET, current, gap)
+        inductances.append(incremental_inductance(COIL, MAGNET, current, gap))
+    crossing = find_crossing(currents, inductances)
+    at_crossing = float(gap_from_crossing_current(KNOWN.gap_curves, crossing.current))
+    at_rest_current = float(rest_gap_from_inductance(KNOWN.gap_curves, np.interp(0.2, currents, inductances)))
+    rest = zero_current_rest_gap(LAW, SPRING, at_rest_current, KNOWN.rest_current)
+    contact = zero_load_contact_gap(LAW, SPRING, PADS, rest, at_crossing, crossing.current)
+    return at_crossing, contact, rest
+
+
+def true_normal_forces(currents):
+    return np.array([closed_state(MOUNT, MAGNET, current, MOUNT.contact_gap)[1] for current in currents])
+
+
+def test_an_initialisation_without_noise_finds_both_gaps_within_one_micrometre(initialised):
+    _, contact, rest = initialised
+    assert contact == pytest.approx(MOUNT.contact_gap, abs=1e-6)
+    assert rest == pytest.approx(MOUNT.rest_gap, abs=1e-6)
+
+
+def test_an_initialisation_without_noise_finds_the_contact_force_within_one_per_cent(initialised):
+    _, contact, rest = initialised
+    assert contact_force(SPRING, rest, contact) == pytest.approx(true_contact_force(MOUNT), rel=0.01)
+
+
+def test_the_gap_at_the_crossing_is_not_yet_the_contact_gap(initialised):
+    raw, _, _ = initialised
+    assert 1e6 * raw == pytest.approx(341.2, abs=0.2)
+
+
+def test_correcting_the_contact_gap_to_zero_load_avoids_most_of_the_force_error(initialised):
+    raw, contact, rest = initialised
+    currents = np.linspace(0.48, 1.15, 200)
+    truth = true_normal_forces(currents)
+
+    def error(gap):
+        table = current_force_table(LAW, SPRING, PADS, rest, gap)
+        estimate = np.interp(currents, table[0], table[1])
+        return math.sqrt(np.mean((estimate - truth) ** 2)) / truth.max()
+
+    assert error(contact) < 0.006
+    assert error(raw) > 0.02
+
+
+def test_the_table_meets_the_true_normal_force_within_one_per_cent_or_the_error_of_the_law(initialised):
+    _, contact, rest = initialised
+    currents = np.linspace(0.48, 3.0, 200)
+    truth = true_normal_forces(currents)
+    table = current_force_table(LAW, SPRING, PADS, rest, contact)
+    assert np.interp(currents, table[0], table[1]) == pytest.approx(truth, rel=0.01, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ('light_pressure', 'current'), [(1, 0.483), (2, 0.4935), (3, 0.504), (5, 0.523), (10, 0.570)]
+)
+def test_the_offset_current_is_the_published_one_within_the_error_of_the_law(light_pressure, current):
+    found = offset_current(LAW, SPRING, REST, CONTACT, light_pressure)
+    assert found == pytest.approx(current, abs=0.0015)
+    assert force(LAW, found, CONTACT) == pytest.approx(22.26 + light_pressure, abs=1e-6)
+
+
+def test_the_difference_of_the_papers_gaps_is_143_micrometres():
+    assert contact_force(1.0, 492e-6, 349e-6) == pytest.approx(143e-6)
+
+
+def test_the_table_starts_at_the_contact_current_and_ends_at_full_current():
+    assert TABLE[1, 0] == 0.0
+    assert TABLE[0, 0] == pytest.approx(offset_current(LAW, SPRING, REST, CONTACT, 0.0), abs=1e-9)
+    assert TABLE[0, 0] == pytest.approx(0.4725, abs=0.0015)
+    assert TABLE[0, -1] == 3.0
+    assert TABLE[1, -1] == pytest.approx(305, abs=3)
+
+
+def test_the_table_rises_strictly_in_steps_of_half_a_newton():
+    assert (np.diff(TABLE) > 0.0).all()
+    assert np.diff(TABLE[1])[:-1] == pytest.approx(0.5)
+    assert np.diff(TABLE[1])[-1] <= 0.51
+    assert current_force_table(LAW, SPRING, PADS, REST, CONTACT, step=2.0).shape[1] < TABLE.shape[1] / 3.9
+
+
+def test_each_entry_balances_magnet_spring_and_pads():
+    for current, normal_force in TABLE.T[::20]:
+        gap = CONTACT - normal_force / PADS
+        assert force(LAW, current, gap) == pytest.approx(normal_force + SPRING * (REST - gap), abs=1e-6)
+
+
+def test_the_last_entry_balances_too():
+    gap = CONTACT - TABLE[1, -1] / PADS
+    assert force(LAW, 3.0, gap) == pytest.approx(TABLE[1, -1] + SPRING * (REST - gap), abs=1e-6)
+
+
+@settings(deadline=None)
+@given(wanted=st.floats(0.0, 1.0))
+def test_current_and_force_lead_back_through_the_table(wanted):
+    normal_force = wanted * TABLE[1, -1]
+    current = table_current(TABLE[0], TABLE[1], normal_force)
+    assert table_normal_force(TABLE[0], TABLE[1], current) == pytest.approx(normal_force, abs=1e-9)
+    assert current == pytest.approx(np.interp(normal_force, TABLE[1], TABLE[0]), abs=1e-12)
+
+
+@settings(deadline=None)
+@given(normal_force=st.floats(0.5, 303.0))
+def test_between_entries_the_table_holds_the_law_within_half_a_per_cent(normal_force):
+    current = table_current(TABLE[0], TABLE[1], normal_force)
+    gap = CONTACT - normal_force / PADS
+    net = force(LAW, current, gap) - SPRING * (REST - gap)
+    assert net == pytest.approx(normal_force, rel=0.005)
+
+
+def test_below_the_contact_current_nothing_presses():
+    assert table_normal_force(TABLE[0], TABLE[1], 0.0) == 0.0
+    assert table_normal_force(TABLE[0], TABLE[1], TABLE[0, 0]) == 0.0
+    assert table_normal_force(TABLE[0], TABLE[1], TABLE[0, 0] + 1e-3) > 0.0
+
+
+@pytest.mark.parametrize('value', [-1e-6, 400.0, math.nan])
+def test_outside_the_table_the_answer_is_unknown(value):
+    assert math.isnan(table_current(TABLE[0], TABLE[1], value))
+    assert math.isnan(table_normal_force(TABLE[0], TABLE[1], value))
+    with pytest.raises(ForceTableError, match=r'must lie within 0\.00 \.\. 30.* N, which 3\.00 A reach'):
+        checked_table_current(TABLE, [10.0, value])
+
+
+def test_the_checked_inverse_takes_arrays():
+    assert checked_table_current(TABLE, [[0.0, 50.0]]).shape == (1, 2)
+    assert checked_table_current(TABLE, 100.0) == pytest.approx(
+        table_current(TABLE[0], TABLE[1], 100.0), abs=1e-12
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(contact=st.floats(300e-6, 440e-6), opening=st.floats(20e-6, 200e-6))
+def test_a_table_can_be_built_for_every_gap_of_new_and_worn_pads(contact, opening):
+    table = current_force_table(LAW, SPRING, PADS, contact + opening, contact)
+    assert (np.diff(table) > 0.0).all()
+    assert table[0, -1] == 3.0
+
+
+def test_a_contact_gap_beyond_the_law_is_refused():
+    with pytest.raises(GapOutsideLaw, match=r'air gap \(260\.0 um\)'):
+        current_force_table(LAW, SPRING, PADS, REST, 260e-6)
+
+
+def test_pads_compressed_beyond_the_law_are_refused():
+    with pytest.raises(GapOutsideLaw, match='air gap'):
+        current_force_table(LAW, SPRING, PADS, REST, 275e-6)
+
+
+def test_a_contact_gap_above_the_rest_gap_is_refused():
+    with pytest.raises(
+        ForceTableError, match=r'contact gap \(400\.0 um\) must lie below the rest gap \(390\.0 um\)'
+    ):
+        current_force_table(LAW, SPRING, PADS, 390e-6, 400e-6)
+    with pytest.raises(ForceTableError):
+        contact_force(SPRING, math.nan, 349e-6)
+
+
+def test_a_spring_that_the_current_cannot_overcome_is_refused():
+    with pytest.raises(ForceTableError, match=r'current_high \(0\.40 A\) must close the pads'):
+        current_force_table(LAW, SPRING, PADS, REST, CONTACT, current_high=0.4)
+    with pytest.raises(ForceOutsideLaw):
+        offset_current(LAW, 50.0 * SPRING, REST, CONTACT, 2.0)
+
+
+def test_a_current_beyond_the_law_is_refused():
+    with pytest.raises(OutsideLawError, match='coil current'):
+        current_force_table(LAW, SPRING, PADS, REST, CONTACT, current_high=3.5)
+
+
+@pytest.mark.parametrize('step', [0.0, -0.5, math.nan])
+def test_a_step_that_is_not_positive_is_refused(step):
+    with pytest.raises(ForceTableError, match='must be positive'):
+        current_force_table(LAW, SPRING, PADS, REST, CONTACT, step=step)
+
+
+def test_a_crossing_without_contact_is_refused():
+    with pytest.raises(ForceTableError, match='must not be negative'):
+        zero_load_contact_gap(LAW, SPRING, PADS, REST, 345e-6, 0.3)
+
+
+@pytest.mark.parametrize(
+    ('table', 'sentence'),
+    [
+        (np.ones((3, 4)), r'shape \(2, N >= 2\); instead received \(3, 4\)'),
+        (np.ones(4), 'shape'),
+        ([[0.5, 1.0, math.nan], [0.0, 1.0, 2.0]], 'finite'),
+        ([[0.5, 0.4], [0.0, 1.0]], 'current of the current-force table must rise strictly; entries 0 and 1'),
+        ([[0.5, 0.6, 0.7], [0.0, 1.0, 1.0]], 'normal force of the current-force table must rise strictly'),
+        ([[0.5, 0.6], [1.0, 2.0]], 'must start at 0 N'),
+        ([[-0.5, 0.6], [0.0, 2.0]], 'must start at 0 N'),
+    ],
+)
+def test_a_table_that_is_none_is_refused(table, sentence):
+    with pytest.raises(ForceTableError, match=sentence):
+        checked_table(table)

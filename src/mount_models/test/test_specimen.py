@@ -1,0 +1,194 @@
+"""The specimen file: nothing is lost, nothing is guessed, and no truth of the plant comes near it."""
+
+import ast
+import math
+from dataclasses import FrozenInstanceError, replace
+from pathlib import Path
+
+import pytest
+import yaml
+
+import mount_models
+from mount_models.specimen import (
+    DEFAULT_SPECIMEN,
+    SpecimenError,
+    checked_specimen,
+    default_specimen,
+    load_specimen,
+    save_specimen,
+    specimen_from_mapping,
+    specimen_to_mapping,
+)
+
+DEFAULT = default_specimen()
+
+
+def changed(path, value):
+    """Return the default specimen as a mapping, the entry at dotted `path` changed, or dropped for None."""
+    content = yaml.safe_load(DEFAULT_SPECIMEN.read_text())
+    *outer, last = path.split('.')
+    inside = content
+    for name in outer:
+        inside = inside[name]
+    if value is None:
+        del inside[last]
+    else:
+        inside[last] = value
+    return content
+
+
+def test_the_default_specimen_knows_its_actuator():
+    assert DEFAULT.name == 'default'
+    assert DEFAULT.rest_current == 0.2
+    assert DEFAULT.crossing_inductance == 20e-3
+    assert DEFAULT.current_limit == 3.0
+    assert DEFAULT.turns_area == pytest.approx(480 * 2.46e-4)
+    assert DEFAULT.spring_stiffness == 1.4e5
+    assert DEFAULT.pad_stiffness == 2e7
+
+
+def test_the_default_specimen_covers_the_gaps_of_new_and_worn_pads():
+    curves = DEFAULT.gap_curves
+    low = max(DEFAULT.force_law.gap_low, curves.inductance_of_gap.low, curves.crossing_current_of_gap.low)
+    high = min(DEFAULT.force_law.gap_high, curves.inductance_of_gap.high, curves.crossing_current_of_gap.high)
+    assert low <= 280e-6
+    assert high >= 540e-6
+
+
+def test_saving_and_loading_changes_nothing(tmp_path):
+    specimen = replace(DEFAULT, name='left', friction={'mu': 0.1 + 0.2}, provenance={'note': 'bench, May'})
+    save_specimen(specimen, tmp_path / 'left.yaml')
+    assert load_specimen(tmp_path / 'left.yaml') == specimen
+
+
+def test_a_specimen_and_its_mapping_lead_back_to_each_other():
+    assert specimen_from_mapping(specimen_to_mapping(DEFAULT)) == DEFAULT
+
+
+def test_a_specimen_cannot_be_changed_by_accident():
+    with pytest.raises(FrozenInstanceError):
+        DEFAULT.turns_area = 1.0
+
+
+@pytest.mark.parametrize(
+    ('path', 'value', 'sentence'),
+    [
+        ('pad_stiffness', None, 'pad_stiffness is missing'),
+        ('pad_stifness', 2e7, 'pad_stifness is unknown'),
+        ('force_law.a3', None, 'force_law must hold exactly .* a3 is missing'),
+        ('force_law.a6', [1.0], 'a6 is unknown'),
+        ('gap_curves.inductance_of_gap.scale', None, 'gap_curves.inductance_of_gap .* scale is missing'),
+        ('force_law', [1.0, 2.0], 'force_law must be a mapping'),
+        ('force_law.a1', 3.0, 'force_law.a1 must be a list of numbers; instead received 3.0'),
+        ('force_law.a1', [], 'force_law.a1 must be a list of numbers'),
+        (
+            'force_law.a1',
+            [1.0, 'x', 0.0, 0.0],
+            r"force_law.a1\[1\] must be a finite number; instead received 'x'",
+        ),
+        (
+            'turns_area',
+            '1e-1',
+            r"turns_area must be a finite number; instead .*'1e-1' \(YAML reads 1e-6 as a text",
+        ),
+        ('turns_area', True, 'turns_area must be a finite number; instead received True'),
+        ('turns_area', math.nan, 'turns_area must be a finite number; instead received nan'),
+        ('spring_stiffness', -1.0, r'spring_stiffness \(-1 N/m\) must lie within 1000 \.\. 1e\+07 N/m'),
+        ('rest_current', 2.0, r'rest_current \(2 A\) must lie within 0\.01 \.\. 1 A'),
+        (
+            'current_limit',
+            3.5,
+            r'current_limit \(3\.50 A\) must not exceed force_law\.current_high \(3\.00 A\)',
+        ),
+        ('force_law.gap_high', 1.0, r'force_law\.gap_high \(1 m\) must lie within'),
+        ('force_law.gap_high', 900e-6, 'the force must'),
+        ('gap_curves.gap_of_inductance.coefficients', [4e-4, 1e-4], 'must agree within'),
+        ('gap_curves.gap_of_inductance.coefficients', [4e-4, 0.0], 'must be monotone'),
+        ('name', 7, 'name must be a text'),
+        ('name', '', 'name must be a text'),
+        ('friction', [1.0], 'friction must be a mapping'),
+        ('friction', {'mu': 'high'}, 'friction.mu must be a finite number'),
+        ('provenance', 'bench', 'provenance must be a mapping'),
+    ],
+)
+def test_a_doubtful_file_is_refused_in_a_sentence(tmp_path, path, value, sentence):
+    file = tmp_path / 'doubtful.yaml'
+    file.write_text(yaml.safe_dump(changed(path, value)))
+    with pytest.raises(SpecimenError, match=sentence) as refusal:
+        load_specimen(file)
+    assert str(file) in str(refusal.value)
+
+
+def test_a_missing_file_is_refused():
+    with pytest.raises(SpecimenError, match='cannot be read'):
+        load_specimen('/nowhere/specimen.yaml')
+
+
+@pytest.mark.parametrize('text', ['a: [1, 2', '', '- 1\n- 2\n'])
+def test_a_file_that_is_no_specimen_is_refused(tmp_path, text):
+    (tmp_path / 'none.yaml').write_text(text)
+    with pytest.raises(SpecimenError, match=r'none\.yaml'):
+        load_specimen(tmp_path / 'none.yaml')
+
+
+def test_a_doubtful_specimen_is_not_saved(tmp_path):
+    with pytest.raises(SpecimenError, match='turns_area'):
+        save_specimen(replace(DEFAULT, turns_area=math.nan), tmp_path / 'bad.yaml')
+    assert not (tmp_path / 'bad.yaml').exists()
+
+
+def test_a_whole_number_is_taken_as_a_number():
+    assert specimen_from_mapping(changed('spring_stiffness', 140000)).spring_stiffness == 140000.0
+
+
+def test_friction_parameters_pass_through():
+    assert specimen_from_mapping(changed('friction', {'a': 1})).friction == {'a': 1.0}
+    assert checked_specimen(DEFAULT).friction == {}
+
+
+TRUTH = {
+    'mount_models.actuator.reluctance',
+    'mount_models.coil.ripple',
+    'mount_models.closing',
+    'mount_models.calibration',
+}
+
+
+def imported_by(module):
+    path = Path(mount_models.__file__).parent / Path(*module.split('.')[1:])
+    file = path.with_suffix('.py') if path.with_suffix('.py').exists() else path / '__init__.py'
+    names = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f'{node.module}.{alias.name}' for alias in node.names)}
+        elif isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+    package = Path(mount_models.__file__).parent
+    ours = {name for name in names if name.startswith('mount_models.')}
+    return {
+        name
+        for name in ours
+        if (package / Path(*name.split('.')[1:])).with_suffix('.py').exists()
+        or (package / Path(*name.split('.')[1:])).is_dir()
+    }
+
+
+def reached_from(module):
+    reached, waiting = set(), {module}
+    while waiting:
+        name = waiting.pop()
+        reached.add(name)
+        waiting |= imported_by(name) - reached
+    return reached
+
+
+@pytest.mark.parametrize(
+    'module',
+    ['specimen', 'force_table', 'actuator.law', 'actuator.fit', 'coil.gap', 'coil.gap_fit', 'coil.crossing'],
+)
+def test_what_the_controller_uses_never_reaches_the_simulated_truth(module):
+    assert not reached_from(f'mount_models.{module}') & TRUTH
+
+
+def test_the_search_for_imports_does_find_them():
+    assert reached_from('mount_models.calibration') >= TRUTH
