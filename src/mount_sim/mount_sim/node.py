@@ -48,7 +48,7 @@ class MountSim(SafeLifecycleNode):
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
         if self._truth.names != TRUTH.names:
             raise ValueError('sim/truth in the topic registry differs from what the plant gives')
-        self._acceleration = OneNumberLayout(_level_imu(), 'linear_acceleration.z')
+        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
         self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
         path = self.open_data_path()
         self._truth_publisher = path.publisher(topics.SIM_TRUTH)
@@ -115,7 +115,7 @@ class MountSim(SafeLifecycleNode):
         self._force_publisher.publish(self._force.pack(stamp, truth['mount_force']))
 
 
-def _level_imu() -> Imu:
+def level_imu() -> Imu:
     """Return the message of an accelerometer that knows neither orientation nor rotation."""
     message = Imu()
     message.header.frame_id = 'mount_chassis'

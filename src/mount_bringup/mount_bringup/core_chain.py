@@ -1,0 +1,94 @@
+"""Initialisation and control as one chain of function calls: a sample goes in, a setpoint comes out.
+
+The same cores as in the nodes, in the same order: the initialisation answers until its ramp is over, the
+controller from the next sample on.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mount_control.controller import Controller
+from mount_control.force_to_current import resample
+from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_control.sample_watch import Judgement, SampleWatch
+from mount_init.initialisation import OFF, Initialisation, InitialisationResult
+from mount_init.parameters import InitParameters
+from mount_models.damper import DamperCurve, damper_curve
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.quantity import with_flattened
+from mount_models.specimen import Specimen, default_specimen, load_specimen
+from mount_sim.electronics import Reading
+
+Parameters = Mapping[str, Mapping[str, Any]]
+"""{node: {parameter: value}}, as given to the nodes."""
+
+_DEFAULT_DAMPER = 'viscous_2000'
+
+
+def control_parameters(parameters: Parameters) -> ControlParameters:
+    """Return the controller's parameters of a run."""
+    return with_flattened(ControlParameters(), parameters.get('mount_control', {}))
+
+
+def chosen_damper(parameters: Parameters) -> DamperCurve:
+    """Return the damper characteristic of a run."""
+    return damper_curve(parameters.get('mount_control', {}).get('damper', _DEFAULT_DAMPER))
+
+
+def chosen_specimen(parameters: Parameters) -> Specimen:
+    """Return the specimen of a run."""
+    path = parameters.get('mount_init', {}).get('specimen', '')
+    return load_specimen(path) if path else default_specimen()
+
+
+class CoreChain:
+    """What mount_init and mount_control do with the samples of one run."""
+
+    def __init__(self, parameters: Parameters):
+        self._parameters = parameters
+        init_parameters = with_flattened(InitParameters(), parameters.get('mount_init', {}))
+        self._initialisation = Initialisation(chosen_specimen(parameters), init_parameters)
+        self._control = control_parameters(parameters)
+        self._watch = SampleWatch(
+            SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range
+        )
+        self.result: InitialisationResult | None = None
+        self.activation = 0
+        self.controller: Controller | None = None
+
+    @property
+    def controlling(self) -> bool:
+        """Whether the last sample was answered by the controller with a trace."""
+        return self.controller is not None
+
+    def answer(self, stamp: int, reading: Reading) -> float:
+        """Return the setpoint (A) for a sample of time `stamp` (ns) as it came over the bus."""
+        if self.controller is not None:
+            return self._control_step(self.controller, stamp, reading.displacement)
+        setpoint = self._initialisation.step(
+            stamp, reading.coil_current, reading.current_rate, reading.flux_rate
+        )
+        if self._initialisation.finished:
+            self.result = self._initialisation.result()
+            self.activation = stamp
+            self.controller = self._make_controller(self.result)
+        return setpoint
+
+    def _control_step(self, controller: Controller, stamp: int, displacement: float) -> float:
+        judgement, missing = self._watch.judge(stamp, displacement)
+        if judgement in (Judgement.INVALID, Judgement.IGNORE):
+            return OFF
+        if judgement is Judgement.RESTART:
+            controller.restart(displacement)
+        return controller.step(displacement, missing)
+
+    def _make_controller(self, result: InitialisationResult) -> Controller:
+        values = self._parameters.get('mount_control', {})
+        return Controller(
+            self._control,
+            chosen_damper(self._parameters),
+            with_flattened(FrictionCoefficients(), values, 'friction'),
+            with_flattened(FrictionContact(), values, 'contact'),
+            resample(result.table, result.offset_current, self._control.highest_current),
+        )

@@ -1,0 +1,102 @@
+"""Figures of a drive from its recording: gaps, switching, peaks, tracking, losses."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from mount_bags.audit import audit
+from mount_bags.reading import Recording
+from mount_control import band_pass
+from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_models.damper import DamperCurve, damper_force
+
+_SECOND = 1e9  # ns
+
+
+@dataclass(frozen=True)
+class Switching:
+    """When damping went on and off, s from the start of the excitation."""
+
+    on: tuple[float, ...]
+    off: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The signals of one drive on their common samples, time in s from the start of the excitation."""
+
+    time: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    current: NDArray[np.float64]
+    damping_active: NDArray[np.bool_]
+    true_time: NDArray[np.float64]
+    true_velocity: NDArray[np.float64]
+    friction_force: NDArray[np.float64]
+    excitation_start: int  # ns
+
+
+def load_drive(recording: Recording, excitation_start: float) -> Drive:
+    """Read the signals of a recorded drive; the excitation began `excitation_start` s after the first sample."""
+    displacement, trace, truth = (
+        recording['displacement'],
+        recording['control_trace'],
+        recording['sim/truth'],
+    )
+    zero = int(truth.stamps[0]) + round(excitation_start * _SECOND)
+    active = np.zeros(len(displacement.stamps), dtype=bool)
+    current = np.zeros(len(displacement.stamps))
+    places = np.searchsorted(displacement.stamps, trace.stamps)
+    active[places] = trace['damping_active'] > 0.5
+    current[places] = trace['current']
+    return Drive(
+        time=(displacement.stamps - zero) / _SECOND,
+        displacement=displacement['mount'],
+        current=current,
+        damping_active=active,
+        true_time=(truth.stamps - zero) / _SECOND,
+        true_velocity=truth['velocity'],
+        friction_force=truth['friction_force'],
+        excitation_start=zero,
+    )
+
+
+def switching(drive: Drive) -> Switching:
+    """Return the times at which damping was switched."""
+    change = np.diff(drive.damping_active.astype(int), prepend=0)
+    return Switching(tuple(drive.time[change > 0].tolist()), tuple(drive.time[change < 0].tolist()))
+
+
+def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCurve) -> float:
+    """Return the rms error of the friction force while damping is on, as a share of the peak wanted force.
+
+    Wanted is what the selected damper would do at the true velocity of the mount in the band at that very
+    moment, without any delay; so the error holds phase and delay as well as force. NaN if damping was
+    never on.
+    """
+    band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, SAMPLE_TIME)
+    velocity = signal.lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], drive.true_velocity)
+    wanted = np.array([damper_force(damper, value) for value in velocity])
+    places = np.clip(np.searchsorted(drive.true_time, drive.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1)
+    on = places[drive.damping_active]
+    if len(on) == 0:
+        return math.nan
+    error = drive.friction_force[on] - wanted[on]
+    return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(wanted[on])))
+
+
+def lost_samples(recording: Recording, samples_sent: int) -> int:
+    """Return how many samples are missing between the electronics and the recording, over all data topics.
+
+    `samples_sent` is the electronics' own count; topics that start later (setpoints) are counted by their
+    stamps.
+    """
+    topics = audit(recording)
+    lost = sum(topic.lost for topic in topics.values())
+    ends = sum(
+        samples_sent - len(recording[name].stamps) - topics[name].lost
+        for name in ('displacement', 'coil_ripple')
+    )
+    return lost + ends

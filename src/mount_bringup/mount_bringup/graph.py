@@ -1,0 +1,37 @@
+"""Which nodes make up the graph, and in which order they come to life."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class GraphNode:
+    """A lifecycle node: its name, which is also its package's, and the topics it cannot do without."""
+
+    name: str
+    package: str
+    needs: tuple[str, ...]
+
+
+RECORDER = GraphNode('mount_recorder', 'mount_bags', ())
+DRIVER = GraphNode('mount_driver', 'mount_driver', ('current_setpoint', 'displacement', 'coil_ripple'))
+SIM = GraphNode('mount_sim', 'mount_sim', ())
+INIT = GraphNode('mount_init', 'mount_init', ('coil_ripple', 'current_setpoint'))
+CONTROL = GraphNode(
+    'mount_control', 'mount_control', ('displacement', 'current_setpoint', 'air_gap', 'current_force_table')
+)
+
+SIMULATED: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
+"""Start order: who listens comes before who speaks, and the coil's table before who uses it."""
+
+VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
+"""The same in the car, where the electronics are real."""
+
+
+@dataclass(frozen=True)
+class GraphSettings:
+    """Where the graph lives and with which parameters: {node: {parameter: value}}."""
+
+    namespace: str = ''
+    domain: int = 0
+    parameters: Mapping[str, Mapping[str, object]] = field(default_factory=dict)

@@ -1,0 +1,92 @@
+"""The processes of the graph: started with their parameters, watched, ended in order."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import yaml
+
+from mount_bringup.graph import GraphNode, GraphSettings
+
+_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
+_INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that was asked to end is terminated
+_TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
+
+
+class NodeProcess:
+    """One node of the graph in a process of its own; its output goes to a log file."""
+
+    def __init__(self, node: GraphNode, settings: GraphSettings, folder: Path):
+        self.node = node
+        self.log_file = folder / f'{node.name}.log'
+        parameter_file = folder / f'{node.name}.yaml'
+        parameter_file.write_text(_parameter_text(settings.parameters.get(node.name, {})))
+        command = [sys.executable, '-c', f'from {node.package}.node import main; main()', '--ros-args']
+        command += ['--params-file', str(parameter_file)]
+        if settings.namespace:
+            command += ['-r', f'__ns:=/{settings.namespace.strip("/")}']
+        with self.log_file.open('wb') as log:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'},
+                start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
+                preexec_fn=_end_with_parent,
+            )
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while the process runs."""
+        return self._process.poll()
+
+    def last_words(self) -> str:
+        """Return the last error line of the log, or its last line."""
+        lines = [line for line in self.log_file.read_text(errors='replace').splitlines() if line.strip()]
+        errors = [line for line in lines if '[ERROR]' in line or '[FATAL]' in line or 'Error: ' in line]
+        return (errors or lines or ['(it said nothing)'])[-1]
+
+    def ask_to_end(self) -> None:
+        """Send SIGINT, to which a node answers by going to 0 A and ending with code 0."""
+        if self.exit_code is None:
+            self._process.send_signal(signal.SIGINT)
+
+    def wait(self) -> int:
+        """Return the exit code; a node that does not end is terminated, then killed."""
+        for limit, harder in ((_INTERRUPT_LIMIT, signal.SIGTERM), (_TERMINATE_LIMIT, signal.SIGKILL)):
+            try:
+                return self._process.wait(limit)
+            except subprocess.TimeoutExpired:
+                self._process.send_signal(harder)
+        return self._process.wait()
+
+
+def end_all(processes: list[NodeProcess]) -> list[str]:
+    """End the nodes one after the other, last started first; return a sentence per unclean end."""
+    complaints = []
+    for process in reversed(processes):
+        died_before = process.exit_code is not None
+        process.ask_to_end()
+        begin = time.monotonic()
+        code = process.wait()
+        if code != 0 and not died_before:
+            complaints.append(
+                f'{process.node.name} ended with code {code} after {time.monotonic() - begin:.1f} s: '
+                f'{process.last_words()}'
+            )
+    return complaints
+
+
+def _parameter_text(parameters: Mapping[str, object]) -> str:
+    return yaml.safe_dump({'/**': {'ros__parameters': dict(parameters)}}, sort_keys=True)
+
+
+def _end_with_parent() -> None:
+    # Without its supervisor a node must not go on driving the coil.
+    ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGINT)

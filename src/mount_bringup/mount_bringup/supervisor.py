@@ -1,0 +1,233 @@
+"""Starts the graph where there is no launch: processes up, transitions in order, all down again."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import rclpy
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import String
+
+from mount_bringup.graph import GraphNode, GraphSettings
+from mount_bringup.processes import NodeProcess, end_all
+from mount_ros.diagnostics import Level
+from mount_ros.qos import publisher_qos, recording_qos
+from mount_ros.topics import DIAGNOSTICS, SESSION
+
+_START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
+_MATCH_LIMIT = 20.0  # s, chosen
+_TRANSITION_LIMIT = 60.0  # s, chosen: activation of mount_init includes its current ramp
+
+
+class GraphError(RuntimeError):
+    """The graph could not be started or broke down; the text names the node and its reason."""
+
+
+class Interrupted(Exception):  # noqa: N818 - no error: the user wants to end
+    """The user asked to end."""
+
+
+class Supervisor:
+    """The graph as one thing: `start`, `wait_until`, and `stop`, which always leaves the coil at 0 A."""
+
+    def __init__(self, nodes: tuple[GraphNode, ...], settings: GraphSettings, folder: Path):
+        self._nodes = nodes
+        self._settings = settings
+        self._folder = folder
+        self._processes: list[NodeProcess] = []
+        self._interrupted = threading.Event()
+        self._verdicts: dict[str, dict[str, str]] = {}
+        self._context = Context()
+
+    def interrupt(self) -> None:
+        """Make every wait of the supervisor end with `Interrupted`; safe from a signal handler."""
+        self._interrupted.set()
+
+    def start(
+        self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
+    ) -> None:
+        """Bring all nodes to life; `session` makes the session text from all parameters of all nodes."""
+        rclpy.init(
+            context=self._context,
+            domain_id=self._settings.domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        namespace = self._settings.namespace
+        self._node = Node('engine_mount_supervisor', namespace=namespace, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._refuse_second_graph()
+        self._node.create_subscription(
+            DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, recording_qos(DIAGNOSTICS)
+        )
+        publisher = self._node.create_publisher(String, SESSION.name, publisher_qos(SESSION))
+        say('starting the nodes')
+        for node in self._nodes:
+            self._processes.append(NodeProcess(node, self._settings, self._folder))
+        for node in self._nodes:
+            self.transition(node, Transition.TRANSITION_CONFIGURE)
+        publisher.publish(String(data=session(self._all_parameters())))
+        self._wait_for_matches()
+        for node in self._nodes:
+            say(f'activating {node.name}')
+            self.transition(node, Transition.TRANSITION_ACTIVATE)
+
+    def figures(self, node: GraphNode) -> dict[str, str]:
+        """Return the last diagnostics of a node: its figures, `level` and `sentence`; empty if none came."""
+        return self._verdicts.get(node.name, {})
+
+    def wait_until(self, condition: Callable[[], bool], limit: float, what: str) -> None:
+        """Serve the graph until `condition`; raise `GraphError` if a node dies or `limit` s pass."""
+        begin = time.monotonic()
+        while not condition():
+            if self._interrupted.is_set():
+                raise Interrupted
+            self._check_processes()
+            if time.monotonic() - begin > limit:
+                raise GraphError(f'{what} did not happen within {limit:g} s; {self._complaints()}')
+            self._executor.spin_once(0.05)
+
+    def transition(self, node: GraphNode, transition: int) -> None:
+        """Take a node through a lifecycle transition, or raise `GraphError` with the node's own reason."""
+        client = self._node.create_client(ChangeState, f'{node.name}/change_state')
+        self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.name}')
+        request = ChangeState.Request(transition=Transition(id=transition))
+        answer = client.call_async(request)
+        label = {1: 'configure', 3: 'activate', 4: 'deactivate'}.get(transition, str(transition))
+        self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.name}')
+        self._node.destroy_client(client)
+        if not answer.result().success:
+            process = next(p for p in self._processes if p.node is node)
+            raise GraphError(f'{node.name} refused to {label}: {_plain(process.last_words())}')
+
+    def stop(self) -> list[str]:
+        """End all nodes in reverse order and the supervisor's own; return a sentence per unclean end."""
+        for node in reversed(self._nodes):
+            self._try_to_deactivate(node)
+        complaints = end_all(self._processes)
+        if self._context.ok():
+            self._executor.shutdown()
+            self._node.destroy_node()
+            rclpy.try_shutdown(context=self._context)
+        return complaints
+
+    def _try_to_deactivate(self, node: GraphNode) -> None:
+        # A node that cannot is ended by a signal, to which it answers in the same way.
+        if self.figures(node).get('state') != 'active':
+            return
+        client = self._node.create_client(ChangeState, f'{node.name}/change_state')
+        if client.service_is_ready():
+            request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+            self._executor.spin_until_future_complete(client.call_async(request), timeout_sec=2.0)
+        self._node.destroy_client(client)
+
+    def _refuse_second_graph(self) -> None:
+        mine = {node.name for node in self._nodes}
+        end = time.monotonic() + 0.5  # discovery of a running graph takes less with the shipped profile
+        while time.monotonic() < end:
+            self._executor.spin_once(0.05)
+            namespace = self._node.get_namespace()
+            for name, space in self._node.get_node_names_and_namespaces():
+                if name in mine and space == namespace:
+                    raise GraphError(
+                        f'{name} already runs in ROS domain {self._settings.domain}, namespace {space}: '
+                        'end that graph, or choose another domain or namespace'
+                    )
+
+    def _wait_for_matches(self) -> None:
+        def all_matched() -> bool:
+            return all(not self._unmatched(node) for node in self._nodes)
+
+        try:
+            self.wait_until(all_matched, _MATCH_LIMIT, 'connection of all topics')
+        except GraphError as error:
+            alone = '; '.join(
+                f'{node.name} waits for {", ".join(self._unmatched(node))}'
+                for node in self._nodes
+                if self._unmatched(node)
+            )
+            raise GraphError(f'{error}: {alone}') from None
+
+    def _unmatched(self, node: GraphNode) -> list[str]:
+        figures = self.figures(node)
+        if 'unmatched' not in figures:
+            return ['its first diagnostics']
+        names = {name.rsplit(self._prefix(), 1)[-1] for name in figures['unmatched'].split(', ') if name}
+        return sorted(names & self._needed(node))
+
+    def _needed(self, node: GraphNode) -> set[str]:
+        if node.name != 'mount_recorder':
+            return set(node.needs)
+        return {name for other in self._nodes for name in other.needs} | {SESSION.name}
+
+    def _prefix(self) -> str:
+        return self._node.get_namespace().rstrip('/') + '/'
+
+    def _all_parameters(self) -> dict[str, dict[str, object]]:
+        return {node.name: self._parameters_of(node) for node in self._nodes}
+
+    def _parameters_of(self, node: GraphNode) -> dict[str, object]:
+        names = self._call(ListParameters, f'{node.name}/list_parameters', ListParameters.Request())
+        request = GetParameters.Request(names=sorted(names.result.names))
+        values = self._call(GetParameters, f'{node.name}/get_parameters', request)
+        return {
+            name: parameter_value_to_python(value)
+            for name, value in zip(request.names, values.values, strict=True)
+        }
+
+    def _call(self, kind, service, request):
+        client = self._node.create_client(kind, service)
+        self.wait_until(client.service_is_ready, _START_LIMIT, f'service {service}')
+        answer = client.call_async(request)
+        self.wait_until(answer.done, _TRANSITION_LIMIT, f'answer of {service}')
+        self._node.destroy_client(client)
+        return answer.result()
+
+    def _check_processes(self) -> None:
+        for process in self._processes:
+            code = process.exit_code
+            if code is not None:
+                raise GraphError(
+                    f'{process.node.name} ended with code {code}: {_plain(process.last_words())} '
+                    f'(log: {process.log_file})'
+                )
+        for node in self._nodes:
+            figures = self.figures(node)
+            if figures.get('fatal') == 'True':
+                raise GraphError(f'{node.name}: {figures["sentence"]}')
+
+    def _complaints(self) -> str:
+        said = [
+            f'{name}: {figures["sentence"]}'
+            for name, figures in self._verdicts.items()
+            if int(figures['level']) >= Level.WARN
+        ]
+        return '; '.join(said) or 'no node complains'
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            name = status.name.rsplit('/', 1)[-1]
+            self._verdicts[name] = {
+                **{value.key: value.value for value in status.values},
+                'level': str(status.level[0]),
+                'sentence': status.message,
+            }
+
+
+def session_text(content: dict[str, object]) -> str:
+    """Return the session message of a run as YAML."""
+    return yaml.safe_dump(content, sort_keys=False)
+
+
+def _plain(log_line: str) -> str:
+    return log_line.split(']: ', 1)[-1]
