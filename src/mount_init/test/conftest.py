@@ -1,7 +1,11 @@
 """A simulated actuator with coil, springs and pads, behind the same samples and setpoints as the real one."""
 
+import fcntl
 import math
-from collections.abc import Callable
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -128,3 +132,23 @@ def run_ramp():
 @pytest.fixture(scope='session')
 def run_initialisation():
     return initialise
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """Return a domain id that no other test of this machine uses at the same time."""
+    folder = Path(tempfile.gettempdir()) / 'engine_mount_domains'
+    folder.mkdir(exist_ok=True)
+    for number in range(1, 102):
+        handle = os.open(folder / str(number), os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(handle)
+            continue
+        try:
+            yield number
+        finally:
+            os.close(handle)
+        return
+    pytest.fail('all 101 domains are in use')

@@ -1,0 +1,79 @@
+"""What `mount_init` says of its result on `/diagnostics`; a pure function of figures."""
+
+from typing import NamedTuple
+
+from mount_init.initialisation import InitialisationResult
+from mount_init.parameters import InitParameters
+from mount_models.specimen import Specimen
+from mount_ros.diagnostics import Level, Verdict
+
+_WEAR_RESERVE = 10e-6  # m, chosen: early enough to order pads
+_SKIPPED_SHARE = 0.02  # chosen
+_OF_LIMIT = 0.5  # chosen: a standard deviation this near to its limit is worth a look
+
+
+class InitFigures(NamedTuple):
+    """The latched result, the stamp (ns) of its last sample, and messages that could not be read."""
+
+    result: InitialisationResult
+    last_stamp: int
+    malformed: int
+    malformed_reason: str
+
+
+def verdict(figures: InitFigures, specimen: Specimen, parameters: InitParameters) -> Verdict:
+    """Return level, sentence and figures for an active node, which always has a result."""
+    result = figures.result
+    level, sentence = _judge(figures, specimen, parameters)
+    told = {
+        'rest_gap_um': f'{result.rest_gap * 1e6:.2f}',
+        'contact_gap_um': f'{result.contact_gap * 1e6:.2f}',
+        'rest_gap_std_um': f'{result.rest_gap_std * 1e6:.2f}',
+        'contact_gap_std_um': f'{result.contact_gap_std * 1e6:.2f}',
+        'contact_force_N': f'{result.contact_force:.2f}',
+        'offset_current_A': f'{result.offset_current:.4f}',
+        'highest_normal_force_N': f'{result.table[1, -1]:.1f}',
+        'wear_reserve_um': f'{wear_reserve(result, specimen) * 1e6:.1f}',
+        'samples_used': result.evidence.samples,
+        'samples_invalid': result.evidence.skipped,
+        'messages_malformed': figures.malformed,
+        'last_stamp': figures.last_stamp,
+    }
+    return Verdict(level, sentence, told)
+
+
+def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
+    """Return how much (m) the pads may wear before the pressed gap leaves the range of the force law."""
+    pressed_gap = result.contact_gap - result.table[1, -1] / specimen.pad_stiffness
+    return float(pressed_gap - specimen.force_law.gap_low)
+
+
+def _judge(figures: InitFigures, specimen: Specimen, parameters: InitParameters) -> tuple[Level, str]:
+    result = figures.result
+    reserve = wear_reserve(result, specimen)
+    if reserve < _WEAR_RESERVE:
+        return Level.WARN, (
+            f'pads are nearly worn: {reserve * 1e6:.1f} um until the gap leaves the calibrated range, less '
+            f'than {_WEAR_RESERVE * 1e6:.0f} um; replace the pads'
+        )
+    for name, std, largest in (
+        ('rest gap', result.rest_gap_std, parameters.largest_rest_gap_std),
+        ('contact gap', result.contact_gap_std, parameters.largest_contact_gap_std),
+    ):
+        if std > _OF_LIMIT * largest:
+            return Level.WARN, (
+                f'standard deviation of the {name} ({std * 1e6:.2f} um) is more than half of its limit '
+                f'{largest * 1e6:.2f} um; check the ripple sensors'
+            )
+    total = result.evidence.samples + result.evidence.skipped
+    if result.evidence.skipped > _SKIPPED_SHARE * total:
+        return Level.WARN, (
+            f'{result.evidence.skipped} of {total} ripple samples were invalid, more than '
+            f'{_SKIPPED_SHARE:.0%}; check the coil ripple measurement'
+        )
+    if figures.malformed:
+        return Level.WARN, f'{figures.malformed} messages could not be read; {figures.malformed_reason}'
+    return Level.OK, (
+        f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
+        f'offset current {result.offset_current:.3f} A'
+    )

@@ -1,0 +1,113 @@
+"""ROS 2 node of the initialisation: at each activation one current ramp, then gaps and table, latched."""
+
+import math
+
+from mount_init.diagnosis import InitFigures, verdict
+from mount_init.dialogue import CoilDialogue
+from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
+from mount_init.parameters import InitParameters
+from mount_models.specimen import default_specimen, load_specimen
+from mount_ros import topics
+from mount_ros.diagnostics import Verdict
+from mount_ros.force_table_message import to_message
+from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.parameters import declare, read
+from mount_ros.process import run_node
+from mount_ros.scalars import ScalarsError, ScalarsLayout
+
+
+class MountInit(SafeLifecycleNode):
+    """Measures the air gap while it is being activated; active means that a result is latched."""
+
+    def __init__(self, **arguments):
+        super().__init__('mount_init', **arguments)
+        declare(self, InitParameters())
+        self.declare_parameter('specimen', '')
+        self._dialogue: CoilDialogue | None = None
+        self._result: tuple[int, InitialisationResult] | None = None
+
+    def configure(self) -> None:
+        self._init_parameters = read(self, InitParameters())
+        path_of_specimen = str(self.get_parameter('specimen').value)
+        self._specimen = load_specimen(path_of_specimen) if path_of_specimen else default_specimen()
+        Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
+        load_compiled_laws(self._specimen)
+        self._malformed, self._malformed_reason = 0, ''
+        self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
+        self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
+        self._air_gap = ScalarsLayout(topics.AIR_GAP)
+        path = self.open_data_path()
+        self._setpoint_publisher = path.publisher(topics.CURRENT_SETPOINT)
+        self._air_gap_publisher = path.publisher(topics.AIR_GAP)
+        self._table_publisher = path.publisher(topics.CURRENT_FORCE_TABLE)
+        self._dialogue = CoilDialogue(self._publish_setpoint)
+        path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
+        path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
+        path.start()
+
+    def activate(self) -> None:
+        assert self._dialogue is not None
+        parameters = self._init_parameters
+        self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
+        ramp = Initialisation(self._specimen, parameters)
+        # in lock-step only silence can tell a stalled chain from a slow machine
+        total_timeout = math.inf if self.lockstep else parameters.total_timeout
+        self._dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending)
+        result = ramp.result()
+        assert ramp.last_stamp is not None
+        self._publish_result(ramp.last_stamp, result)
+        self._result = (ramp.last_stamp, result)
+
+    def deactivate(self) -> None:
+        self._result = None
+        if self._dialogue is not None:
+            self._dialogue.switch_off()
+
+    def cleanup(self) -> None:
+        self.deactivate()
+
+    def judge(self) -> Verdict:
+        assert self._result is not None
+        stamp, result = self._result
+        figures = InitFigures(result, stamp, self._malformed, self._malformed_reason)
+        return verdict(figures, self._specimen, self._init_parameters)
+
+    def _publish_setpoint(self, stamp: int, current: float) -> None:
+        self._setpoint_publisher.publish(self._setpoint.pack(stamp, (current,)))
+
+    def _publish_result(self, stamp: int, result: InitialisationResult) -> None:
+        numbers = [getattr(result, name) for name in self._air_gap.names]
+        table = to_message(stamp, result.table)
+        self._air_gap_publisher.publish(self._air_gap.pack(stamp, numbers))
+        self._table_publisher.publish(table)
+        self.get_logger().info(
+            f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
+            f'offset current {result.offset_current:.3f} A'
+        )
+
+    def _on_ripple(self, raw: bytes) -> None:
+        try:
+            stamp, (current, _), (current_rate, flux_rate) = self._ripple.unpack(raw)
+        except ScalarsError as error:
+            self._note_malformed(error)
+            return
+        if self._dialogue is not None:
+            self._dialogue.take_ripple(stamp, current, current_rate, flux_rate)
+
+    def _on_setpoint(self, raw: bytes) -> None:
+        try:
+            stamp, (current,), _ = self._setpoint.unpack(raw)
+        except ScalarsError as error:
+            self._note_malformed(error)
+            return
+        if self._dialogue is not None:
+            self._dialogue.take_setpoint(stamp, current)
+
+    def _note_malformed(self, error: ScalarsError) -> None:
+        self._malformed += 1
+        self._malformed_reason = str(error)
+
+
+def main() -> None:
+    """Run the node until the process is told to end."""
+    run_node(MountInit)

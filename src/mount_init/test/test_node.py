@@ -1,0 +1,349 @@
+"""The node between electronics that wait for each answer and a lifecycle service."""
+
+import threading
+import time
+
+import pytest
+import rclpy
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from mount_init.node import MountInit
+from mount_ros import topics
+from mount_ros.data_path import DataPath
+from mount_ros.environment import prepare_environment
+from mount_ros.force_table_message import from_bytes
+from mount_ros.scalars import ScalarsLayout
+
+LIMIT = 30.0  # s
+STEP = 1_000_000  # ns
+RAMP_LENGTH = 2750
+
+
+class Electronics:
+    """Simulated electronics in lock-step: each sample waits for the setpoint that answers it."""
+
+    def __init__(self, context, plant):
+        self.plant = plant
+        self.setpoints = []
+        self.results = []
+        self.tables = []
+        self.silent_after = None
+        self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
+        self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
+        self._air_gap = ScalarsLayout(topics.AIR_GAP)
+        self.node = Node('electronics', context=context)
+        self.path = DataPath(self.node, lockstep=True)
+        self._publisher = self.path.publisher(topics.COIL_RIPPLE)
+        self.foreign = self.path.publisher(topics.CURRENT_SETPOINT)
+        self.path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
+        self.path.subscribe(topics.AIR_GAP, lambda raw: self.results.append(self._air_gap.unpack(raw)))
+        self.path.subscribe(topics.CURRENT_FORCE_TABLE, lambda raw: self.tables.append(from_bytes(raw)))
+        self.path.start()
+
+    @property
+    def stamp(self):
+        """Stamp of the newest sample; it counts from 1."""
+        return (self.plant.number + 1) * STEP
+
+    def send_sample(self):
+        current, current_rate, flux_rate = self.plant.sample()
+        self._publisher.publish(
+            self._ripple.pack(self.stamp, (current, float('nan')), (current_rate, flux_rate))
+        )
+
+    def drive_as_another_node(self, current):
+        self.foreign.publish(self._setpoint.pack(self.stamp, (current,)))
+
+    def _on_setpoint(self, raw):
+        stamp, (current,), _ = self._setpoint.unpack(raw)
+        self.setpoints.append((stamp, current))
+        if stamp != self.stamp or (self.silent_after is not None and stamp >= self.silent_after * STEP):
+            return
+        self.plant.follow(current)
+        self.send_sample()
+
+    def close(self):
+        self.path.stop()
+        self.node.destroy_node()
+
+
+class Graph:
+    """The node under test, electronics, and a client of its lifecycle, in a domain of their own."""
+
+    def __init__(self, domain, plant, parameters):
+        prepare_environment()
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        self.init = MountInit(context=self.context, parameter_overrides=overrides)
+        self.electronics = Electronics(self.context, plant)
+        self._client_node = Node('client', context=self.context)
+        self._change = self._client_node.create_client(ChangeState, '/mount_init/change_state')
+        self._state = self._client_node.create_client(GetState, '/mount_init/get_state')
+        self._ending = threading.Event()
+        self._threads = [
+            threading.Thread(target=self._spin, args=(node,)) for node in (self.init, self._client_node)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def configure(self):
+        assert self.change(Transition.TRANSITION_CONFIGURE)
+        node = self.init.data_path.node
+        path = self.electronics.path.node
+        self.await_true(
+            lambda: (
+                node.count_publishers('coil_ripple') == 1
+                and path.count_subscribers('coil_ripple') == 1
+                and path.count_publishers('current_setpoint') == 2
+                and node.count_publishers('current_setpoint') == 2
+                and node.count_subscribers('current_setpoint') == 2
+                and self.electronics._publisher.get_subscription_count() == 1
+                and node.count_subscribers('air_gap') == 1
+            )
+        )
+
+    def change(self, transition):
+        """Ask the lifecycle service for a transition; return whether it succeeded."""
+        assert self._change.wait_for_service(LIMIT)
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return self._result(self._change.call_async(request)).success
+
+    def state(self):
+        return self._result(self._state.call_async(GetState.Request())).current_state.id
+
+    def await_true(self, condition):
+        deadline = time.monotonic() + LIMIT
+        while not condition():
+            assert time.monotonic() < deadline, 'the condition was not met in time'
+            self._ending.wait(0.005)
+
+    def refusal(self):
+        return self.init._refusal
+
+    def close(self):
+        self._ending.set()
+        for thread in self._threads:
+            thread.join()
+        self.init.close()
+        self.electronics.close()
+        self.init.destroy_node()
+        self._client_node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+    def _result(self, future):
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        assert done.wait(LIMIT), 'the lifecycle service did not answer'
+        return future.result()
+
+    def _spin(self, node):
+        executor = SingleThreadedExecutor(context=self.context)
+        executor.add_node(node)
+        while not self._ending.is_set():
+            executor.spin_once(0.05)
+        executor.remove_node(node)
+        executor.shutdown()
+
+
+@pytest.fixture
+def graph(domain, simulated_actuator):
+    """Return a function that builds the graph; by default in lock-step around a fault-free actuator."""
+    made = []
+    simulated_actuator().follow(0.0)  # compiled before the node waits for its samples
+
+    def make(plant=None, **parameters):
+        made.append(Graph(domain, plant or simulated_actuator(), {'lockstep': True, **parameters}))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+def test_activation_measures_in_lock_step_and_latches_gaps_and_table(
+    graph, simulated_actuator, specimen, run_initialisation
+):
+    g = graph()
+    g.configure()
+    g.electronics.send_sample()
+    assert g.change(Transition.TRANSITION_ACTIVATE)
+    g.await_true(lambda: g.electronics.tables and g.electronics.results)
+
+    stamps = [stamp // STEP for stamp, _ in g.electronics.setpoints]
+    assert stamps == list(range(1, RAMP_LENGTH + 1))
+    assert g.electronics.setpoints[-1][1] == 0.0
+
+    core = run_initialisation(simulated_actuator(), specimen)
+    stamp, numbers, _ = g.electronics.results[0]
+    assert stamp == RAMP_LENGTH * STEP
+    # the same samples as plain function calls: the same result to the bit
+    assert numbers == (
+        core.rest_gap,
+        core.contact_gap,
+        core.rest_gap_std,
+        core.contact_gap_std,
+        core.contact_force,
+        core.offset_current,
+    )
+    table = g.electronics.tables[0]
+    assert table.stamp == stamp
+    assert (table.current == core.table[0]).all()
+    assert (table.normal_force == core.table[1]).all()
+    verdict = g.init.judge()
+    assert verdict.sentence.startswith('rest gap 507.5 um, contact gap 349.0 um')
+    assert verdict.figures['last_stamp'] == stamp
+
+
+def test_after_the_ramp_the_node_leaves_the_coil_to_others(graph):
+    g = graph()
+    g.configure()
+    g.electronics.send_sample()
+    assert g.change(Transition.TRANSITION_ACTIVATE)
+    g.await_true(lambda: g.electronics.stamp == (RAMP_LENGTH + 1) * STEP)
+    for _ in range(20):
+        before = g.electronics.stamp
+        g.electronics.drive_as_another_node(0.5)
+        g.await_true(lambda before=before: g.electronics.stamp > before)
+    # mount_init is deactivated while another node drives: it must not interfere
+    assert g.change(Transition.TRANSITION_DEACTIVATE)
+    assert g.state() == State.PRIMARY_STATE_INACTIVE
+    assert [current for _, current in g.electronics.setpoints[RAMP_LENGTH:]] == [0.5] * 20
+
+
+def test_a_second_activation_measures_anew(graph, simulated_actuator):
+    g = graph()
+    g.configure()
+    g.electronics.send_sample()
+    assert g.change(Transition.TRANSITION_ACTIVATE)
+    g.await_true(lambda: len(g.electronics.tables) == 1)
+    assert g.change(Transition.TRANSITION_DEACTIVATE)
+    number = g.electronics.plant.number
+    worn = simulated_actuator(contact_gap=330e-6)
+    worn.number = number
+    g.electronics.plant = worn
+    assert g.change(Transition.TRANSITION_ACTIVATE)
+    g.await_true(lambda: len(g.electronics.results) == 2 and len(g.electronics.tables) == 2)
+    assert g.electronics.results[1][1][1] == pytest.approx(330e-6, abs=0.2e-6)
+    assert g.electronics.results[1][0] == 2 * RAMP_LENGTH * STEP
+    assert g.electronics.tables[1].stamp == 2 * RAMP_LENGTH * STEP
+    stamps = [stamp // STEP for stamp, _ in g.electronics.setpoints]
+    assert stamps == list(range(1, 2 * RAMP_LENGTH + 1))
+
+
+def test_without_samples_activation_is_refused(graph):
+    g = graph(silence_timeout=0.1)
+    g.configure()
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    assert g.state() == State.PRIMARY_STATE_INACTIVE
+    assert g.refusal() == (
+        'air gap not estimated: 0 of 2750 ripple samples, none in the last 0.1 s; is mount_driver active?'
+    )
+    assert g.electronics.setpoints == []
+
+
+def test_samples_that_stop_end_in_a_refusal_with_zero_current(graph):
+    g = graph(silence_timeout=0.1)
+    g.electronics.silent_after = 1000
+    g.configure()
+    g.electronics.send_sample()
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    g.await_true(lambda: len(g.electronics.setpoints) == 1001)
+    assert '1000 of 2750 ripple samples, none in the last 0.1 s' in g.refusal()
+    assert g.electronics.setpoints[-2][1] > 1.0
+    assert g.electronics.setpoints[-1] == (1000 * STEP, 0.0)
+    assert g.electronics.results == []
+    assert g.electronics.tables == []
+
+
+def test_a_refused_estimate_leaves_no_result_and_zero_current(graph, simulated_actuator):
+    g = graph(simulated_actuator(contact_gap=230e-6))
+    g.configure()
+    g.electronics.send_sample()
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    assert g.state() == State.PRIMARY_STATE_INACTIVE
+    assert 'contact gap not estimated' in g.refusal()
+    g.await_true(lambda: len(g.electronics.setpoints) == RAMP_LENGTH)
+    assert g.electronics.setpoints[-1][1] == 0.0
+    assert g.electronics.results == []
+
+
+def test_an_open_coil_is_refused_at_once_and_the_next_activation_may_succeed(graph, simulated_actuator):
+    g = graph(simulated_actuator(distort=lambda _, s: (0.0, s[1], s[2])))
+    g.configure()
+    g.electronics.send_sample()
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    assert 'must follow its setpoint' in g.refusal()
+    g.await_true(lambda: g.electronics.setpoints and g.electronics.setpoints[-1][1] == 0.0)
+    assert len(g.electronics.setpoints) < 100
+    mended = simulated_actuator()
+    mended.number = g.electronics.plant.number
+    g.electronics.plant = mended
+    assert g.change(Transition.TRANSITION_ACTIVATE)
+    assert g.refusal() == ''
+
+
+def test_while_another_node_drives_the_coil_activation_is_refused(graph):
+    g = graph()
+    g.configure()
+    g.electronics.send_sample()
+    stop = threading.Event()
+
+    def drive():
+        while not stop.wait(0.01):
+            g.electronics.drive_as_another_node(0.5)
+
+    other = threading.Thread(target=drive)
+    other.start()
+    try:
+        g.await_true(lambda: len(g.electronics.setpoints) > 5)
+        assert not g.change(Transition.TRANSITION_ACTIVATE)
+    finally:
+        stop.set()
+        other.join()
+    assert 'another node sent a current_setpoint' in g.refusal()
+    assert 'deactivate mount_control first' in g.refusal()
+    assert {current for _, current in g.electronics.setpoints} == {0.5}
+
+
+def test_the_end_of_the_process_ends_a_ramp_with_zero_current(graph):
+    g = graph()
+    g.electronics.silent_after = 1000
+    g.configure()
+    g.electronics.send_sample()
+    future = g._change.call_async(
+        ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
+    )
+    g.await_true(lambda: len(g.electronics.setpoints) == 1000)
+    g.init.ending.set()
+    assert not g._result(future).success
+    g.await_true(lambda: len(g.electronics.setpoints) == 1001)
+    assert g.electronics.setpoints[-1] == (1000 * STEP, 0.0)
+
+
+def test_a_specimen_that_cannot_be_read_is_refused_at_configure(graph):
+    g = graph(specimen='/nowhere/specimen.yaml')
+    assert not g.change(Transition.TRANSITION_CONFIGURE)
+    assert g.state() == State.PRIMARY_STATE_UNCONFIGURED
+    assert 'specimen file /nowhere/specimen.yaml cannot be read' in g.refusal()
+
+
+def test_parameters_that_contradict_each_other_are_refused_at_configure(graph):
+    g = graph(settle_duration=0.4)
+    assert not g.change(Transition.TRANSITION_CONFIGURE)
+    assert 'settle_duration (0.4 s) must lie below dwell_duration (0.3 s)' in g.refusal()
+
+
+def test_malformed_messages_are_counted_and_not_answered(graph):
+    g = graph()
+    g.configure()
+    g.electronics._publisher.publish(ScalarsLayout(topics.DISPLACEMENT).pack(1, (0.0,)))
+    g.electronics.send_sample()
+    assert g.change(Transition.TRANSITION_ACTIVATE)
+    verdict = g.init.judge()
+    assert verdict.figures['messages_malformed'] == 1
+    assert 'needed are' in verdict.sentence
