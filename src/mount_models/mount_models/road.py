@@ -74,8 +74,8 @@ def named_road(name: str, speed: float = 33.0, seed: int = 1) -> RandomRoad:
 def random_road(times: npt.ArrayLike, road: RandomRoad) -> FloatArray:
     """Return heights (n,) in m at `times` (n,) in s: a sum of waves with random phases.
 
-    Taken with its slope at points of a fixed grid along the road, 16 to the shortest wave, and joined by cubic
-    pieces, which leaves 1e-4 of that wave's amplitude. Raises `RoadError` or `ParameterError`.
+    Taken with its slope at points of a fixed grid along the road, 16 to the shortest wave, and joined by
+    cubic pieces, which leaves 1e-4 of that wave's amplitude. Raises `RoadError` or `ParameterError`.
     """
     road = checked(road)
     seconds = _times(times)

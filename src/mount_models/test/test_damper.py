@@ -23,7 +23,7 @@ from mount_models.quantity import ParameterError
     dead_zone=st.one_of(st.just(0.0), st.floats(1e-4, 0.02)),
     velocity=st.floats(-0.4, 0.4),
 )
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, derandomize=True, max_examples=150)
 def test_viscous_curve_equals_its_law_at_and_between_the_nodes(damping_coefficient, dead_zone, velocity):
     curve = viscous(damping_coefficient, dead_zone, force_limit=10000.0)
     law = damping_coefficient * max(abs(velocity) - dead_zone, 0.0) * np.sign(velocity)
