@@ -1,0 +1,210 @@
+"""All messages of one topic as columns of numbers."""
+
+import functools
+import math
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_bags.layout import Layout, LayoutError, installed_class, layout_of
+from mount_ros.topics import JOINT_STATE, TOPICS, Scalar, Topic
+
+Column = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+_SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
+_STEP = re.compile(r'([^.\[\]]+)|\[(\d+)\]')
+
+
+class SeriesError(ValueError):
+    """What was asked of a topic is not in its messages; the text says what is."""
+
+
+class Payloads:
+    """Serialised messages: one block of rows where all have the same length, else one by one."""
+
+    def __init__(self, pieces: Sequence[NDArray[np.uint8] | list[bytes]]):
+        """Take them in pieces, each an array (messages x bytes) or a list."""
+        widths = {piece.shape[1] if isinstance(piece, np.ndarray) else -1 for piece in pieces}
+        self.rows: NDArray[np.uint8] | None = None
+        self._parts: list[bytes] = []
+        if len(widths) == 1 and -1 not in widths:
+            self.rows = np.concatenate([np.asarray(piece) for piece in pieces])
+        else:
+            self._parts = [bytes(message) for piece in pieces for message in piece]
+
+    def __len__(self) -> int:
+        return len(self._parts) if self.rows is None else len(self.rows)
+
+    def __getitem__(self, index: int) -> bytes:
+        return self._parts[index] if self.rows is None else self.rows[index].tobytes()
+
+
+class Series:
+    """The messages of one topic in the order in which they were recorded.
+
+    `receive_times` and `publish_times` are those of the recording, `stamps` those of the samples (from
+    the messages' headers); all in ns. `series[name]` is a column: of a `JointState` the position of
+    that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
+    """
+
+    def __init__(
+        self, topic: str, type_name: str, payloads: Payloads, receive_times: Times, publish_times: Times
+    ):
+        self.topic = topic
+        self.type = type_name
+        self.receive_times = receive_times
+        self.publish_times = publish_times
+        self.payloads = payloads
+        self.registered: Topic | None = registered_topic(topic)
+
+    def __len__(self) -> int:
+        return len(self.payloads)
+
+    @functools.cached_property
+    def stamps(self) -> Times:
+        """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
+        layout, rows = self._layout, self.payloads.rows
+        if layout is None or rows is None:
+            return np.array([self._stamp(message) for message in self._decoded], np.int64)
+        if _SECONDS not in layout.numbers:
+            raise self._without_stamp()
+        seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
+        return seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows)
+
+    @functools.cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the columns."""
+        if not len(self):
+            return self.registered.names if self.registered else ()
+        layout = self._layout
+        if self.type != JOINT_STATE:
+            if layout is None:
+                raise SeriesError(f'{self.topic}: messages of different shape have no columns; use message()')
+            return tuple(path for path, numbers in layout.numbers.items() if numbers.count == 1)
+        if layout is not None:
+            return tuple(text for path, text in layout.strings.items() if path.startswith('name['))
+        return tuple(dict.fromkeys(name for message in self._decoded for name in message.name))
+
+    def __getitem__(self, name: str) -> Column:
+        """Return the column `name` in the unit `unit(name)`; raises `SeriesError` with the known names."""
+        if self.type == JOINT_STATE:
+            return self._joint_column(name, 'position')
+        return self._path_column(name)
+
+    def derivative(self, name: str) -> Column:
+        """Return the time derivative that the messages carry for `name` (velocity of a `JointState`)."""
+        if self.type != JOINT_STATE:
+            raise SeriesError(f'{self.topic}: only JointState carries derivatives, this is {self.type}')
+        return self._joint_column(name, 'velocity')
+
+    def unit(self, name: str) -> str:
+        """Return the unit of `series[name]`, empty where the registry does not know it."""
+        return next((scalar.unit for scalar in self._scalars() if scalar.name == name), '')
+
+    def derivative_unit(self, name: str) -> str:
+        """Return the unit of `series.derivative(name)`, empty where the registry does not know it."""
+        return next((scalar.derivative_unit for scalar in self._scalars() if scalar.name == name), '')
+
+    def message(self, index: int) -> Any:
+        """Return message `index`, deserialised; raises `SeriesError`."""
+        return self._deserialised(index)
+
+    def messages(self) -> Iterator[Any]:
+        """Yield all messages, deserialised."""
+        return (self._deserialised(index) for index in range(len(self)))
+
+    def _stamp(self, message: Any) -> int:
+        if not hasattr(message, 'header'):
+            raise self._without_stamp()
+        return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+
+    def _without_stamp(self) -> SeriesError:
+        return SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
+
+    def _scalars(self) -> tuple[Scalar, ...]:
+        return self.registered.scalars if self.registered else ()
+
+    @functools.cached_property
+    def _layout(self) -> Layout | None:
+        """The common layout of all messages, None where they differ or cannot be read in place."""
+        rows = self.payloads.rows
+        if rows is None or not len(rows):
+            return None
+        try:
+            layout = layout_of(rows[0].tobytes(), self.type)
+        except LayoutError:
+            return None
+        except ValueError as error:
+            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
+        return layout if layout.fits(rows) else None
+
+    def _joint_column(self, name: str, part: str) -> Column:
+        if name not in self.names:
+            raise SeriesError(
+                f'{self.topic} has no {name!r}; it has {", ".join(self.names) or "no messages"}'
+            )
+        layout, rows = self._layout, self.payloads.rows
+        if not len(self):
+            return np.empty(0)
+        if layout is None or rows is None:
+            return np.array([_joint_number(message, name, part) for message in self._decoded])
+        numbers = layout.numbers[part]
+        if numbers.count != len(self.names):
+            return np.full(len(self), math.nan)
+        return numbers.column(rows, self.names.index(name))
+
+    def _path_column(self, path: str) -> Column:
+        layout, rows = self._layout, self.payloads.rows
+        owner, place = _split_place(path)
+        if layout is not None and rows is not None:
+            numbers = layout.numbers.get(path) or layout.numbers.get(owner)
+            if numbers is not None and place < numbers.count:
+                return numbers.column(rows, place).astype(np.float64)
+            raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
+        try:
+            return np.array([float(_at(message, path)) for message in self._decoded])
+        except (AttributeError, IndexError, TypeError, ValueError):
+            raise SeriesError(f'{self.topic}: not every message has a number {path!r}') from None
+
+    @functools.cached_property
+    def _decoded(self) -> list[Any]:
+        return list(self.messages())
+
+    def _deserialised(self, index: int) -> Any:
+        # Only needed where messages differ in shape: the fast way does without the middleware.
+        from rclpy.serialization import deserialize_message
+
+        try:
+            return deserialize_message(self.payloads[index], installed_class(self.type))
+        except ValueError as error:
+            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
+        except Exception as error:  # the binding raises a type of its own that it does not export
+            raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
+
+
+def registered_topic(name: str) -> Topic | None:
+    """Return the registered topic behind a full name with any namespace, None if there is none."""
+    fitting = [topic for topic in TOPICS if f'/{name}'.endswith('/' + topic.name.lstrip('/'))]
+    return max(fitting, key=lambda topic: len(topic.name), default=None)
+
+
+def _joint_number(message: Any, name: str, part: str) -> float:
+    numbers = getattr(message, part)
+    if name not in message.name or len(numbers) != len(message.name):
+        return math.nan
+    return numbers[message.name.index(name)]
+
+
+def _split_place(path: str) -> tuple[str, int]:
+    match = re.fullmatch(r'(.*)\[(\d+)\]', path)
+    return (match[1], int(match[2])) if match else (path, 0)
+
+
+def _at(message: Any, path: str) -> Any:
+    for name, place in _STEP.findall(path):
+        message = getattr(message, name) if name else message[int(place)]
+    return message

@@ -1,0 +1,78 @@
+"""What the audit says of recordings with known losses."""
+
+import json
+
+import numpy as np
+import pytest
+from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
+from rich.console import Console
+
+import mount_bags
+from mount_bags.audit import as_json, as_table, audit, setpoint_coverage
+from mount_bags.writer import BagWriter
+from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
+
+
+def test_sound_recording_has_nothing_to_tell(drive):
+    audits = audit(mount_bags.open(drive))
+    assert all(entry.sound for entry in audits.values())
+    displacement = audits['/displacement']
+    assert (displacement.expected, displacement.present, displacement.lost) == (500, 500, 0)
+    assert displacement.longest_gap_s == pytest.approx(1e-3)
+    assert displacement.unanswered == 0
+
+
+def test_lost_samples_are_counted_with_the_longest_gap(tmp_path):
+    entry = audit(mount_bags.open(write_drive(tmp_path / 'bag', 100, skipped=range(40, 47))))['/displacement']
+    assert (entry.expected, entry.present, entry.lost, entry.duplicated) == (100, 93, 7, 0)
+    assert entry.longest_gap_s == pytest.approx(8e-3)
+    assert not entry.sound
+
+
+def test_displacement_without_its_setpoint_is_counted(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    for topic in RECORDED:
+        writer.add_topic(f'/{topic.name}', topic.type)
+    for index in range(100):
+        writer.write('/displacement', sample(DISPLACEMENT, index), START + index)
+        if 20 <= index < 80 and index not in (30, 31):
+            writer.write('/current_setpoint', sample(CURRENT_SETPOINT, index), START + index)
+    writer.close()
+    assert audit(mount_bags.open(tmp_path / 'bag'))['/displacement'].unanswered == 2
+
+
+def test_setpoints_are_only_asked_for_while_control_was_active():
+    samples = START + np.arange(3000) * PERIOD
+    setpoints = np.concatenate([samples[100:200], samples[2000:2500]])
+    coverage = setpoint_coverage(samples, setpoints)
+    assert (coverage.asked, coverage.unanswered, coverage.spans) == (600, 0, 2)
+    assert setpoint_coverage(samples, np.empty(0, np.int64)).asked == 0
+
+
+def test_topics_without_a_rate_have_no_expectation(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/session', 'std_msgs/msg/String')
+    writer.add_topic('/displacement', DISPLACEMENT.type)
+    writer.write('/session', b'\x00\x01\x00\x00\x01\x00\x00\x00\x00', START)
+    writer.close()
+    audits = audit(mount_bags.open(tmp_path / 'bag'))
+    assert audits['/session'].expected is None
+    assert audits['/session'].present == 1
+    assert audits['/displacement'].remark == 'no message'
+
+
+def test_json_holds_the_figures_and_no_nan(tmp_path):
+    figures = as_json(audit(mount_bags.open(write_drive(tmp_path / 'bag', 1))))
+    text = json.dumps(figures, allow_nan=False)
+    entry = json.loads(text)['/displacement']
+    assert entry['longest_gap_s'] is None
+    assert {'expected', 'present', 'lost', 'duplicated', 'longest_gap_s'} <= entry.keys()
+    assert (entry['expected'], entry['present'], entry['lost'], entry['duplicated']) == (1, 1, 0, 0)
+
+
+def test_table_names_every_topic_and_its_losses(tmp_path):
+    console = Console(width=160, record=True, file=open('/dev/null', 'w'))  # noqa: SIM115
+    console.print(as_table(audit(mount_bags.open(write_drive(tmp_path / 'bag', 100, skipped=range(40, 47))))))
+    text = console.export_text()
+    assert '/coil_ripple' in text
+    assert '8.0 ms' in text
