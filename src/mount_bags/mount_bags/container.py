@@ -1,8 +1,8 @@
 """Writes the MCAP container: chunks with CRC and message indexes, and a summary at the end.
 
 The records around the messages are those of the `mcap` package. The messages themselves and their
-indexes are packed here, because one object per message is what limits `mcap.writer.Writer` to a few
-ten thousand messages per second. A chunk and its indexes reach the file in one write, so every state
+indexes are packed here: `mcap.writer.Writer` makes an object of each, which limits it to a quarter of the
+messages per second (measured). A chunk and its indexes reach the file in one write, so every state
 of the file ends with a whole record.
 """
 
