@@ -7,6 +7,7 @@ controller from the next sample on.
 from collections.abc import Mapping
 from typing import Any
 
+from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
 from mount_control.parameters import SAMPLE_TIME, ControlParameters
@@ -23,8 +24,6 @@ from mount_sim.electronics import Reading
 Parameters = Mapping[str, Mapping[str, Any]]
 """{node: {parameter: value}}, as given to the nodes."""
 
-_DEFAULT_DAMPER = 'viscous_2000'
-
 
 def control_parameters(parameters: Parameters) -> ControlParameters:
     """Return the controller's parameters of a run."""
@@ -33,7 +32,7 @@ def control_parameters(parameters: Parameters) -> ControlParameters:
 
 def chosen_damper(parameters: Parameters) -> DamperCurve:
     """Return the damper characteristic of a run."""
-    return damper_curve(parameters.get('mount_control', {}).get('damper', _DEFAULT_DAMPER))
+    return damper_curve(parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER))
 
 
 def chosen_specimen(parameters: Parameters) -> Specimen:
@@ -50,9 +49,7 @@ class CoreChain:
         init_parameters = with_flattened(InitParameters(), parameters.get('mount_init', {}))
         self._initialisation = Initialisation(chosen_specimen(parameters), init_parameters)
         self._control = control_parameters(parameters)
-        self._watch = SampleWatch(
-            SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range
-        )
+        self._watch = SampleWatch(SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range)
         self.result: InitialisationResult | None = None
         self.activation = 0
         self.controller: Controller | None = None
@@ -90,5 +87,5 @@ class CoreChain:
             chosen_damper(self._parameters),
             with_flattened(FrictionCoefficients(), values, 'friction'),
             with_flattened(FrictionContact(), values, 'contact'),
-            resample(result.table, result.offset_current, self._control.highest_current),
+            resample(*result.table, result.offset_current, self._control.highest_current),
         )

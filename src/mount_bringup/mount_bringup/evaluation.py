@@ -11,7 +11,7 @@ from mount_bags.audit import audit
 from mount_bags.reading import Recording
 from mount_control import band_pass
 from mount_control.parameters import SAMPLE_TIME, ControlParameters
-from mount_models.damper import DamperCurve, damper_force
+from mount_models.damper import DamperCurve
 
 _SECOND = 1e9  # ns
 
@@ -39,7 +39,7 @@ class Drive:
 
 
 def load_drive(recording: Recording, excitation_start: float) -> Drive:
-    """Read the signals of a recorded drive; the excitation began `excitation_start` s after the first sample."""
+    """Read the signals of a drive whose excitation began `excitation_start` s after its first sample."""
     displacement, trace, truth = (
         recording['displacement'],
         recording['control_trace'],
@@ -78,7 +78,7 @@ def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCu
     """
     band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, SAMPLE_TIME)
     velocity = signal.lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], drive.true_velocity)
-    wanted = np.array([damper_force(damper, value) for value in velocity])
+    wanted = damper.force(velocity)
     places = np.clip(np.searchsorted(drive.true_time, drive.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1)
     on = places[drive.damping_active]
     if len(on) == 0:
@@ -90,13 +90,13 @@ def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCu
 def lost_samples(recording: Recording, samples_sent: int) -> int:
     """Return how many samples are missing between the electronics and the recording, over all data topics.
 
-    `samples_sent` is the electronics' own count; topics that start later (setpoints) are counted by their
-    stamps.
+    Gaps are seen in the stamps; what is missing at the ends of the measurements is seen against
+    `samples_sent`, the electronics' own count.
     """
     topics = audit(recording)
-    lost = sum(topic.lost for topic in topics.values())
+    gaps = sum(topic.lost or 0 for topic in topics.values())
     ends = sum(
-        samples_sent - len(recording[name].stamps) - topics[name].lost
-        for name in ('displacement', 'coil_ripple')
+        samples_sent - (topics[recording.resolve(name)].expected or 0)
+        for name in ('displacement', 'coil_ripple', 'sim/truth')
     )
-    return lost + ends
+    return gaps + ends

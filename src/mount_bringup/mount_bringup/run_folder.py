@@ -50,5 +50,7 @@ def make_run_folder(wanted: Path | None, scenario: str) -> RunFolder:
     try:
         folder.logs.mkdir(parents=True)
     except OSError as error:
-        raise RunFolderError(f'{wanted} cannot be created: {error.strerror}; choose another with --out') from None
+        raise RunFolderError(
+            f'{wanted} cannot be created: {error.strerror}; choose another with --out'
+        ) from None
     return folder

@@ -132,6 +132,17 @@ class Controller:
         return traces
 
 
+def load_compiled_law(
+    parameters: ControlParameters,
+    damper: DamperCurve,
+    friction: FrictionCoefficients,
+    contact: FrictionContact,
+) -> None:
+    """Run the compiled law once, so that the first sample need not wait for the compiler."""
+    table = force_to_current.resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
+    Controller(parameters, damper, friction, contact, table).step(0.0)
+
+
 @compiled
 def start(law, state, displacement):
     """Set a cleared state to a mount at rest at `displacement` (m); arguments as for `step`."""

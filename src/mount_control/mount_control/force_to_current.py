@@ -29,12 +29,16 @@ class CurrentTable(NamedTuple):
     limits: CurrentLimits
 
 
-def resample(table: NDArray[np.float64], offset_current: float, highest_current: float) -> CurrentTable:
-    """Return a table of shape (2, N), rows current (A) and normal force (N), both rising, on an even grid.
+def resample(
+    current: NDArray[np.float64],
+    normal_force: NDArray[np.float64],
+    offset_current: float,
+    highest_current: float,
+) -> CurrentTable:
+    """Return the table of `current` (A) over `normal_force` (N), both (n,) and rising, on an even grid of forces.
 
     Raises `ForceTableError` where it does not start at the first touch or the offset current lies outside.
     """
-    current, normal_force = table
     if not 0.0 <= normal_force[0] <= _FIRST_TOUCH:
         raise ForceTableError(
             f'current_force_table starts at {normal_force[0]:.2f} N (limit {_FIRST_TOUCH:g} N), '

@@ -4,9 +4,9 @@ import threading
 import time
 
 from mount_control.activation import MeasurementStream, check_belongs
-from mount_control.controller import TRACE, Controller
+from mount_control.controller import TRACE, Controller, load_compiled_law
 from mount_control.diagnosis import ControlFigures, verdict
-from mount_control.force_to_current import resample
+from mount_control.force_to_current import ForceTableError, resample
 from mount_control.parameters import SAMPLE_TIME, ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_models.damper import damper_curve
@@ -14,7 +14,7 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_ros import topics
 from mount_ros.diagnostics import Verdict
-from mount_ros.force_table_message import ForceTableMessageError, ReceivedForceTable, from_bytes
+from mount_ros.force_table_message import ForceTable, ForceTableMessageError, from_bytes
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.parameters import declare, read
 from mount_ros.process import run_node
@@ -22,6 +22,7 @@ from mount_ros.scalars import ScalarsLayout
 from mount_ros.timing import LatencyHistogram
 
 _OFF = 0.0  # A
+_TABLE_PATIENCE = 1.0  # s, chosen: latched messages may still be under way when control is activated
 
 
 class MountControl(SafeLifecycleNode):
@@ -34,7 +35,7 @@ class MountControl(SafeLifecycleNode):
         declare(self, FrictionContact(), 'contact')
         self.declare_parameter('damper', 'viscous_2000')
         self._controller: Controller | None = None
-        self._table: ReceivedForceTable | None = None
+        self._table: ForceTable | None = None
         self._air_gap: tuple[int, tuple[float, ...]] | None = None
         self._stream = MeasurementStream()
         self._last_message: bytes | None = None
@@ -42,7 +43,7 @@ class MountControl(SafeLifecycleNode):
         self._answering = threading.Lock()
 
     def configure(self) -> None:
-        self._parameters = checked_parameters(read(self, ControlParameters()))
+        self._settings = checked_parameters(read(self, ControlParameters()))
         self._friction = read(self, FrictionCoefficients(), 'friction')
         self._contact = read(self, FrictionContact(), 'contact')
         self._damper = damper_curve(self.get_parameter('damper').value)
@@ -52,6 +53,7 @@ class MountControl(SafeLifecycleNode):
         self._gap_layout = ScalarsLayout(topics.AIR_GAP)
         if self._trace.names != TRACE.names:
             raise ValueError('control_trace in the topic registry differs from what the controller traces')
+        load_compiled_law(self._settings, self._damper, self._friction, self._contact)
         path = self.open_data_path()
         self._setpoint_publisher = path.publisher(topics.CURRENT_SETPOINT)
         self._trace_publisher = path.publisher(topics.CONTROL_TRACE)
@@ -61,19 +63,12 @@ class MountControl(SafeLifecycleNode):
         path.start()
 
     def activate(self) -> None:
-        table_stamp = self._table.activation if self._table else None
-        gap_stamp, gap = self._air_gap or (None, ())
-        check_belongs(table_stamp, gap_stamp, self._stream)
-        assert self._table is not None
-        assert gap_stamp is not None
-        offset_current = gap[self._gap_layout.names.index('offset_current')]
-        table = resample(self._table.table, offset_current, self._parameters.highest_current)
-        controller = Controller(self._parameters, self._damper, self._friction, self._contact, table)
-        controller.step(0.0)  # loads the compiled law before the first sample needs it
+        table, gap_stamp, offset_current = self._wait_for_table()
+        currents = resample(table.current, table.normal_force, offset_current, self._settings.highest_current)
+        controller = Controller(self._settings, self._damper, self._friction, self._contact, currents)
         self._watch = SampleWatch(
-            SAMPLE_TIME, self._parameters.longest_bridge, self._parameters.displacement_range
+            SAMPLE_TIME, self._settings.longest_bridge, self._settings.displacement_range
         )
-        self._watch.last_stamp = None
         self._latency = LatencyHistogram()
         self._activation = gap_stamp
         self._table_refusal = ''
@@ -98,7 +93,7 @@ class MountControl(SafeLifecycleNode):
             ControlFigures(
                 counts=self._watch.counts,
                 silence=0.0 if self.lockstep else time.monotonic() - self._heard,
-                longest_silence=self._parameters.longest_bridge,
+                longest_silence=self._settings.longest_bridge,
                 table_refusal=self._table_refusal,
                 damping_active=bool(trace is not None and trace['damping_active']),
                 current=float(trace['current']) if trace is not None else _OFF,
@@ -107,6 +102,22 @@ class MountControl(SafeLifecycleNode):
                 last_stamp=self._stream.last,
             )
         )
+
+    def _wait_for_table(self) -> tuple[ForceTable, int, float]:
+        """Return table, stamp and offset current (A) of this activation; they may still be under way."""
+        limit = time.monotonic() + _TABLE_PATIENCE
+        while True:
+            table, air_gap = self._table, self._air_gap
+            try:
+                check_belongs(table.stamp if table else None, air_gap[0] if air_gap else None, self._stream)
+            except ForceTableError:
+                if time.monotonic() > limit or self.ending.wait(0.01):
+                    raise
+                continue
+            assert table is not None
+            assert air_gap is not None
+            offset_current = air_gap[1][self._gap_layout.names.index('offset_current')]
+            return table, air_gap[0], offset_current
 
     def _on_displacement(self, raw: bytes) -> None:
         begin = time.monotonic()
@@ -169,7 +180,3 @@ class MountControl(SafeLifecycleNode):
 def main() -> None:
     """Run the node as a process."""
     run_node(MountControl)
-
-
-if __name__ == '__main__':
-    main()

@@ -42,9 +42,9 @@ class MountSim(SafeLifecycleNode):
         self._can_end: CanEnd | None = None
 
     def configure(self) -> None:
-        self._parameters = read(self, SimParameters())
-        self._excitation = build_excitation(self._parameters)
-        self._fault = Fault(self._parameters.fault)
+        self._settings = read(self, SimParameters())
+        self._excitation = build_excitation(self._settings)
+        self._fault = Fault(self._settings.fault)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
         if self._truth.names != TRUTH.names:
             raise ValueError('sim/truth in the topic registry differs from what the plant gives')
@@ -67,7 +67,7 @@ class MountSim(SafeLifecycleNode):
             self._prepare_mount()
         self._can_end = CanEnd(bus)
         self._loop = ElectronicsLoop(
-            self._mount, self._can_end, self._parameters.electronics, self._fault, self._publish
+            self._mount, self._can_end, self._settings.electronics, self._fault, self._publish
         )
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
@@ -88,8 +88,8 @@ class MountSim(SafeLifecycleNode):
         return verdict(self._loop.figures, self._mount.run, lockstep=self.lockstep)
 
     def _prepare_mount(self) -> None:
-        self._mount = SimulatedMount(self._parameters.plant, self._excitation, self._parameters.seed)
-        rehearsal = SimulatedMount(self._parameters.plant, self._excitation, self._parameters.seed)
+        self._mount = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
+        rehearsal = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
         rehearsal.measure()  # loads the compiled plant before time begins to run
         rehearsal.advance(0.0)
 
@@ -127,7 +127,3 @@ def level_imu() -> Imu:
 def main() -> None:
     """Run the node as a process."""
     run_node(MountSim)
-
-
-if __name__ == '__main__':
-    main()

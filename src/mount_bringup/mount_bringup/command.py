@@ -1,0 +1,154 @@
+"""The `engine-mount` command."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+from rich.console import Console
+
+from mount_ros.environment import prepare_environment
+
+app = typer.Typer(
+    name='engine-mount',
+    help='Semi-active engine mount with dry friction: drive, record, look at what happened.',
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode='markdown',
+)
+
+_INTERRUPTED = 130  # as a shell reports SIGINT
+
+
+@app.callback()
+def _top() -> None:
+    """Keep sub-commands even while there is only one."""
+
+
+@app.command(
+    epilog="""Examples:
+
+`engine-mount drive` - a gap in the motorway, in real time
+
+`engine-mount drive --scenario bench --lockstep --duration 10` - 8 Hz, 1 mm, as fast as it goes
+
+`engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
+
+`engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.damper=viscous_3000`
+"""
+)
+def drive(
+    scenario: Annotated[str, typer.Option(help='motorway, bench or recorded')] = 'motorway',
+    file: Annotated[
+        Path | None, typer.Option(help='recorded: CSV, NPY, folder of NPY pairs, or MCAP')
+    ] = None,
+    column: Annotated[
+        str, typer.Option(help='recorded: column (CSV), signal.number (NPY) or field of the message (MCAP)')
+    ] = '',
+    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV)')] = '',
+    topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
+    scale: Annotated[
+        float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
+    ] = None,
+    lockstep: Annotated[
+        bool, typer.Option('--lockstep', help='the electronics wait for each answer: deterministic, faster')
+    ] = False,
+    core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
+    duration: Annotated[
+        float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help='seed of noise and road')] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option('--set', metavar='NODE.NAME=VALUE', help='any parameter of any node; may be repeated'),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help='folder of the run; default: bags/<time>_<scenario>')
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='write the printed figures to this file')
+    ] = None,
+    on_full: Annotated[
+        str, typer.Option(help='full disk: stop the run, or continue without recording')
+    ] = 'stop',
+    domain: Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')] = None,
+    namespace: Annotated[str, typer.Option(help='namespace of this mount, such as mount_right')] = '',
+) -> None:
+    """Drive the simulated car through the whole graph, record it and print what happened."""
+    from mount_bringup import drive as driving
+    from mount_bringup.domain import chosen_domain
+    from mount_bringup.run_folder import make_run_folder
+    from mount_bringup.settings import checked_settings
+    from mount_bringup.summary import write_json
+
+    if lockstep and core:
+        raise typer.BadParameter('choose --lockstep or --core, not both')
+    parameters = _parameters(settings or [])
+    given = {
+        'scenario': scenario,
+        'seed': seed,
+        'timeline.duration': duration,
+        'recorded.file': str(file.absolute()) if file else None,
+        'recorded.column': column or None,
+        'recorded.time_column': time_column or None,
+        'recorded.topic': topic or None,
+        'recorded.scale': scale,
+    }
+    sim = parameters.setdefault('mount_sim', {})
+    sim.update({name: value for name, value in given.items() if value is not None})
+    parameters = checked_settings(parameters)
+    mode = 'core' if core else 'lock-step' if lockstep else 'real time'
+    chosen = chosen_domain(domain)
+    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, on_full)
+    console = Console()
+    folder = make_run_folder(out, scenario)
+    outcome = driving.drive(order, folder, console)
+    if json_file is not None:
+        write_json(outcome.figures, json_file)
+    console.print(f'figure     {folder.figure}\nrecording  {folder.recording}', highlight=False)
+    for complaint in outcome.complaints:
+        console.print(f'[yellow]note[/yellow] {complaint}')
+    if outcome.complaints:
+        raise typer.Exit(1)
+
+
+@app.command()
+def prepare() -> None:
+    """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""
+    from mount_bringup.core_run import run_core
+
+    console = Console()
+    with console.status('compiling the laws for this machine (once, about half a minute)'):
+        for scenario in ('bench', 'motorway'):
+            sim = {'scenario': scenario, 'timeline.duration': 0.5, 'motorway.gap_time': 0.1}
+            run_core({'mount_sim': sim}, lambda *_: None)
+
+
+def _parameters(settings: list[str]) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of the `--set` options."""
+    parameters: dict[str, dict[str, Any]] = {}
+    for setting in settings:
+        name, equals, text = setting.partition('=')
+        node, dot, parameter = name.partition('.')
+        if not (equals and dot and parameter):
+            raise typer.BadParameter(
+                f'--set {setting}: write NODE.NAME=VALUE, as in mount_control.quality=0.7'
+            )
+        parameters.setdefault(node, {})[parameter] = yaml.safe_load(text)
+    return parameters
+
+
+def main() -> None:
+    """Run the command; every refusal is one sentence and a non-zero exit code."""
+    prepare_environment()
+    from mount_bringup.supervisor import GraphError, Interrupted
+
+    try:
+        app()
+    except (KeyboardInterrupt, Interrupted):
+        Console(stderr=True).print('interrupted; the coil is at 0 A')
+        sys.exit(_INTERRUPTED)
+    except (ValueError, GraphError, OSError) as error:
+        Console(stderr=True).print(f'[red]engine-mount:[/red] {error}', soft_wrap=True, highlight=False)
+        sys.exit(1)

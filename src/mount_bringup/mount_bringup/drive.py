@@ -1,0 +1,227 @@
+"""One simulated drive from the first node to the last figure."""
+
+import platform
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from importlib import metadata
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from mount_bags.reading import Recording, open_recording
+from mount_bags.writer import BagWriter
+from mount_bringup.core_chain import Parameters, control_parameters
+from mount_bringup.core_run import run_core
+from mount_bringup.domain import domain_lock
+from mount_bringup.evaluation import load_drive
+from mount_bringup.figure import draw_drive
+from mount_bringup.graph import SIM, SIMULATED, GraphSettings
+from mount_bringup.run_folder import RunFolder
+from mount_bringup.summary import print_summary, summarise, write_json
+from mount_bringup.supervisor import Supervisor, session_text
+from mount_models.quantity import with_flattened
+from mount_ros.topics import SESSION, TOPICS, Topic
+from mount_sim.diagnosis import FINISHED
+from mount_sim.parameters import SimParameters
+from mount_sim.scenario import build_excitation
+
+_FIRST_PORT = 43113  # UDP port of domain 0; each domain has its own CAN bus
+_SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
+
+
+@dataclass(frozen=True)
+class DriveOrder:
+    """What the user wants."""
+
+    scenario: str
+    mode: str  # 'real time', 'lock-step' or 'core'
+    parameters: dict[str, dict[str, Any]]
+    domain: int = 0
+    namespace: str = ''
+    on_full: str = 'stop'
+
+
+@dataclass
+class DriveOutcome:
+    """What came of it: the figures, and a sentence for each thing that was not as it should be."""
+
+    figures: dict[str, Any]
+    complaints: list[str] = field(default_factory=list)
+
+
+def drive(order: DriveOrder, folder: RunFolder, console: Console) -> DriveOutcome:
+    """Drive, record, evaluate; raises `Interrupted`, `GraphError` or a `ValueError` with the reason."""
+    build_excitation(_sim_parameters(order))  # bad input is refused before any process is started
+    complaints: list[str] = []
+    if order.mode == 'core':
+        run = _drive_in_core(order, folder, console)
+    else:
+        run = _drive_graph(order, folder, console, complaints)
+    recording = open_recording(folder.recording)
+    complaints += recording.warnings
+    return DriveOutcome(_evaluate(order, folder, recording, run, console), complaints)
+
+
+def _evaluate(
+    order: DriveOrder, folder: RunFolder, recording: Recording, run: dict[str, Any], console: Console
+) -> dict[str, Any]:
+    drive_data = load_drive(recording, run['excitation_start'])
+    figures = summarise(recording, drive_data, order.parameters, run)
+    control = control_parameters(order.parameters)
+    title = f'{order.scenario}, {order.mode}: mount displacement and actuator current'
+    draw_drive(drive_data, control.switch_on_level, control.switch_off_level, title, folder.figure)
+    write_json(figures, folder.summary)
+    print_summary(figures, console)
+    return figures
+
+
+def _drive_graph(
+    order: DriveOrder, folder: RunFolder, console: Console, complaints: list[str]
+) -> dict[str, Any]:
+    settings = GraphSettings(order.namespace, order.domain, _node_parameters(order, folder))
+    supervisor = Supervisor(SIMULATED, settings, folder.logs)
+    with domain_lock(order.domain, order.namespace), _interrupting(supervisor):
+        try:
+            with console.status('starting') as status:
+                supervisor.start(lambda all_parameters: _session(order, all_parameters), status.update)
+            _watch_drive(order, supervisor, console)
+            figures = supervisor.figures(SIM)
+        finally:
+            complaints += supervisor.stop()
+    return {
+        'scenario': order.scenario,
+        'mode': order.mode,
+        'samples': int(figures['samples']),
+        'excitation_start': float(figures['excitation_start_s']),
+        'real_time_factor': float(figures['real_time_factor']),
+        'latency_median_s': float(figures['latency_median_s']),
+        'latency_p99_s': float(figures['latency_p99_s']),
+    }
+
+
+def _watch_drive(order: DriveOrder, supervisor: Supervisor, console: Console) -> None:
+    total = float(supervisor.figures(SIM).get('samples_of_run', 0)) or 1.0
+    limit = _SLACK + (1e9 if order.mode == 'lock-step' else _duration(order))
+    with _progress(console) as progress:
+        task = progress.add_task(f'driving ({order.scenario})', total=1.0)
+
+        def finished() -> bool:
+            figures = supervisor.figures(SIM)
+            share = int(figures.get('samples', 0)) / float(figures.get('samples_of_run', total))
+            progress.update(task, completed=share)
+            return figures.get('sentence') == FINISHED
+
+        supervisor.wait_until(finished, limit, 'the end of the drive')
+
+
+def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> dict[str, Any]:
+    writer = BagWriter(folder.recording)
+    prefix = f'/{order.namespace.strip("/")}/' if order.namespace else '/'
+    for topic in TOPICS:
+        writer.add_topic(_full_name(topic, prefix), topic.type)
+    names = {topic.name: _full_name(topic, prefix) for topic in TOPICS}
+    session = _session_message(_session(order, order.parameters))
+    begin = time.time_ns()
+    try:
+        writer.write(names[SESSION.name], session, begin)
+        with _progress(console) as progress:
+            task = progress.add_task(f'driving ({order.scenario})', total=1.0)
+            outcome = run_core(
+                order.parameters,
+                lambda topic, raw, stamp: writer.write(names[topic.name], raw, begin + stamp),
+                lambda share: progress.update(task, completed=share),
+            )
+    finally:
+        writer.close()
+    return {
+        'scenario': order.scenario,
+        'mode': order.mode,
+        'samples': outcome.samples,
+        'excitation_start': outcome.excitation_start,
+        'real_time_factor': outcome.simulated / outcome.wall_time,
+        'latency_median_s': float('nan'),
+        'latency_p99_s': float('nan'),
+    }
+
+
+@contextmanager
+def _interrupting(supervisor: Supervisor) -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end the drive in order instead of tearing it."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, lambda *_: supervisor.interrupt())
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=console)
+
+
+def _sim_parameters(order: DriveOrder) -> SimParameters:
+    return with_flattened(SimParameters(), order.parameters.get('mount_sim', {}))
+
+
+def _duration(order: DriveOrder) -> float:
+    excitation = build_excitation(_sim_parameters(order))
+    return excitation.start + excitation.duration
+
+
+def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
+    lockstep = order.mode == 'lock-step'
+    port = _FIRST_PORT + order.domain
+    added: dict[str, dict[str, Any]] = {
+        'mount_recorder': {'uri': str(folder.recording), 'on_full': order.on_full},
+        'mount_driver': {'port': port},
+        'mount_sim': {'port': port},
+        'mount_init': {},
+        'mount_control': {},
+    }
+    return {
+        name: {'lockstep': lockstep, **values, **order.parameters.get(name, {})}
+        for name, values in added.items()
+    }
+
+
+def _session(order: DriveOrder, parameters: Parameters) -> str:
+    return session_text(
+        {
+            'scenario': order.scenario,
+            'mode': order.mode,
+            'started': datetime.now().astimezone().isoformat(timespec='seconds'),
+            'parameters': {node: dict(values) for node, values in parameters.items()},
+            'versions': versions(),
+        }
+    )
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of this project and of what it runs on."""
+    names = ('mount_bringup', 'rclpy', 'numpy', 'scipy', 'numba', 'mcap', 'python-can', 'cantools')
+    found = {'python': platform.python_version()}
+    for name in names:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = 'unknown'  # installed from Debian packages without metadata
+    return found
+
+
+def _session_message(text: str) -> bytes:
+    from rclpy.serialization import serialize_message
+    from std_msgs.msg import String
+
+    return serialize_message(String(data=text))
+
+
+def _full_name(topic: Topic, prefix: str) -> str:
+    return topic.name if topic.name.startswith('/') else prefix + topic.name

@@ -1,0 +1,66 @@
+"""Parameters of the nodes as given by the user: names known, types as declared, before a node starts."""
+
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+from mount_control.parameters import ControlParameters
+from mount_driver.parameters import DriverParameters
+from mount_init.parameters import InitParameters
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.quantity import ParameterError, flattened
+from mount_sim.parameters import SimParameters
+
+DEFAULT_DAMPER = 'viscous_2000'
+
+
+def defaults_of_nodes() -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: default}} of all that can be set from outside."""
+    return {
+        'mount_driver': flattened(DriverParameters()),
+        'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0},
+        'mount_init': {**flattened(InitParameters()), 'specimen': ''},
+        'mount_control': {
+            **flattened(ControlParameters()),
+            **flattened(FrictionCoefficients(), 'friction'),
+            **flattened(FrictionContact(), 'contact'),
+            'damper': DEFAULT_DAMPER,
+        },
+        'mount_recorder': {'on_full': 'stop'},
+    }
+
+
+def checked_settings(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the settings in the types that the nodes declare; unknown names raise `ParameterError`.
+
+    ROS itself takes an unknown parameter without a word.
+    """
+    known = defaults_of_nodes()
+    checked: dict[str, dict[str, Any]] = {}
+    for node, values in settings.items():
+        if node not in known:
+            raise ParameterError(f'{node!r} is no node of the graph; known are {", ".join(known)}')
+        checked[node] = {
+            name: _typed(f'{node}.{name}', value, known[node][_known_name(node, name, known[node])])
+            for name, value in values.items()
+        }
+    return checked
+
+
+def _known_name(node: str, name: str, known: Mapping[str, Any]) -> str:
+    if name in known:
+        return name
+    near = difflib.get_close_matches(name, known, n=3)
+    hint = f'; did you mean {" or ".join(near)}?' if near else f'; known are {", ".join(known)}'
+    raise ParameterError(f'{name!r} is no parameter of {node}{hint}')
+
+
+def _typed(name: str, value: Any, default: Any) -> Any:
+    if isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if not isinstance(value, type(default)):
+        raise ParameterError(
+            f'{name} must be a {type(default).__name__} such as {default!r}; instead received {value!r}'
+        )
+    return value

@@ -1,0 +1,104 @@
+"""What a drive says at its end: the figures of `--json`, and the same for people."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mount_bags.reading import Recording
+from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
+from mount_bringup.evaluation import Drive, lost_samples, switching, tracking_error
+
+_UM, _MM, _US = 1e6, 1e3, 1e6
+
+
+def summarise(
+    recording: Recording, drive: Drive, parameters: Parameters, run: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the figures of a drive; `run` brings those that the recording does not hold.
+
+    `run`: `scenario`, `mode`, `samples`, `real_time_factor`, `latency_median_s`, `latency_p99_s`.
+    Times of switching are s from the start of the excitation. Unknown is null.
+    """
+    gap = recording['air_gap']
+    truth = recording['sim/truth']
+    times = switching(drive)
+    error = tracking_error(drive, control_parameters(parameters), chosen_damper(parameters))
+    return {
+        'recording': str(recording.path),
+        'scenario': run['scenario'],
+        'mode': run['mode'],
+        'duration_s': float(drive.time[-1] - max(drive.time[0], 0.0)),
+        'samples': run['samples'],
+        'lost_samples': lost_samples(recording, run['samples']),
+        'real_time_factor': run['real_time_factor'],
+        'rest_gap_m': float(gap['rest_gap'][-1]),
+        'contact_gap_m': float(gap['contact_gap'][-1]),
+        'rest_gap_std_m': float(gap['rest_gap_std'][-1]),
+        'contact_gap_std_m': float(gap['contact_gap_std'][-1]),
+        'true_rest_gap_m': float(truth['rest_gap'][-1]),
+        'true_contact_gap_m': float(truth['contact_gap'][-1]),
+        'offset_current_a': float(gap['offset_current'][-1]),
+        'switch_on_s': list(times.on),
+        'switch_off_s': list(times.off),
+        'peak_displacement_m': float(np.nanmax(np.abs(drive.displacement))),
+        'peak_current_a': float(np.max(drive.current)),
+        'tracking_error_rms': _known(error),
+        'latency_median_s': _known(run['latency_median_s']),
+        'latency_p99_s': _known(run['latency_p99_s']),
+    }
+
+
+def write_json(figures: dict[str, Any], file: Path) -> None:
+    """Write the figures as JSON."""
+    file.write_text(json.dumps(figures, indent=2, allow_nan=False) + '\n')
+
+
+def print_summary(figures: dict[str, Any], console: Console) -> None:
+    """Print the figures as a table."""
+    table = Table(title=f'{figures["scenario"]}, {figures["mode"]}', show_header=False, title_justify='left')
+    table.add_column(style='bold')
+    table.add_column()
+    for name in ('rest', 'contact'):
+        measured, std = _UM * figures[f'{name}_gap_m'], _UM * figures[f'{name}_gap_std_m']
+        true = _UM * figures[f'true_{name}_gap_m']
+        table.add_row(f'{name} gap', f'{measured:.1f} ± {std:.1f} um measured, {true:.1f} um true')
+    table.add_row('damping switched', _switching_text(figures))
+    table.add_row('peak displacement', f'{_MM * figures["peak_displacement_m"]:.2f} mm')
+    table.add_row('peak current', f'{figures["peak_current_a"]:.2f} A')
+    table.add_row(
+        'friction force error', _percent(figures['tracking_error_rms'], 'rms of the peak wanted force')
+    )
+    table.add_row('samples lost', f'{figures["lost_samples"]} of {figures["samples"]}')
+    table.add_row('latency', _latency_text(figures))
+    table.add_row('speed', f'{figures["real_time_factor"]:.2f} x real time')
+    console.print(table)
+
+
+def _switching_text(figures: dict[str, Any]) -> str:
+    ons, offs = figures['switch_on_s'], figures['switch_off_s']
+    if not ons:
+        return 'never on'
+    pairs = [(on, next((off for off in offs if off > on), None)) for on in ons]
+    shown = [f'{on:.2f} s to {f"{off:.2f} s" if off is not None else "the end"}' for on, off in pairs]
+    more = f' and {len(shown) - 6} more' if len(shown) > 6 else ''
+    return 'on from ' + ', '.join(shown[:6]) + more
+
+
+def _latency_text(figures: dict[str, Any]) -> str:
+    median, p99 = figures['latency_median_s'], figures['latency_p99_s']
+    if median is None or p99 is None:
+        return 'none (no middleware)'
+    return f'{_US * median:.0f} us median, {_US * p99:.0f} us in 99 of 100 (sample sent to setpoint back)'
+
+
+def _percent(value: float | None, of_what: str) -> str:
+    return 'damping was never on' if value is None else f'{100 * value:.1f} % {of_what}'
+
+
+def _known(value: float) -> float | None:
+    return None if value is None or math.isnan(value) else float(value)
