@@ -1,6 +1,5 @@
 """The driver's node: CAN on one side, topics on the other."""
 
-import gc
 import math
 import time
 
@@ -24,7 +23,7 @@ class MountDriver(SafeLifecycleNode):
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
         declare(self, DriverParameters())
-        self._parameters = DriverParameters()
+        self._settings = DriverParameters()
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
         self._watch = LinkWatch()
@@ -34,7 +33,7 @@ class MountDriver(SafeLifecycleNode):
         self._setpoint_layout = ScalarsLayout(CURRENT_SETPOINT)
 
     def configure(self) -> None:
-        self._parameters = read(self, DriverParameters())
+        self._settings = read(self, DriverParameters())
         self._codec = MountCodec()
         path = self.open_data_path()
         self._publish_displacement = path.publisher(DISPLACEMENT).publish
@@ -47,12 +46,11 @@ class MountDriver(SafeLifecycleNode):
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
-        exchange = Exchange(self._parameters, self._codec, clock, self._on_sample, lockstep=self.lockstep)
+        exchange = Exchange(self._settings, self._codec, clock, self._on_sample, lockstep=self.lockstep)
         self._watch = LinkWatch()
         self._started_ns = time.monotonic_ns()
         exchange.start()
         self._exchange = exchange
-        gc.freeze()  # what stands now need not be looked at again on the 1 kHz path
 
     def deactivate(self) -> None:
         exchange, self._exchange = self._exchange, None
@@ -67,7 +65,7 @@ class MountDriver(SafeLifecycleNode):
         if exchange is None:
             return Verdict(Level.OK, 'inactive')
         now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
-        return judge(now, self._watch.earlier(now), self._parameters, lockstep=self.lockstep)
+        return judge(now, self._watch.earlier(now), self._settings, lockstep=self.lockstep)
 
     def _on_sample(self, stamp: int, sample: Measurement) -> None:
         # The displacement first: the setpoint waits for it.
@@ -93,3 +91,7 @@ class MountDriver(SafeLifecycleNode):
 def main() -> None:
     """Run the driver's process."""
     run_node(MountDriver)
+
+
+if __name__ == '__main__':
+    main()

@@ -15,7 +15,12 @@ CODEC = MountCodec()
 
 def sample(index: int, **changes) -> Measurement:
     """Return sample number `index`, taken at `index` ms."""
-    values = {'displacement': 1e-6 * index, 'coil_current': 0.5, 'current_rate': 250.0, 'flux_rate': 80.0}
+    values = {
+        'displacement': 1e-6 * (index % 1000),
+        'coil_current': 0.5,
+        'current_rate': 250.0,
+        'flux_rate': 80.0,
+    }
     return Measurement(index % 65536, index * 1000 % 2**32, **(values | changes))
 
 

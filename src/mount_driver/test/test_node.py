@@ -1,0 +1,324 @@
+"""The driver as a node: CAN frames on one side, topics of the real middleware on the other."""
+
+import gc
+import itertools
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from far_end import CODEC, LIMIT, FarEnd, sample, wait_until
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from mount_driver.codec import Setpoint
+from mount_driver.link import Arrival
+from mount_driver.node import MountDriver
+from mount_ros.data_path import DataPath
+from mount_ros.diagnostics import Level
+from mount_ros.environment import prepare_environment
+from mount_ros.qos import publisher_qos
+from mount_ros.scalars import ScalarsLayout, stamp_of
+from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT
+
+MS = 1_000_000
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+
+
+@pytest.fixture
+def context(domain):
+    prepare_environment()
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    rclpy.try_shutdown(context=context)
+
+
+@pytest.fixture
+def make_driver(context, multicast):
+    """Return a function that creates a driver with parameters."""
+    made = []
+
+    def make(**parameters):
+        values = {'channel': multicast[0], 'port': multicast[1], 'lockstep': True, **parameters}
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        made.append(MountDriver(context=context, parameter_overrides=overrides))
+        return made[-1]
+
+    yield make
+    for node in made:
+        node.close()
+        node.destroy_node()
+    del node
+    made.clear()
+    gc.collect()  # until then rclpy keeps the services of a lifecycle node in the graph, answered by nobody
+
+
+@pytest.fixture
+def far(multicast):
+    end = FarEnd('udp_multicast', *multicast)
+    yield end
+    end.close()
+
+
+class Controller:
+    """Stands in for the controller: keeps what it receives, publishes setpoints."""
+
+    def __init__(self, context):
+        self.node = Node('controller', context=context)
+        self.path = DataPath(self.node, lockstep=True)
+        self.received = {DISPLACEMENT: [], COIL_RIPPLE: []}
+        self.order = []
+        for topic in self.received:
+            self.path.subscribe(topic, lambda raw, topic=topic: self._take(topic, raw))
+        self._publisher = self.path.publisher(CURRENT_SETPOINT)
+        self._layout = ScalarsLayout(CURRENT_SETPOINT)
+        self.path.start()
+
+    def _take(self, topic, raw):
+        self.received[topic].append(ScalarsLayout(topic).unpack(raw))
+        self.order.append((topic.name, stamp_of(raw)))
+
+    def setpoint(self, stamp, current):
+        self._publisher.publish(self._layout.pack(stamp, (current,)))
+
+    def publish_raw(self, message):
+        self._publisher.publish(message)
+
+    def wait_for(self, count):
+        wait_until(lambda: all(len(got) >= count for got in self.received.values()), f'{count} samples')
+
+    def close(self):
+        self.path.stop()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def controller(context):
+    stand_in = Controller(context)
+    yield stand_in
+    stand_in.close()
+
+
+@pytest.fixture
+def active(make_driver, controller):
+    """Return a function that creates an active driver, matched with the controller on both sides."""
+
+    def make(**parameters):
+        driver = make_driver(**parameters)
+        assert driver.trigger_configure() == SUCCESS
+        wait_until(lambda: not controller.path.unmatched(), 'matched by the controller')
+        wait_until(lambda: not driver.data_path.unmatched(), 'matched by the driver')
+        assert driver.trigger_activate() == SUCCESS
+        return driver
+
+    return make
+
+
+def test_frames_become_topics_with_true_stamps_and_values(active, controller, far):
+    active()
+    for index in range(50):
+        far.send(sample(index, coil_current=0.02 * index))
+        controller.wait_for(index + 1)
+    assert controller.received[DISPLACEMENT] == [(k * MS, (k / 1e6,), ()) for k in range(50)]
+    for k, (stamp, (current, flux), slopes) in enumerate(controller.received[COIL_RIPPLE]):
+        assert (stamp, current, slopes) == (k * MS, pytest.approx(0.02 * k, abs=1e-12), (250.0, 80.0))
+        assert math.isnan(flux)
+
+
+def test_a_displacement_that_is_not_valid_is_nan(active, controller, far):
+    active()
+    far.send(sample(0, displacement=math.nan))
+    controller.wait_for(1)
+    assert math.isnan(controller.received[DISPLACEMENT][0][1][0])
+
+
+def test_a_setpoint_becomes_a_frame_with_the_number_of_the_answered_sample(active, controller, far):
+    active()
+    for index in range(70_000, 70_005):
+        far.send(sample(index))
+    controller.wait_for(5)
+    controller.setpoint(70_003 * MS, 1.2345)
+    assert far.setpoint() == Setpoint(1.2345, 70_003 - 65_536, True)
+
+
+def test_in_real_time_stamps_are_ros_time_and_evenly_spaced(active, controller, far):
+    before = time.time_ns()
+    active(lockstep=False)
+    far.stream()
+    controller.wait_for(500)
+    stamps = [stamp for stamp, _, _ in controller.received[DISPLACEMENT]]
+    spacings = {round(right - left, -4) for left, right in itertools.pairwise(stamps)}
+    assert all(spacing % MS <= 10_000 or spacing % MS >= MS - 10_000 for spacing in spacings)
+    assert before < stamps[0] < stamps[-1] < time.time_ns() + 100 * MS
+
+
+def test_when_setpoints_stop_the_0_ampere_frame_is_sent(active, controller, far):
+    driver = active(lockstep=False)
+    far.stream()
+    controller.wait_for(1)
+
+    def accepted():
+        controller.setpoint(controller.received[DISPLACEMENT][-1][0], 1.5)
+        return driver._exchange.link.setpoints > 0
+
+    wait_until(accepted, 'an accepted setpoint')
+    assert far.setpoint_where(lambda setpoint: setpoint.enable).current == 1.5
+    off = far.setpoint_where(lambda setpoint: not setpoint.enable)
+    assert off.current == 0.0
+    wait_until(lambda: 'no setpoint for 20 ms' in driver.judge().sentence, 'the verdict')
+
+
+def test_a_corrupt_frame_is_not_published_and_counted(active, controller, far):
+    driver = active()
+    far.send(sample(0))
+    far.send(sample(1), damage=0x80)
+    far.send(sample(2))
+    controller.wait_for(2)
+    assert [stamp for stamp, _, _ in controller.received[DISPLACEMENT]] == [0, 2 * MS]
+    assert driver._exchange.link.arrivals[Arrival.CORRUPT] == 1
+    verdict = driver.judge()
+    assert (verdict.figures['corrupt'], verdict.figures['lost']) == (1, 1)
+
+
+def test_the_verdict_carries_the_last_stamp(active, controller, far):
+    driver = active()
+    far.send(sample(123))
+    controller.wait_for(1)
+    assert driver.judge().figures['last_stamp'] == 123 * MS
+
+
+def test_without_frames_the_verdict_names_the_remedy(active):
+    driver = active(lockstep=False, frame_timeout=0.01)
+    wait_until(lambda: driver.judge().level == Level.ERROR, 'the verdict')
+    assert 'are the electronics powered' in driver.judge().sentence
+
+
+def test_a_setpoint_message_without_the_coil_current_is_refused_and_the_path_lives_on(
+    active, controller, far
+):
+    driver = active()
+    far.send(sample(0))
+    controller.wait_for(1)
+    controller.publish_raw(ScalarsLayout(DISPLACEMENT).pack(0, (1.0,)))
+    controller.setpoint(0, 0.5)
+    assert far.setpoint().current == 0.5
+    assert sum(driver._exchange.link.refusals.values()) == 1
+
+
+def test_deactivation_sends_0_ampere_and_setpoints_no_longer_leave(active, controller, far):
+    driver = active()
+    far.send(sample(0))
+    controller.wait_for(1)
+    controller.setpoint(0, 2.0)
+    assert far.setpoint().current == 2.0
+    assert driver.trigger_deactivate() == SUCCESS
+    assert [far.setpoint() for _ in range(3)] == [Setpoint(0.0, 0, False)] * 3
+    controller.setpoint(0, 2.0)
+    assert far.nothing_for(0.05)
+
+
+def test_the_driver_can_be_activated_again(active, controller, far):
+    driver = active()
+    far.send(sample(500))
+    controller.wait_for(1)
+    assert driver.trigger_deactivate() == SUCCESS
+    assert driver.trigger_activate() == SUCCESS
+    far.send(sample(3))
+    controller.wait_for(2)
+    assert controller.received[DISPLACEMENT][-1][0] == 3 * MS
+    assert driver.trigger_deactivate() == SUCCESS
+    assert driver.trigger_cleanup() == SUCCESS
+    assert driver.trigger_configure() == SUCCESS
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'sentence'),
+    [
+        ({'interface': 'socketcan', 'channel': 'no-such-can'}, 'is it up?'),
+        ({'interface': 'carrier_pigeon'}, 'known interfaces are'),
+        ({'channel': '192.0.2.1'}, 'must be an IPv4 multicast address'),
+    ],
+)
+def test_a_bus_that_does_not_open_fails_the_activation_and_the_node_lives_on(
+    make_driver, context, far, parameters, sentence
+):
+    heard = []
+    listener = Node('listener', context=context)
+    listener.create_subscription(
+        DiagnosticArray, DIAGNOSTICS.name, lambda message: heard.append(message), publisher_qos(DIAGNOSTICS)
+    )
+    driver = make_driver(**parameters)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(driver)
+    executor.add_node(listener)
+
+    def spun(condition):
+        executor.spin_once(0.05)
+        return condition()
+
+    wait_until(lambda: spun(lambda: heard), 'diagnostics')
+    assert driver.trigger_configure() == SUCCESS
+    assert driver.trigger_activate() == FAILURE
+    assert not driver.active
+    wait_until(
+        lambda: spun(lambda: any(sentence in status.message for array in heard for status in array.status)),
+        'the sentence on diagnostics',
+    )
+    executor.shutdown()
+    listener.destroy_node()
+    driver.set_parameters([Parameter('interface', value='udp_multicast')])
+    assert driver.trigger_cleanup() == SUCCESS
+
+
+def test_a_parameter_outside_its_range_is_refused(make_driver):
+    result = make_driver().set_parameters([Parameter('setpoint_timeout', value=0.1)])[0]
+    assert not result.successful
+    assert 'setpoint_timeout' in result.reason
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_sends_0_ampere_and_ends_the_process_with_code_0(domain, context, multicast, far, number):
+    command = [sys.executable, '-m', 'mount_driver.node', '--ros-args', '-p', 'lockstep:=true']
+    command += ['-p', f'channel:={multicast[0]}', '-p', f'port:={multicast[1]}']
+    process = subprocess.Popen(command, env=os.environ | {'ROS_DOMAIN_ID': str(domain)})
+    commander = Node('commander', context=context)
+    try:
+        change(commander, Transition.TRANSITION_CONFIGURE)
+        change(commander, Transition.TRANSITION_ACTIVATE)
+        process.send_signal(number)
+        assert [far.setpoint().enable for _ in range(3)] == [False] * 3
+        assert process.wait(LIMIT) == 0
+    finally:
+        process.kill()
+        process.wait()
+        commander.destroy_node()
+
+
+def change(commander, transition):
+    client = commander.create_client(ChangeState, 'mount_driver/change_state')
+    assert client.wait_for_service(LIMIT)
+    request = ChangeState.Request()
+    request.transition.id = transition
+    executor = SingleThreadedExecutor(context=commander.context)
+    executor.add_node(commander)
+    future = client.call_async(request)
+    executor.spin_until_future_complete(future, LIMIT)
+    executor.shutdown()
+    assert future.result() is not None
+    assert future.result().success
+
+
+def test_the_codec_of_the_far_end_is_that_of_the_driver(make_driver):
+    driver = make_driver()
+    assert driver.trigger_configure() == SUCCESS
+    assert driver._codec.measurement.data_id == CODEC.measurement.data_id
