@@ -18,7 +18,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
-from mount_bringup.graph import GraphNode, GraphSettings
+from mount_bringup.graph import CONTROL, DRIVER, GraphNode, GraphSettings
 from mount_bringup.processes import NodeProcess, end_all
 from mount_ros.diagnostics import Level
 from mount_ros.qos import publisher_qos, recording_qos
@@ -204,7 +204,18 @@ class Supervisor:
         for node in self._nodes:
             figures = self.figures(node)
             if figures.get('fatal') == 'True':
-                raise GraphError(f'{node.name}: {figures["sentence"]}')
+                raise GraphError(f'{node.name}: {figures["sentence"]}{self._who_is_silent(figures)}')
+
+    def _who_is_silent(self, figures: dict[str, str]) -> str:
+        """Return the first node of the chain that has not handled the sample which waits for its answer."""
+        waiting = figures.get('waiting_stamp', '')
+        if not waiting.isdigit():
+            return ''
+        for node in self._nodes:
+            handled = self.figures(node).get('last_stamp', '')
+            if node in (DRIVER, CONTROL) and (not handled.isdigit() or int(handled) < int(waiting)):
+                return f'; {node.name} does not answer'
+        return ''
 
     def _complaints(self) -> str:
         said = [

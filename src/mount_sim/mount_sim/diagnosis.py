@@ -23,6 +23,7 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
         'fatal': bool(figures.failure),
     }
     if figures.failure:
+        values['waiting_stamp'] = round((figures.samples - 1) * SAMPLE_TIME * 1e9)
         return Verdict(Level.ERROR, figures.failure, values)
     if figures.samples >= run.samples:
         return Verdict(Level.OK, FINISHED, values)

@@ -1,0 +1,36 @@
+"""The graph in the car: ros2 launch mount_bringup vehicle.launch.py channel:=can0 namespace:=mount_right"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+
+from mount_bringup.graph import VEHICLE
+from mount_bringup.launch_graph import launch_graph
+
+
+def generate_launch_description() -> LaunchDescription:
+    config = Path(get_package_share_directory('mount_bringup')) / 'config' / 'vehicle.yaml'
+    arguments = [
+        DeclareLaunchArgument('namespace', default_value='', description='such as mount_right'),
+        DeclareLaunchArgument('config', default_value=str(config), description='parameters of all nodes'),
+        DeclareLaunchArgument('recording', description='folder that the recording creates'),
+        DeclareLaunchArgument('interface', default_value='socketcan', description='python-can interface'),
+        DeclareLaunchArgument('channel', default_value='can0', description='channel of the interface'),
+        DeclareLaunchArgument(
+            'specimen', default_value='', description='calibration of this actuator; empty: the shipped one'
+        ),
+        DeclareLaunchArgument('damper', default_value='viscous_2000', description='damper characteristic'),
+    ]
+    config_file = LaunchConfiguration('config')
+    parameters = {node.name: [config_file] for node in VEHICLE}
+    parameters['mount_recorder'].append({'uri': LaunchConfiguration('recording')})
+    parameters['mount_driver'].append(
+        {'interface': LaunchConfiguration('interface'), 'channel': LaunchConfiguration('channel')}
+    )
+    parameters['mount_init'].append({'specimen': LaunchConfiguration('specimen')})
+    parameters['mount_control'].append({'damper': LaunchConfiguration('damper')})
+    graph = launch_graph(VEHICLE, LaunchConfiguration('namespace'), parameters)
+    return LaunchDescription([*arguments, *graph])

@@ -1,0 +1,79 @@
+"""The arrows between the packages point one way."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+SOURCES = Path(__file__).resolve().parents[2] / 'src'
+MAY_IMPORT = {
+    'mount_models': set(),
+    'mount_ros': {'mount_models'},
+    'mount_driver': {'mount_models', 'mount_ros'},
+    'mount_init': {'mount_models', 'mount_ros'},
+    'mount_control': {'mount_models', 'mount_ros'},
+    'mount_sim': {'mount_models', 'mount_ros', 'mount_driver'},
+    'mount_bags': {'mount_models', 'mount_ros'},
+    'mount_bringup': {
+        'mount_models', 'mount_ros', 'mount_driver', 'mount_init', 'mount_control', 'mount_sim', 'mount_bags',
+    },
+}  # fmt: skip
+ROS = ('rclpy', 'sensor_msgs', 'std_msgs', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle_msgs', 'mount_ros')
+# Beside node.py: verdicts are `mount_ros.diagnostics.Verdict`, plain data; the reader decodes messages.
+MAY_TOUCH_ROS = {
+    'mount_driver': {'node.py', 'diagnosis.py'},
+    'mount_init': {'node.py', 'diagnosis.py'},
+    'mount_control': {'node.py', 'diagnosis.py'},
+    'mount_sim': {'node.py', 'diagnosis.py', 'recorded_mcap.py', 'loop.py'},
+}
+
+
+@pytest.mark.parametrize('package', MAY_IMPORT)
+def test_packages_import_only_what_lies_below_them(package: str):
+    ours = {name for _, name in _imports(package) if name in MAY_IMPORT}
+    assert ours - {package} <= MAY_IMPORT[package]
+
+
+def test_every_package_is_covered():
+    assert {path.name for path in SOURCES.iterdir() if (path / 'package.xml').exists()} == set(MAY_IMPORT)
+
+
+@pytest.mark.parametrize('package', MAY_TOUCH_ROS)
+def test_only_the_node_and_its_verdict_touch_ros(package: str):
+    touching = {file.name for file, name in _imports(package) if name in ROS}
+    assert touching == MAY_TOUCH_ROS[package]
+
+
+def test_models_know_no_ros():
+    assert not [str(file) for file, name in _imports('mount_models') if name in ROS]
+
+
+def test_the_controller_never_sees_the_truth():
+    truth = {
+        'mount_models.actuator.reluctance',
+        'mount_models.closing',
+        'mount_models.coil.ripple',
+        'mount_sim',
+    }
+    for package in ('mount_control', 'mount_init', 'mount_driver'):
+        seen = {module for module in _modules(package) if any(module.startswith(name) for name in truth)}
+        assert not seen, f'{package} imports {seen}'
+
+
+def _imports(package: str) -> Iterator[tuple[Path, str]]:
+    for file in sorted((SOURCES / package / package).rglob('*.py')):
+        for module in _modules_of(file):
+            yield file, module.split('.')[0]
+
+
+def _modules(package: str) -> set[str]:
+    return {m for file in (SOURCES / package / package).rglob('*.py') for m in _modules_of(file)}
+
+
+def _modules_of(file: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            yield node.module

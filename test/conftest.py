@@ -1,0 +1,99 @@
+"""What the tests of the whole graph share: a ROS domain of their own, and the command as users run it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mount_ros.testing import free_domain
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
+LIMIT = 240.0  # s: only a hang takes so long
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A ROS domain that no other test of this machine uses at the same time."""
+    with free_domain() as number:
+        yield number
+
+
+@dataclass
+class Result:
+    """What a command did."""
+
+    code: int
+    output: str
+    figures: dict[str, Any] = field(default_factory=dict)
+    folder: Path = Path()
+
+
+class Command:
+    """The `engine-mount` command in a folder of its own."""
+
+    def __init__(self, folder: Path, domain: int):
+        self.folder = folder
+        self.domain = domain
+        self._runs = 0
+
+    def drive(self, *options: str) -> Result:
+        """Run a drive to its end and read its figures."""
+        process, out = self.start_drive(*options)
+        output, _ = process.communicate(timeout=LIMIT)
+        summary = out / 'summary.json'
+        figures = json.loads(summary.read_text()) if summary.exists() else {}
+        return Result(process.returncode, output, figures, out)
+
+    def start_drive(self, *options: str) -> tuple[subprocess.Popen[str], Path]:
+        """Start a drive and return its process and the folder of the run."""
+        self._runs += 1
+        out = self.folder / f'run_{self._runs}'
+        return self.start('drive', '--out', str(out), *options), out
+
+    def start(self, *arguments: str) -> subprocess.Popen[str]:
+        """Start the command."""
+        return subprocess.Popen(
+            [str(Path(sys.executable).parent / 'engine-mount'), *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            cwd=self.folder,
+            env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain), 'COLUMNS': '200', 'NO_COLOR': '1'},
+        )
+
+
+@pytest.fixture
+def command(tmp_path: Path, domain: int) -> Iterator[Command]:
+    """The command; what it started and left behind is ended."""
+    started: list[subprocess.Popen[str]] = []
+
+    class Watched(Command):
+        def start(self, *arguments: str) -> subprocess.Popen[str]:
+            started.append(super().start(*arguments))
+            return started[-1]
+
+    yield Watched(tmp_path, domain)
+    for process in started:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            process.wait(30)
+
+
+def wait_for(condition: Callable[[], Any], what: str, limit: float = 60.0) -> Any:
+    """Return the first true value of `condition`, or fail."""
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.02)
+    return pytest.fail(f'{what} did not happen within {limit:g} s')

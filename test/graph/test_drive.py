@@ -1,0 +1,72 @@
+"""The whole graph: real processes, real topics, from the CAN peer to the recording."""
+
+import json
+
+import pytest
+
+import mount_bags
+
+DATA_TOPICS = (
+    'displacement',
+    'coil_ripple',
+    'current_setpoint',
+    'air_gap',
+    'current_force_table',
+    'control_trace',
+    'sim/truth',
+    'sim/chassis_acceleration',
+    'sim/mount_force',
+)
+PROMISED_FIGURES = {
+    'recording', 'scenario', 'lost_samples', 'real_time_factor', 'rest_gap_m', 'contact_gap_m',
+    'true_rest_gap_m', 'true_contact_gap_m', 'switch_on_s', 'switch_off_s', 'peak_displacement_m',
+    'peak_current_a', 'tracking_error_rms', 'latency_median_s', 'latency_p99_s',
+}  # fmt: skip
+
+
+def _payloads(folder, topic):
+    return [bytes(payload) for payload in mount_bags.open(folder / 'recording')[topic].payloads]
+
+
+def test_lockstep_repeats_itself_and_equals_the_core_run(command):
+    options = ('--scenario', 'bench', '--duration', '2', '--set', 'mount_sim.timeline.start=3.0')
+    first = command.drive('--lockstep', *options)
+    second = command.drive('--lockstep', *options)
+    core = command.drive('--core', *options)
+    assert first.code == second.code == core.code == 0, first.output + second.output + core.output
+    for topic in DATA_TOPICS:
+        reference = _payloads(first.folder, topic)
+        assert reference, topic
+        assert _payloads(second.folder, topic) == reference, topic
+        assert _payloads(core.folder, topic) == reference, topic
+
+
+def test_real_time_drive_records_every_sample_and_damps_the_gap(command, tmp_path):
+    figures_file = tmp_path / 'figures.json'
+    result = command.drive(
+        '--duration', '3', '--set', 'mount_sim.motorway.gap_time=1.0',
+        '--set', 'mount_sim.motorway.gap_depth=0.03', '--json', str(figures_file),
+    )  # fmt: skip
+    assert result.code == 0, result.output
+    figures = json.loads(figures_file.read_text())
+    assert figures == result.figures
+    assert set(figures) >= PROMISED_FIGURES
+    assert figures['lost_samples'] == 0
+    assert len(figures['switch_on_s']) == 1
+    assert 1.0 < figures['switch_on_s'][0] < 1.5
+    assert figures['contact_gap_m'] == pytest.approx(figures['true_contact_gap_m'], abs=3e-6)
+    assert figures['rest_gap_m'] == pytest.approx(figures['true_rest_gap_m'], abs=6e-6)
+    assert (result.folder / 'drive.png').stat().st_size > 10_000
+    recording = mount_bags.open(result.folder / 'recording')
+    assert set(recording.topics) >= {f'/{topic}' for topic in DATA_TOPICS}
+    assert 'scenario: motorway' in recording.latched('session').data
+
+
+def test_namespace_holds_all_topics_but_diagnostics(command):
+    result = command.drive(
+        '--lockstep', '--namespace', 'mount_right', '--scenario', 'bench', '--duration', '0.2',
+        '--set', 'mount_sim.timeline.start=3.0',
+    )  # fmt: skip
+    assert result.code == 0, result.output
+    topics = set(mount_bags.open(result.folder / 'recording').topics)
+    assert topics - {'/diagnostics'} == {name for name in topics if name.startswith('/mount_right/')}

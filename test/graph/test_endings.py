@@ -1,0 +1,145 @@
+"""Whatever ends a drive, the coil is at 0 A, the recording is closed and the exit code tells the reason."""
+
+import os
+import signal
+import subprocess
+import threading
+import time
+
+import pytest
+
+import mount_bags
+from mount_driver.bus import MULTICAST_GROUP, open_bus
+from mount_driver.codec import MountCodec
+
+from ..conftest import wait_for
+
+FIRST_PORT = 43113
+
+
+@pytest.fixture
+def bus_listener(domain):
+    """The setpoints seen on the CAN bus, by a peer that was there all the time."""
+    codec = MountCodec()
+    setpoints = []
+    bus = open_bus(
+        'udp_multicast', MULTICAST_GROUP, port=FIRST_PORT + domain, receive=[codec.setpoint.frame_id]
+    )
+    ending = threading.Event()
+
+    def listen():
+        while not ending.is_set():
+            frame = bus.recv(0.1)
+            if frame is not None:
+                setpoints.append(codec.decode_setpoint(frame.data))
+
+    thread = threading.Thread(target=listen)
+    thread.start()
+    yield setpoints
+    ending.set()
+    thread.join()
+    bus.shutdown()
+
+
+def _node_pids(parent: int) -> dict[str, int]:
+    """Return {node: pid} of the children of the command."""
+    found = {}
+    listing = subprocess.run(
+        ['ps', '-o', 'pid=,args=', '--ppid', str(parent)], capture_output=True, text=True, check=False
+    ).stdout
+    for line in listing.splitlines():
+        pid, _, arguments = line.strip().partition(' ')
+        for name in ('mount_bags', 'mount_driver', 'mount_sim', 'mount_init', 'mount_control'):
+            if f'from {name}.node' in arguments:
+                found[name] = int(pid)
+    return found
+
+
+@pytest.mark.parametrize('moment', ['starting', 'initialising', 'damping'])
+def test_ctrl_c_ends_at_zero_current_with_a_closed_recording(command, bus_listener, moment):
+    process, out = command.start_drive('--scenario', 'bench', '--duration', '60')
+    reached = {
+        'starting': lambda: (out / 'log' / 'mount_control.log').exists(),
+        'initialising': lambda: any(setpoint.current > 1.0 for setpoint in bus_listener),
+        'damping': lambda: (
+            sum(s.current > 0.4 for s in bus_listener[-200:]) > 100 and len(bus_listener) > 4000
+        ),
+    }[moment]
+    wait_for(reached, moment)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, output
+    assert 'interrupted' in output
+    if moment != 'starting':
+        assert bus_listener[-1].current == 0.0
+        assert not bus_listener[-1].enable
+        recording = mount_bags.open(out / 'recording')
+        assert recording.warnings == []
+        assert len(recording['displacement']) > 100
+    wait_for(lambda: not _node_pids(process.pid), 'the end of all nodes')
+
+
+def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_listener):
+    process, out = command.start_drive('--scenario', 'bench', '--duration', '60')
+    wait_for(
+        lambda: sum(s.current > 0.4 for s in bus_listener[-200:]) > 100 and len(bus_listener) > 4000,
+        'damping',
+    )
+    os.kill(_node_pids(process.pid)['mount_control'], signal.SIGKILL)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert 'mount_control ended with code -9' in output
+    assert bus_listener[-1].current == 0.0
+    assert len(mount_bags.open(out / 'recording')['displacement']) > 1000
+
+
+def test_nodes_end_when_their_supervisor_is_killed(command, bus_listener):
+    process, _ = command.start_drive('--scenario', 'bench', '--duration', '60')
+    wait_for(lambda: len(bus_listener) > 500, 'setpoints')
+    nodes = _node_pids(process.pid)
+    assert len(nodes) == 5
+    process.kill()
+    process.communicate(timeout=30)
+    wait_for(lambda: not any(_alive(pid) for pid in nodes.values()), 'the end of all nodes')
+    assert bus_listener[-1].current == 0.0
+
+
+def test_lockstep_names_the_node_that_does_not_answer(command, bus_listener):
+    process, _ = command.start_drive(
+        '--lockstep', '--scenario', 'bench', '--duration', '600', '--set', 'mount_sim.answer_patience=2.0'
+    )
+    wait_for(lambda: len(bus_listener) > 4000, 'control in lock-step')
+    control = _node_pids(process.pid)['mount_control']
+    os.kill(control, signal.SIGSTOP)
+    wait_for(lambda: _goes_on_after_stall(bus_listener), 'the end of the patience')
+    os.kill(control, signal.SIGCONT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert 'was not answered within 2 s' in output
+    assert 'mount_control does not answer' in output
+
+
+def test_a_second_graph_on_the_same_domain_is_refused(command, domain):
+    first, _ = command.start_drive('--scenario', 'bench', '--duration', '60')
+    wait_for(lambda: len(_node_pids(first.pid)) == 5, 'the first graph')
+    second = command.drive('--scenario', 'bench', '--duration', '1')
+    assert second.code == 1
+    assert f'a graph already runs in ROS domain {domain}' in second.output
+    first.send_signal(signal.SIGINT)
+    assert first.wait(60) == 130
+
+
+def _goes_on_after_stall(setpoints) -> bool:
+    """Return true once no setpoint has come for longer than the simulator's patience."""
+    before = len(setpoints)
+    time.sleep(3.0)  # the stall itself is what is waited for
+    return len(setpoints) == before
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    with open(f'/proc/{pid}/stat') as stat:
+        return stat.read().rsplit(') ', 1)[1][0] != 'Z'
