@@ -189,6 +189,11 @@ def test_the_check_refuses_the_printed_law_stretched_to_600_um():
         check_force_law(TABLE_1._replace(gap_high=600e-6))
 
 
+def test_the_check_refuses_a_law_that_turns_over_at_high_current():
+    with pytest.raises(ForceLawRefusedError, match=r'rise with current; at 120 um and 2\.9'):
+        check_force_law(TABLE_1._replace(gap_low=120e-6))
+
+
 def test_the_check_refuses_a_law_that_rises_with_gap():
     with pytest.raises(ForceLawRefusedError, match='fall with the air gap'):
         check_force_law(TABLE_1._replace(gap_low=130e-6))

@@ -192,6 +192,15 @@ def test_within_the_hysteresis_the_previous_gap_decides():
     assert open_gap - shut_gap > 50e-6
 
 
+@pytest.mark.parametrize('distance', [0.1e-6, 2e-6, 20e-6])
+def test_halves_that_hardly_left_the_contact_open_all_the_way(distance):
+    """There the magnet's pull falls faster with the gap than the spring's, and yet the spring wins."""
+    current = contact_current(WIDE, MAGNET) - 2e-4
+    gap, normal_force = closed_state(WIDE, MAGNET, current, WIDE.contact_gap + distance)
+    assert gap == pytest.approx(closed_state(WIDE, MAGNET, current, WIDE.rest_gap)[0], abs=1e-9)
+    assert normal_force == 0.0
+
+
 def test_without_current_the_halves_rest_wherever_they_came_from():
     for before in (MOUNT.rest_gap, MOUNT.contact_gap, 330e-6, 600e-6):
         gap, normal_force = closed_state(MOUNT, MAGNET, 0.0, before)

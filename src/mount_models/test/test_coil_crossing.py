@@ -95,6 +95,16 @@ def test_outliers_do_not_move_the_crossing():
     assert find_crossing(RAMP, spoiled).current == pytest.approx(clean.current, abs=3 * clean.current_std)
 
 
+@pytest.mark.parametrize('seed', range(8))
+def test_not_even_every_fourth_sample_struck_to_one_side_moves_the_crossing(seed):
+    random = np.random.default_rng(seed)
+    noisy = ASSEMBLED * (1.0 + 0.01 * random.standard_normal(RAMP.size))
+    clean = find_crossing(RAMP, noisy)
+    struck = (np.abs(RAMP - clean.current) < 0.1) & (random.random(RAMP.size) < 0.25)
+    spoiled = np.where(struck, noisy * random.uniform(3.0, 5.0, RAMP.size), noisy)
+    assert find_crossing(RAMP, spoiled).current == pytest.approx(clean.current, abs=3 * clean.current_std)
+
+
 def test_another_level_can_be_asked_for():
     found = find_crossing(RAMP, FIXED, level=30e-3)
     assert fixed_gap_curve([found.current])[0] == pytest.approx(30e-3, abs=5e-6)

@@ -56,8 +56,8 @@ def core_field(actuator, current, gap):
     linear = square * actuator.knee_field + actuator.gap_area * actuator.saturation_polarisation - drive
     constant = drive * actuator.knee_field
     root = math.sqrt(linear * linear + 4.0 * square * constant)
-    # of the two forms of the root, the one that does not subtract nearly equal numbers
-    field = 2.0 * constant / (linear + root) if linear > 0.0 else (root - linear) / (2.0 * square)
+    # this form of the root does not subtract nearly equal numbers where the core is unsaturated
+    field = 2.0 * constant / (linear + root)
     return math.copysign(field, current)
 
 
