@@ -11,6 +11,7 @@ from mount_init.errors import (
     CurrentNotFollowingError,
     InitialisationError,
     OutsideCalibrationError,
+    SpecimenMismatchError,
     TooFewRipplesError,
 )
 from mount_init.estimation import (
@@ -82,6 +83,11 @@ class Initialisation:
     """Drives one current ramp, sample by sample, and estimates at its end."""
 
     def __init__(self, specimen: Specimen, parameters: InitParameters):
+        if parameters.peak_current > specimen.current_limit:
+            raise SpecimenMismatchError(
+                f'peak_current ({parameters.peak_current:.3f} A) must not exceed current_limit of the specimen '
+                f'({specimen.current_limit:.3f} A); lower peak_current'
+            )
         self.specimen = specimen
         self.parameters = parameters
         self.ramp: Ramp = current_ramp(parameters, specimen.rest_current)

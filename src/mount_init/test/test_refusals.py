@@ -255,6 +255,13 @@ def test_a_ramp_that_never_reaches_the_rest_current_is_refused(specimen):
         Initialisation(dataclasses.replace(specimen, rest_current=3.0), InitParameters())
 
 
+def test_a_peak_beyond_the_limit_of_the_coil_is_refused(specimen):
+    with pytest.raises(
+        SpecimenMismatchError, match=r'peak_current \(3\.000 A\) must not exceed .*\(2\.500 A\)'
+    ):
+        Initialisation(dataclasses.replace(specimen, current_limit=2.5), InitParameters())
+
+
 def test_after_the_end_only_zero_is_answered(specimen, simulated_actuator, run_ramp):
     plant = simulated_actuator()
     initialisation = run_ramp(plant, specimen)
