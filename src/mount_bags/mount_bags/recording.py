@@ -85,7 +85,7 @@ class Recorder:
             with self._gate:
                 if self._open:
                     self._take(item)
-                elif not self.begun:
+                else:
                     self._latched[topic] = item
 
         return receive

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType, Writer
 from recorded_drive import PERIOD, START, joint_state, sample, write_drive
 from rosbags.typesys import Stores, get_typestore
@@ -235,6 +236,30 @@ def test_file_without_its_end_is_read_to_the_last_whole_chunk(drive):
     assert any('without its footer' in warning for warning in recording.warnings)
 
 
+def test_cut_between_the_indexes_of_a_chunk_loses_nothing_of_it(drive):
+    path = drive / 'drive_0.mcap'
+    content = path.read_bytes()
+    indexes = [begin for opcode, begin in records_of(content) if opcode == Opcode.MESSAGE_INDEX]
+    path.write_bytes(content[: indexes[1]])  # of three topics in the first chunk
+    recording = mount_bags.open(drive)
+    counts = [len(recording[topic]) for topic in recording]
+    assert min(counts) >= max(counts) - 1 > 0
+
+
+def test_wrong_byte_in_a_chunk_without_compression_is_noticed(tmp_path):
+    path = tmp_path / 'other.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file, compression=CompressionType.NONE)
+        writer.start('ros2', 'another')
+        writer.register_channel('/event', 'cdr', writer.register_schema(STRING, 'ros2msg', b'string data'))
+        writer.add_message(1, START, string('the text'), START)
+        writer.finish()
+    path.write_bytes(path.read_bytes().replace(b'the text', b'the test'))
+    recording = mount_bags.open(path)
+    assert len(recording['event']) == 0
+    assert any('damaged' in warning for warning in recording.warnings)
+
+
 def test_damaged_chunk_is_left_out_with_a_sentence(drive):
     path = drive / 'drive_0.mcap'
     content = bytearray(path.read_bytes())
@@ -325,15 +350,22 @@ def test_files_of_other_writers_are_read(tmp_path, compression, chunked, indexed
 def test_index_that_points_astray_is_not_believed(drive):
     path = drive / 'drive_0.mcap'
     content = bytearray(path.read_bytes())
-    position = 8
-    while position < len(content) and content[position] != 7:  # the first message index
-        position += 9 + struct.unpack_from('<Q', content, position + 1)[0]
+    position = next(begin for opcode, begin in records_of(content) if opcode == Opcode.MESSAGE_INDEX)
     struct.pack_into('<Q', content, position + 9 + 6 + 8, 12345)  # the offset of its first entry
     path.write_bytes(content)
     np.testing.assert_array_equal(mount_bags.open(drive)['displacement']['mount'], INDICES)
 
 
-@settings(deadline=None, max_examples=60)
+def records_of(content):
+    """Yield opcode and beginning of each record of a file."""
+    position = 8
+    while position + 9 <= len(content):
+        opcode, length = struct.unpack_from('<BQ', content, position)
+        yield opcode, position
+        position += 9 + length
+
+
+@settings(deadline=None, derandomize=True, max_examples=60)
 @given(st.data())
 def test_no_damage_ends_in_a_traceback(tmp_path_factory, data):
     content = bytearray(_intact(tmp_path_factory))

@@ -69,6 +69,22 @@ def test_stream_before_begin_is_dropped_and_latched_message_is_written_first(tmp
     ]
 
 
+def test_message_that_is_under_way_at_the_end_is_taken(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    receive = recorder.receiver('/displacement')
+    recorder.begin()
+    wait = recorder._ending.wait
+
+    def arrive_while_waiting(period):
+        if threading.current_thread() is threading.main_thread():
+            receive(sample(DISPLACEMENT, 7))
+        return wait(period)
+
+    recorder._ending.wait = arrive_while_waiting
+    recorder.end()
+    assert sample(DISPLACEMENT, 7) in [data for _, data, _ in messages_of(tmp_path / 'bag')]
+
+
 def test_messages_after_the_end_are_dropped(tmp_path):
     recorder = recorder_of(tmp_path / 'bag')
     receive, receive_latched = recorder.receiver('/displacement'), recorder.latched_receiver('/latched')

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_bags.stamps import StampWatch, stamp_statistics
@@ -53,6 +53,7 @@ def test_jitter_below_a_third_of_the_period_is_no_loss():
     assert (found.lost, found.duplicated, found.out_of_order) == (0, 0, 0)
 
 
+@settings(deadline=None, derandomize=True)
 @given(st.lists(st.integers(0, 200), min_size=1, max_size=100))
 def test_expected_is_the_span_and_the_counts_add_up(indices):
     expected, present, lost, duplicated, _ = counts(indices)
@@ -60,6 +61,7 @@ def test_expected_is_the_span_and_the_counts_add_up(indices):
     assert duplicated == len(indices) - len(set(indices))
 
 
+@settings(deadline=None, derandomize=True)
 @given(st.lists(st.booleans(), max_size=200), st.sets(st.integers(0, 199)), st.sets(st.integers(0, 150)))
 def test_watch_counts_the_same_while_samples_arrive(dropped, repeated, swapped):
     indices = [index for index in range(200) if index >= len(dropped) or not dropped[index]]
