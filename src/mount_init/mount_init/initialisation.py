@@ -85,8 +85,8 @@ class Initialisation:
     def __init__(self, specimen: Specimen, parameters: InitParameters):
         if parameters.peak_current > specimen.current_limit:
             raise SpecimenMismatchError(
-                f'peak_current ({parameters.peak_current:.3f} A) must not exceed current_limit of the specimen '
-                f'({specimen.current_limit:.3f} A); lower peak_current'
+                f'peak_current ({parameters.peak_current:.3f} A) must not exceed current_limit '
+                f'({specimen.current_limit:.3f} A) of the specimen; lower peak_current'
             )
         self.specimen = specimen
         self.parameters = parameters

@@ -256,9 +256,7 @@ def test_a_ramp_that_never_reaches_the_rest_current_is_refused(specimen):
 
 
 def test_a_peak_beyond_the_limit_of_the_coil_is_refused(specimen):
-    with pytest.raises(
-        SpecimenMismatchError, match=r'peak_current \(3\.000 A\) must not exceed .*\(2\.500 A\)'
-    ):
+    with pytest.raises(SpecimenMismatchError, match=r'peak_current .* must not exceed .*\(2\.500 A\)'):
         Initialisation(dataclasses.replace(specimen, current_limit=2.5), InitParameters())
 
 
