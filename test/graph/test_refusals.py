@@ -1,7 +1,17 @@
 """Bad input ends in one clear sentence and a non-zero exit code, before anything moves."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+
+from mount_bringup.command import main
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('COLUMNS', '200')
 
 
 def _csv(path, times, values):
@@ -41,11 +51,9 @@ def bad_inputs(tmp_path):
         ('slow', 'az', ('samples per second', 'is its time in seconds?')),
     ],
 )
-def test_bad_recorded_input_is_refused(command, bad_inputs, which, column, words):
-    result = command.drive(
-        '--lockstep', '--scenario', 'recorded', '--file', str(bad_inputs[which]), '--column', column
-    )
-    _expect_refusal(result, *words)
+def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words):
+    order = ('--scenario', 'recorded', '--file', str(bad_inputs[which]), '--column', column)
+    _expect_refusal(capsys, order, *words)
 
 
 @pytest.mark.parametrize(
@@ -60,23 +68,34 @@ def test_bad_recorded_input_is_refused(command, bad_inputs, which, column, words
         (('--set', 'mount_control.switch_off_level=0.0009'), ('switch_off_level (0.9 mm)', 'below')),
         (('--set', 'mount_sim.mechanics.contact_gap=0.0006'), ('contact_gap (600.0 um)', 'rest_gap')),
         (('--set', 'mount_sim.fault.kind=flat_tyre'), ("fault 'flat_tyre' is unknown",)),
-        (('--set', 'mount_driver.channel=127.0.0.1'), ('multicast',)),
-        (('--set', 'mount_driver.interface=socketcan'), ('CAN interface', 'does not open')),
         (('--domain', '400'), ("ROS domain '400'", '0 .. 101')),
     ],
 )
-def test_impossible_orders_are_refused(command, options, words):
-    _expect_refusal(command.drive('--lockstep', '--duration', '1', *options), *words)
+def test_impossible_orders_are_refused(capsys, options, words):
+    _expect_refusal(capsys, options, *words)
 
 
-def test_a_folder_in_use_is_refused(command, tmp_path):
-    (tmp_path / 'run_1').mkdir()
-    (tmp_path / 'run_1' / 'precious').touch()
-    _expect_refusal(command.drive('--core'), 'exists and is not empty', '--out')
+def test_a_folder_in_use_is_refused(capsys, tmp_path):
+    (tmp_path / 'precious').touch()
+    _expect_refusal(capsys, ('--out', str(tmp_path)), 'exists and is not empty', '--out')
 
 
-def _expect_refusal(result, *words):
-    assert result.code not in (0, 130), result.output
-    assert 'Traceback' not in result.output
+def test_a_can_interface_that_does_not_open_is_refused(command):
+    result = command.drive('--duration', '1', '--set', 'mount_driver.interface=socketcan')
+    assert result.code == 1
+    _expect_words(result.output, "CAN interface 'socketcan'", 'does not open', 'ip link set')
+
+
+def _expect_refusal(capsys, options, *words):
+    """Run the command in this process: it must refuse before it starts another."""
+    with pytest.raises(SystemExit) as ending:
+        main(['drive', *options])
+    assert ending.value.code not in (0, None, 130)
+    assert not Path('bags').exists(), 'a refused order must leave nothing behind'
+    _expect_words(capsys.readouterr().err, *words)
+
+
+def _expect_words(output, *words):
+    assert 'Traceback' not in output
     for word in words:
-        assert word in ' '.join(result.output.split()), result.output
+        assert word in ' '.join(output.split()), output

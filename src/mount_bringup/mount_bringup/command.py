@@ -78,7 +78,6 @@ def drive(
     """Drive the simulated car through the whole graph, record it and print what happened."""
     from mount_bringup import drive as driving
     from mount_bringup.domain import chosen_domain
-    from mount_bringup.run_folder import make_run_folder
     from mount_bringup.settings import checked_settings
     from mount_bringup.summary import write_json
 
@@ -100,10 +99,10 @@ def drive(
     parameters = checked_settings(parameters)
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, on_full)
+    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, on_full, out)
     console = Console()
-    folder = make_run_folder(out, scenario)
-    outcome = driving.drive(order, folder, console)
+    outcome = driving.drive(order, console)
+    folder = outcome.folder
     if json_file is not None:
         write_json(outcome.figures, json_file)
     console.print(f'figure     {folder.figure}\nrecording  {folder.recording}', highlight=False)
@@ -121,7 +120,7 @@ def prepare() -> None:
     console = Console()
     with console.status('compiling the laws for this machine (once, about half a minute)'):
         for scenario in ('bench', 'motorway'):
-            sim = {'scenario': scenario, 'timeline.duration': 0.5, 'motorway.gap_time': 0.1}
+            sim = {'scenario': scenario, 'timeline.duration': 0.5}
             run_core({'mount_sim': sim}, lambda *_: None)
 
 
@@ -139,13 +138,13 @@ def _parameters(settings: list[str]) -> dict[str, dict[str, Any]]:
     return parameters
 
 
-def main() -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Run the command; every refusal is one sentence and a non-zero exit code."""
     prepare_environment()
     from mount_bringup.supervisor import GraphError, Interrupted
 
     try:
-        app()
+        app(args=arguments)
     except (KeyboardInterrupt, Interrupted):
         Console(stderr=True).print('interrupted; the coil is at 0 A')
         sys.exit(_INTERRUPTED)

@@ -10,7 +10,7 @@ from typing import Any
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
-from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_control.parameters import SAMPLE_TIME, ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_init.initialisation import OFF, Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
@@ -27,7 +27,7 @@ Parameters = Mapping[str, Mapping[str, Any]]
 
 def control_parameters(parameters: Parameters) -> ControlParameters:
     """Return the controller's parameters of a run."""
-    return with_flattened(ControlParameters(), parameters.get('mount_control', {}))
+    return checked_parameters(with_flattened(ControlParameters(), parameters.get('mount_control', {})))
 
 
 def chosen_damper(parameters: Parameters) -> DamperCurve:
@@ -45,10 +45,13 @@ class CoreChain:
     """What mount_init and mount_control do with the samples of one run."""
 
     def __init__(self, parameters: Parameters):
-        self._parameters = parameters
         init_parameters = with_flattened(InitParameters(), parameters.get('mount_init', {}))
         self._initialisation = Initialisation(chosen_specimen(parameters), init_parameters)
+        control = parameters.get('mount_control', {})
         self._control = control_parameters(parameters)
+        self._damper = chosen_damper(parameters)
+        self._friction = with_flattened(FrictionCoefficients(), control, 'friction')
+        self._contact = with_flattened(FrictionContact(), control, 'contact')
         self._watch = SampleWatch(SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range)
         self.result: InitialisationResult | None = None
         self.activation = 0
@@ -81,11 +84,5 @@ class CoreChain:
         return controller.step(displacement, missing)
 
     def _make_controller(self, result: InitialisationResult) -> Controller:
-        values = self._parameters.get('mount_control', {})
-        return Controller(
-            self._control,
-            chosen_damper(self._parameters),
-            with_flattened(FrictionCoefficients(), values, 'friction'),
-            with_flattened(FrictionContact(), values, 'contact'),
-            resample(*result.table, result.offset_current, self._control.highest_current),
-        )
+        table = resample(*result.table, result.offset_current, self._control.highest_current)
+        return Controller(self._control, self._damper, self._friction, self._contact, table)

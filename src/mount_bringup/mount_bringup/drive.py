@@ -1,5 +1,6 @@
 """One simulated drive from the first node to the last figure."""
 
+import math
 import platform
 import signal
 import time
@@ -21,14 +22,13 @@ from mount_bringup.domain import domain_lock
 from mount_bringup.evaluation import load_drive
 from mount_bringup.figure import draw_drive
 from mount_bringup.graph import SIM, SIMULATED, GraphSettings
-from mount_bringup.run_folder import RunFolder
+from mount_bringup.preflight import preflight
+from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import print_summary, summarise, write_json
 from mount_bringup.supervisor import Supervisor, session_text
-from mount_models.quantity import with_flattened
 from mount_ros.topics import SESSION, TOPICS, Topic
 from mount_sim.diagnosis import FINISHED
-from mount_sim.parameters import SimParameters
-from mount_sim.scenario import build_excitation
+from mount_sim.excitation import Excitation
 
 _FIRST_PORT = 43113  # UDP port of domain 0; each domain has its own CAN bus
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
@@ -44,6 +44,7 @@ class DriveOrder:
     domain: int = 0
     namespace: str = ''
     on_full: str = 'stop'
+    out: Path | None = None
 
 
 @dataclass
@@ -51,20 +52,22 @@ class DriveOutcome:
     """What came of it: the figures, and a sentence for each thing that was not as it should be."""
 
     figures: dict[str, Any]
+    folder: RunFolder
     complaints: list[str] = field(default_factory=list)
 
 
-def drive(order: DriveOrder, folder: RunFolder, console: Console) -> DriveOutcome:
+def drive(order: DriveOrder, console: Console) -> DriveOutcome:
     """Drive, record, evaluate; raises `Interrupted`, `GraphError` or a `ValueError` with the reason."""
-    build_excitation(_sim_parameters(order))  # bad input is refused before any process is started
+    excitation = preflight(order.parameters)
+    folder = make_run_folder(order.out, order.scenario)
     complaints: list[str] = []
     if order.mode == 'core':
         run = _drive_in_core(order, folder, console)
     else:
-        run = _drive_graph(order, folder, console, complaints)
+        run = _drive_graph(order, excitation, folder, console, complaints)
     recording = open_recording(folder.recording)
     complaints += recording.warnings
-    return DriveOutcome(_evaluate(order, folder, recording, run, console), complaints)
+    return DriveOutcome(_evaluate(order, folder, recording, run, console), folder, complaints)
 
 
 def _evaluate(
@@ -81,7 +84,7 @@ def _evaluate(
 
 
 def _drive_graph(
-    order: DriveOrder, folder: RunFolder, console: Console, complaints: list[str]
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
 ) -> dict[str, Any]:
     settings = GraphSettings(order.namespace, order.domain, _node_parameters(order, folder))
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
@@ -89,7 +92,9 @@ def _drive_graph(
         try:
             with console.status('starting') as status:
                 supervisor.start(lambda all_parameters: _session(order, all_parameters), status.update)
-            _watch_drive(order, supervisor, console)
+            duration = excitation.start + excitation.duration
+            limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
+            _watch_drive(order, supervisor, limit, console)
             figures = supervisor.figures(SIM)
         finally:
             complaints += supervisor.stop()
@@ -104,15 +109,13 @@ def _drive_graph(
     }
 
 
-def _watch_drive(order: DriveOrder, supervisor: Supervisor, console: Console) -> None:
-    total = float(supervisor.figures(SIM).get('samples_of_run', 0)) or 1.0
-    limit = _SLACK + (1e9 if order.mode == 'lock-step' else _duration(order))
+def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, console: Console) -> None:
     with _progress(console) as progress:
         task = progress.add_task(f'driving ({order.scenario})', total=1.0)
 
         def finished() -> bool:
             figures = supervisor.figures(SIM)
-            share = int(figures.get('samples', 0)) / float(figures.get('samples_of_run', total))
+            share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
             progress.update(task, completed=share)
             return figures.get('sentence') == FINISHED
 
@@ -165,15 +168,6 @@ def _interrupting(supervisor: Supervisor) -> Iterator[None]:
 def _progress(console: Console) -> Progress:
     columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     return Progress(*columns, console=console)
-
-
-def _sim_parameters(order: DriveOrder) -> SimParameters:
-    return with_flattened(SimParameters(), order.parameters.get('mount_sim', {}))
-
-
-def _duration(order: DriveOrder) -> float:
-    excitation = build_excitation(_sim_parameters(order))
-    return excitation.start + excitation.duration
 
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:

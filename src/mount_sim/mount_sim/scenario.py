@@ -43,7 +43,10 @@ class MotorwayScenario(NamedTuple):
     gap_length: Annotated[
         float, Quantity('m', 'effective length of the gap, after the tyre', 0.1, 5.0, 'chosen')
     ] = 1.0
-    gap_time: Annotated[float, Quantity('s', 'when the wheel meets the gap', 0.0, 3600.0, 'chosen')] = 5.0
+    gap_time: Annotated[
+        float,
+        Quantity('s', 'when the wheel meets the gap; 0: after a third of the drive', 0.0, 3600.0, 'chosen'),
+    ] = 0.0
 
 
 class RecordedScenario(NamedTuple):
@@ -104,15 +107,16 @@ def _bench(scenarios: Scenarios) -> Excitation:
 def _motorway(scenarios: Scenarios) -> Excitation:
     timeline, motorway = scenarios.timeline, scenarios.motorway
     duration = timeline.duration or _DEFAULT_DURATION
-    if motorway.gap_depth > 0.0 and motorway.gap_time >= duration:
+    gap_time = motorway.gap_time or duration / 3.0
+    if motorway.gap_depth > 0.0 and gap_time >= duration:
         raise ParameterError(
-            f'gap_time ({motorway.gap_time:g} s) must lie before the end of the drive ({duration:g} s); '
+            f'motorway.gap_time ({gap_time:g} s) must lie before the end of the drive ({duration:g} s); '
             'make the drive longer, the gap earlier, or gap_depth 0'
         )
     road = RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=scenarios.seed)
     gap = Gap(
         depth=motorway.gap_depth,
-        position=motorway.speed * motorway.gap_time,
+        position=motorway.speed * gap_time,
         length=motorway.gap_length,
         speed=motorway.speed,
     )

@@ -1,0 +1,21 @@
+"""Refuses an order that a node would refuse, before any node is started."""
+
+from mount_bringup.core_chain import CoreChain, Parameters
+from mount_driver.parameters import DriverParameters
+from mount_models.closing import checked_closing
+from mount_models.quantity import with_flattened
+from mount_sim.excitation import Excitation
+from mount_sim.faults import Fault
+from mount_sim.parameters import SimParameters
+from mount_sim.scenario import build_excitation
+
+
+def preflight(parameters: Parameters) -> Excitation:
+    """Return the excitation of a run, or raise the `ValueError` that says what is wrong with the order."""
+    sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
+    excitation = build_excitation(sim)
+    Fault(sim.fault)
+    checked_closing(sim.mechanics, sim.actuator)
+    with_flattened(DriverParameters(), parameters.get('mount_driver', {}))
+    CoreChain(parameters)
+    return excitation
