@@ -1,4 +1,4 @@
-"""Parameter sets as records in plain bytes: the same field names in compiled code, handed over as one pointer.
+"""Parameter sets as records in plain bytes: the same names in compiled code, handed over as one pointer.
 
 A named tuple is taken apart number by number at each call of a compiled function; for a law with fifty
 parameters that costs more than the law. Bytes cost nothing: compiled code looks at them through
