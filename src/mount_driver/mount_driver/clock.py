@@ -4,6 +4,8 @@
 `stamp(microseconds, received_monotonic_ns) -> ns` and count what interrupted them.
 """
 
+import math
+
 _WRAP = 1 << 32  # us: the counter wraps after 71.6 min
 _NS = 1000  # ns per us
 
@@ -77,8 +79,9 @@ class ElectronicsClock:
         self._stamp = 0
         self._elapsed = 0  # us since the beginning of the block
         self._base = 0  # stamp at the beginning of the block
+        self._correction = 0.0  # of the slope in this block, beside the drift
         self._slope = 0.0  # ns per us beyond 1000
-        self._earliest = 0  # least lateness in the block, ns
+        self._earliest = 0.0  # ns, least lateness in the block, as it were without the correction
         self._late_blocks = 0
 
     def stamp(self, microseconds: int, received_monotonic_ns: int) -> int:
@@ -92,11 +95,11 @@ class ElectronicsClock:
         elif step:
             self._elapsed += step
             self._stamp = self._base + self._elapsed * _NS + round(self._elapsed * self._slope)
-            lateness = arrival - self._stamp
+            lateness = arrival - self._stamp + self._elapsed * self._correction * _NS
             if lateness < self._earliest:
                 self._earliest = lateness
             if self._elapsed >= _BLOCK_US:
-                self._end_block(arrival)
+                self._end_block()
         self._microseconds = microseconds
         self._received = received_monotonic_ns
         return self._stamp
@@ -104,25 +107,27 @@ class ElectronicsClock:
     def _begin(self, arrival: int) -> None:
         self._stamp = max(arrival, self._stamp + _SPACING_NS) if self._running else arrival
         self._running = True
-        self._slope = self.drift * _NS
         self._late_blocks = 0
-        self._begin_block()
+        self._begin_block(0.0)
 
-    def _begin_block(self) -> None:
+    def _begin_block(self, correction: float) -> None:
+        self._correction = correction
+        self._slope = (self.drift + correction) * _NS
         self._base = self._stamp
         self._elapsed = 0
-        self._earliest = 1 << 62
+        self._earliest = math.inf
 
-    def _end_block(self, arrival: int) -> None:
-        error = self._earliest / (_BLOCK_US * _NS)  # as a share of the block
-        if self._earliest > _TRUSTED_NS:
+    def _end_block(self) -> None:
+        earliest = self._earliest - self._elapsed * self._correction * _NS  # what is left of it now
+        error = earliest / (_BLOCK_US * _NS)  # as a slope over the next block
+        correction = 0.0
+        if earliest > _TRUSTED_NS:
             self._late_blocks += 1
             if self._late_blocks >= _BLOCKS_TO_BELIEVE:
                 self.remappings += 1
-                self._stamp = max(self._stamp, self._stamp + self._earliest)
+                self._stamp += round(earliest)
                 self._late_blocks = 0
-            correction = 0.0
-        elif self._earliest < -_TRUSTED_NS:
+        elif earliest < -_TRUSTED_NS:
             # Certain, because no frame is early: the first frame of the mapping was late.
             self._late_blocks = 0
             correction = max(_PHASE_GAIN * error, -_FAST_SLEW_LIMIT)
@@ -132,8 +137,7 @@ class ElectronicsClock:
             self.drift = min(max(drift, -_DRIFT_LIMIT), _DRIFT_LIMIT)
             limit = _SLEW_LIMIT - abs(self.drift)
             correction = min(max(_PHASE_GAIN * error, -limit), limit)
-        self._slope = (self.drift + correction) * _NS
-        self._begin_block()
+        self._begin_block(correction)
 
     def _report_jump(self, step: int, received: int) -> None:
         waited = (received - self._received) // _NS

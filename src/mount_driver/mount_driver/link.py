@@ -121,7 +121,6 @@ class Link:
         self.setpoints += 1
         self._answered_stamp = stamp
         self._fed = now
-        self._off_sent = -1
         self._last_setpoint = Setpoint(current, counter, True)
         return self._last_setpoint
 
