@@ -217,11 +217,12 @@ class McapFile:
             f'{self.path.name} ends without its footer, as after a crash: read up to byte {position}, '
             f'{len(self._chunks)} whole chunks'
         )
-        if self._chunks:
-            self._chunks[-1].indexes = {}  # perhaps not all of them were written
 
     def _find_hidden_channels(self) -> None:
-        """Look into the chunks where the file has no summary that repeats its channels."""
+        """Look into the chunks where the file has no summary that repeats its channels.
+
+        That also replaces the indexes of a last chunk, of which a crash may have left only some.
+        """
         indexed = {channel for chunk in self._chunks for channel in chunk.indexes}
         if self.complete and self.channels and indexed <= self.channels.keys():
             return

@@ -347,11 +347,16 @@ def test_files_of_other_writers_are_read(tmp_path, compression, chunked, indexed
         recording['broken'].message(0)
 
 
-def test_index_that_points_astray_is_not_believed(drive):
+# An offset beyond the head of a message lands where its bytes could pass for a record of channel 1.
+@pytest.mark.parametrize(
+    'astray', [lambda offset: 12345, lambda offset: offset + 31 + 3, lambda offset: 1 << 40]
+)
+def test_index_that_points_astray_is_not_believed(drive, astray):
     path = drive / 'drive_0.mcap'
     content = bytearray(path.read_bytes())
     position = next(begin for opcode, begin in records_of(content) if opcode == Opcode.MESSAGE_INDEX)
-    struct.pack_into('<Q', content, position + 9 + 6 + 8, 12345)  # the offset of its first entry
+    place = position + 9 + 6 + 8  # of the offset of its first entry
+    struct.pack_into('<Q', content, place, astray(*struct.unpack_from('<Q', content, place)))
     path.write_bytes(content)
     np.testing.assert_array_equal(mount_bags.open(drive)['displacement']['mount'], INDICES)
 

@@ -26,7 +26,7 @@ from rosbags.typesys import Stores, get_typestore
 from small_disk import small_disk
 
 from mount_bags.metadata import read_metadata
-from mount_bags.offered_qos import OfferedQos, qos_text, read_qos
+from mount_bags.offered_qos import OfferedQos, QosError, qos_text, read_qos
 from mount_bags.schemas import SchemaError, schema_text, type_hash
 from mount_bags.writer import BagWriter, RecordingError
 from mount_ros.topics import DISPLACEMENT, TOPICS
@@ -243,6 +243,25 @@ def test_whatever_was_written_is_read(tmp_path_factory, names, messages, chunk_s
 def test_offered_qos_survives_its_text(history, depth, deadline):
     offers = (OfferedQos(history=history, depth=depth, deadline=deadline), OfferedQos())
     assert read_qos(qos_text(offers)) == offers
+
+
+def test_qos_of_old_bags_stands_in_numbers():
+    time = {'sec': 0, 'nsec': 5}
+    numbers = {
+        'history': 3,
+        'depth': 0,
+        'reliability': 2,
+        'durability': 1,
+        'deadline': time,
+        'lifespan': time,
+        'liveliness': 1,
+        'liveliness_lease_duration': time,
+        'avoid_ros_namespace_conventions': False,
+    }
+    offer = OfferedQos('unknown', 0, 'best_effort', 'transient_local', 5, 5, 'automatic', 5, False)
+    assert read_qos(yaml.safe_dump([numbers])) == (offer,)
+    with pytest.raises(QosError, match='policy 9'):
+        read_qos([{**numbers, 'history': 9}])
 
 
 def test_existing_folder_is_refused(tmp_path):
