@@ -5,7 +5,7 @@ name = 'mount_ros'
 setup(
     name=name,
     version='0.1.0',
-    description='What every node of the engine mount shares: topic registry, messages, parameters, safe lifecycle.',
+    description='What all nodes of the engine mount share: topics, messages, parameters, safe lifecycle.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test']),
     package_data={name: ['dds/*.xml']},

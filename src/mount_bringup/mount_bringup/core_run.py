@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from geometry_msgs.msg import WrenchStamped
-from rclpy.serialization import serialize_message
 
 from mount_bringup.core_chain import CoreChain, Parameters
 from mount_driver.quantisation import (
@@ -19,6 +18,7 @@ from mount_driver.quantisation import (
 from mount_init.initialisation import InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_ros import topics
+from mount_ros.cdr import serialised
 from mount_ros.force_table_message import to_message
 from mount_ros.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import Topic
@@ -125,5 +125,5 @@ class _Messages:
     def write_result(self, stamp: int, result: InitialisationResult) -> None:
         numbers = [getattr(result, name) for name in self._air_gap.names]
         self._write(topics.AIR_GAP, self._air_gap.pack(stamp, numbers), stamp)
-        table = serialize_message(to_message(stamp, result.table))
+        table = serialised(to_message(stamp, result.table))
         self._write(topics.CURRENT_FORCE_TABLE, table, stamp)

@@ -14,6 +14,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from std_msgs.msg import String
 
 from mount_bags.reading import Recording, open_recording
 from mount_bags.writer import BagWriter
@@ -27,6 +28,7 @@ from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import print_summary, summarise, write_json
 from mount_bringup.supervisor import Supervisor, session_text
+from mount_ros.cdr import serialised
 from mount_ros.topics import SESSION, TOPICS, Topic
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
@@ -129,7 +131,7 @@ def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> di
     for topic in TOPICS:
         writer.add_topic(_full_name(topic, prefix), topic.type)
     names = {topic.name: _full_name(topic, prefix) for topic in TOPICS}
-    session = _session_message(_session(order, order.parameters))
+    session = serialised(String(data=_session(order, order.parameters)))
     begin = time.time_ns()
     try:
         writer.write(names[SESSION.name], session, begin)
@@ -209,13 +211,6 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             found[name] = 'unknown'  # installed from Debian packages without metadata
     return found
-
-
-def _session_message(text: str) -> bytes:
-    from rclpy.serialization import serialize_message
-    from std_msgs.msg import String
-
-    return serialize_message(String(data=text))
 
 
 def _full_name(topic: Topic, prefix: str) -> str:

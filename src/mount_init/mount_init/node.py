@@ -8,6 +8,7 @@ from mount_init.initialisation import Initialisation, InitialisationResult, load
 from mount_init.parameters import InitParameters
 from mount_models.specimen import default_specimen, load_specimen
 from mount_ros import topics
+from mount_ros.cdr import serialised
 from mount_ros.diagnostics import Verdict
 from mount_ros.force_table_message import to_message
 from mount_ros.lifecycle import SafeLifecycleNode
@@ -79,7 +80,7 @@ class MountInit(SafeLifecycleNode):
         numbers = [getattr(result, name) for name in self._air_gap.names]
         table = to_message(stamp, result.table)
         self._air_gap_publisher.publish(self._air_gap.pack(stamp, numbers))
-        self._table_publisher.publish(table)
+        self._table_publisher.publish(serialised(table))
         self.get_logger().info(
             f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
             f'offset current {result.offset_current:.3f} A'

@@ -11,7 +11,7 @@ def message_class(name: str) -> type:
     package, _, kind = name.partition('/msg/')
     try:
         return getattr(importlib.import_module(f'{package}.msg'), kind)
-    except (ImportError, AttributeError, ValueError):
+    except (ImportError, AttributeError, TypeError, ValueError):
         raise ValueError(f'message type {name!r} is not installed; is its package missing?') from None
 
 

@@ -1,9 +1,8 @@
 """Named scalars as the CDR bytes of a `sensor_msgs/JointState`, written and read in place.
 
-On the 1 kHz path the layout of these messages never changes: the same names, the same lengths. So
-the bytes are made once by the middleware's own serialiser and afterwards only the stamp and the
-numbers are replaced. A message of another layout (a foreign publisher) is read by the general
-deserialiser, by names.
+On the 1 kHz path the layout of these messages never changes: the same names, the same lengths. So the
+bytes are made once and afterwards only the stamp and the numbers are replaced. A message of another
+layout (a foreign publisher) is read by the general deserialiser, by names.
 """
 
 import functools
@@ -12,9 +11,10 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from mount_ros.cdr import serialised
 from mount_ros.topics import Topic
 
 _STAMP = struct.Struct('<iI')
@@ -103,7 +103,7 @@ class OneNumberLayout:
         *owners, field = path.split('.')
         owner = functools.reduce(getattr, owners, message)
         setattr(owner, field, mark[0])
-        self._template = bytearray(serialize_message(message))
+        self._template = bytearray(serialised(message))
         self._number = struct.Struct('<d')
         self._offset = _offset_of(self._template, mark)
 
@@ -124,7 +124,7 @@ def _template(topic: Topic) -> bytes:
     message = JointState(name=list(topic.names), position=_marks(count, 0))
     if topic.has_derivatives:
         message.velocity = _marks(count, count)
-    return serialize_message(message)
+    return serialised(message)
 
 
 def _offset_of(template: bytearray, numbers: list[float]) -> int:

@@ -1,0 +1,80 @@
+"""Fixed-layout messages against the general deserialiser."""
+
+import math
+
+import pytest
+from geometry_msgs.msg import WrenchStamped
+from hypothesis import given
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+
+from mount_ros.scalars import OneNumberLayout, ScalarsError, ScalarsLayout, stamp_of
+from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, TOPICS
+
+STAMP = 1_763_680_000_123_456_789
+stamps = st.integers(0, 2**31 * 1_000_000_000 - 1)
+floats = st.floats(allow_nan=False)
+
+
+@given(stamp=stamps, numbers=st.tuples(floats, floats), slopes=st.tuples(floats, floats))
+def test_packed_messages_are_what_the_middleware_reads(stamp, numbers, slopes):
+    message = deserialize_message(ScalarsLayout(COIL_RIPPLE).pack(stamp, numbers, slopes), JointState)
+    assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
+    assert tuple(message.name) == COIL_RIPPLE.names
+    assert (tuple(message.position), tuple(message.velocity)) == (numbers, slopes)
+
+
+@given(stamp=stamps, numbers=st.tuples(floats, floats), slopes=st.tuples(floats, floats))
+def test_unpack_returns_what_was_packed(stamp, numbers, slopes):
+    layout = ScalarsLayout(COIL_RIPPLE)
+    assert layout.unpack(layout.pack(stamp, numbers, slopes)) == (stamp, numbers, slopes)
+
+
+def test_two_layouts_of_a_topic_understand_each_other_without_the_slow_path(monkeypatch):
+    raw = ScalarsLayout(DISPLACEMENT).pack(STAMP, (0.001,))
+    reader = ScalarsLayout(DISPLACEMENT)
+    monkeypatch.setattr(reader, '_unpack_foreign', lambda _: pytest.fail('read as a foreign message'))
+    assert reader.unpack(raw) == (STAMP, (0.001,), ())
+
+
+def test_a_record_is_packed_in_the_order_of_the_names():
+    layout = ScalarsLayout(CONTROL_TRACE)
+    numbers = tuple(float(place) for place in range(len(layout.names)))
+    message = ScalarsLayout(CONTROL_TRACE).pack(STAMP, numbers)
+    assert message == layout.pack_record(STAMP, message[layout._position_offset :][: 8 * len(numbers)])
+
+
+def test_a_foreign_order_of_names_is_read_by_name():
+    message = JointState(name=['flux_density', 'other', 'coil_current'], position=[1.0, 2.0, 3.0])
+    message.velocity = [4.0, 5.0, 6.0]
+    message.header.frame_id = 'somewhere'
+    message.header.stamp.sec = 7
+    stamp, positions, velocities = ScalarsLayout(COIL_RIPPLE).unpack(serialize_message(message))
+    assert (stamp, positions, velocities) == (7_000_000_000, (3.0, 1.0), (6.0, 4.0))
+
+
+def test_missing_velocities_are_unknown_and_not_zero():
+    message = JointState(name=['coil_current', 'flux_density'], position=[1.0, math.nan])
+    _, _, velocities = ScalarsLayout(COIL_RIPPLE).unpack(serialize_message(message))
+    assert all(math.isnan(value) for value in velocities)
+
+
+def test_a_message_without_the_declared_name_is_refused():
+    message = JointState(name=['throttle'], position=[1.0])
+    with pytest.raises(ScalarsError, match=r"displacement: the message names \['throttle'\]"):
+        ScalarsLayout(DISPLACEMENT).unpack(serialize_message(message))
+
+
+@given(stamp=stamps, number=floats)
+def test_one_number_layouts_change_stamp_and_number_only(stamp, number):
+    raw = OneNumberLayout(WrenchStamped(), 'wrench.force.z').pack(stamp, number)
+    message = deserialize_message(raw, WrenchStamped)
+    assert (stamp_of(raw), message.wrench.force.z) == (stamp, number)
+    assert (message.wrench.force.x, message.wrench.torque.z) == (0.0, 0.0)
+
+
+def test_topic_names_are_unique_and_relative_but_for_diagnostics():
+    names = [topic.name for topic in TOPICS]
+    assert len(set(names)) == len(names)
+    assert [name for name in names if name.startswith('/')] == ['/diagnostics']
