@@ -13,7 +13,7 @@ from mount_bags.diagnosis import OnFull, RecorderState, judge
 from mount_bags.offered_qos import OfferedQos
 from mount_bags.recording import Recorder
 from mount_bags.writer import BagWriter, RecordingError
-from mount_ros.data_path import DataPath
+from mount_ros.collector import Collector
 from mount_ros.diagnostics import Verdict
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.process import run_node
@@ -50,11 +50,10 @@ class MountRecorder(SafeLifecycleNode):
         self._writer = BagWriter(Path(uri).expanduser().absolute())
         self._recorder = Recorder(self._writer)
         self._announced_failure = ''
-        path = self.open_data_path()
+        collector = self.open_collector()
         for entry in topics:
-            self._record(path, entry)
-        self._subscriptions_by_topic = {entry.topic_name: entry for entry in path.node.subscriptions}
-        path.start()
+            self._record(collector, entry)
+        collector.start()
 
     def activate(self) -> None:
         self._present_recorder().begin()
@@ -94,14 +93,15 @@ class MountRecorder(SafeLifecycleNode):
         state = RecorderState(str(folder), figures, publishers, recorder.watches, free, rate)
         return judge(state, self._on_full)
 
-    def _record(self, path: DataPath, entry: Topic) -> None:
+    def _record(self, collector: Collector, entry: Topic) -> None:
         writer, recorder = self._present_writer(), self._present_recorder()
-        name = path.node.resolve_topic_name(entry.name)
-        writer.add_topic(name, entry.type, partial(_offers, path, name))
+        name = collector.node.resolve_topic_name(entry.name)
+        writer.add_topic(name, entry.type, partial(_offers, collector, name))
         if entry.delivery is Delivery.STREAM:
             recorder.watch(name, entry.rate, stamp_of)
         latched = entry.delivery is Delivery.LATCHED
-        path.subscribe_all(entry, recorder.latched_receiver(name) if latched else recorder.receiver(name))
+        receive = recorder.latched_receiver(name) if latched else recorder.receiver(name)
+        self._subscriptions_by_topic[name] = collector.collect(entry, receive)
 
     def _present_writer(self) -> BagWriter:
         if self._writer is None:
@@ -133,9 +133,11 @@ def _on_full(word: str) -> OnFull:
         raise RecordingError(f'on_full must be stop or continue; instead received {word!r}') from None
 
 
-def _offers(path: DataPath, topic_name: str) -> list[OfferedQos]:
+def _offers(collector: Collector, topic_name: str) -> list[OfferedQos]:
     try:
-        return [_offer(entry.qos_profile) for entry in path.node.get_publishers_info_by_topic(topic_name)]
+        return [
+            _offer(entry.qos_profile) for entry in collector.node.get_publishers_info_by_topic(topic_name)
+        ]
     except RuntimeError:  # rclpy's errors of a context that is already shut down
         return []
 

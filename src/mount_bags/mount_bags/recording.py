@@ -19,7 +19,10 @@ _FLUSH_PERIOD = 1.0  # s, chosen: the same where messages are rare
 _QUIET_PERIOD = 0.05  # s, chosen: after the last publisher stopped, so long may a message be under way
 _SETTLE_LIMIT = 0.5  # s, chosen
 
-Receive = Callable[[bytes], None]
+Receive = Callable[[bytes, int, int], None]
+"""Takes (serialised message, time of arrival ns, time of sending ns)."""
+
+_Item = tuple[str, bytes, int, int]  # topic, message, times of arrival and of sending
 
 
 @dataclass(frozen=True)
@@ -47,18 +50,16 @@ class Recorder:
         writer: BagWriter,
         *,
         memory_limit: int = MEMORY_LIMIT,
-        clock: Callable[[], int] = time.time_ns,
     ):
         self.watches: dict[str, StampWatch] = {}
         self.begun = False
         self._writer = writer
         self._memory_limit = memory_limit
-        self._clock = clock
         self._stamp_of: dict[str, Callable[[bytes], int]] = {}
-        self._queue: deque[tuple[str, bytes, int]] = deque()
+        self._queue: deque[_Item] = deque()
         self._open = False
         self._gate = threading.Lock()
-        self._latched: dict[str, tuple[str, bytes, int]] = {}
+        self._latched: dict[str, _Item] = {}
         self._received = 0
         self._received_bytes = 0  # changed by the receiving thread alone
         self._drained_bytes = 0  # changed by the writing thread alone
@@ -71,17 +72,17 @@ class Recorder:
     def receiver(self, topic: str) -> Receive:
         """Return the function that takes the messages of `topic`; before `begin` it drops them."""
 
-        def receive(raw: bytes) -> None:
+        def receive(raw: bytes, received: int, sent: int) -> None:
             if self._open:
-                self._take((topic, raw, self._clock()))
+                self._take((topic, raw, received, sent))
 
         return receive
 
     def latched_receiver(self, topic: str) -> Receive:
         """Return the same for a latched topic: the last message before `begin` is kept for it."""
 
-        def receive(raw: bytes) -> None:
-            item = (topic, raw, self._clock())
+        def receive(raw: bytes, received: int, sent: int) -> None:
+            item = (topic, raw, received, sent)
             with self._gate:
                 if self._open:
                     self._take(item)
@@ -136,7 +137,7 @@ class Recorder:
             failure=self._failure,
         )
 
-    def _take(self, item: tuple[str, bytes, int]) -> None:
+    def _take(self, item: _Item) -> None:
         self._received += 1
         size = len(item[1])
         if self._received_bytes - self._drained_bytes + size > self._memory_limit:
@@ -165,10 +166,10 @@ class Recorder:
     def _write_queued(self) -> None:
         queue, write, watches, stamp_of = self._queue, self._writer.write, self.watches, self._stamp_of
         for _ in range(len(queue)):
-            topic, raw, receive_time = queue.popleft()
+            topic, raw, received, sent = queue.popleft()
             self._drained_bytes += len(raw)
             self._handed += 1
-            write(topic, raw, receive_time)
+            write(topic, raw, received, sent)
             if topic in watches:
                 watches[topic].add(stamp_of[topic](raw))
 

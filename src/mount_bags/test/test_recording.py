@@ -1,5 +1,6 @@
 """The queue between the receiving and the writing thread, and the recorder's verdict on itself."""
 
+import itertools
 import threading
 
 import pytest
@@ -17,12 +18,26 @@ from mount_ros.topics import DISPLACEMENT
 STRING = 'std_msgs/msg/String'
 
 
-def recorder_of(folder, clock=None, memory_limit=1 << 20, **options):
+def recorder_of(folder, memory_limit=1 << 20, **options):
     writer = BagWriter(folder, **options)
     writer.add_topic('/displacement', DISPLACEMENT.type)
     writer.add_topic('/latched', STRING)
-    times = iter(range(START, START + 10**9))
-    return Recorder(writer, memory_limit=memory_limit, clock=clock or (lambda: next(times)))
+    return Recorder(writer, memory_limit=memory_limit)
+
+
+@pytest.fixture
+def clocked():
+    """Return a function that makes a receiver take one message per nanosecond."""
+    times = itertools.count(START)
+
+    def clock(receive):
+        def receive_now(raw):
+            now = next(times)
+            receive(raw, now, now)
+
+        return receive_now
+
+    return clock
 
 
 def messages_of(folder):
@@ -39,9 +54,9 @@ def verdict_of(recorder, on_full=OnFull.STOP, **state):
     return judge(RecorderState('/data/bag', recorder.figures(), watches=recorder.watches, **state), on_full)
 
 
-def test_every_message_between_begin_and_end_is_written(tmp_path):
+def test_every_message_between_begin_and_end_is_written(tmp_path, clocked):
     recorder = recorder_of(tmp_path / 'bag')
-    receive = recorder.receiver('/displacement')
+    receive = clocked(recorder.receiver('/displacement'))
     recorder.begin()
     for index in range(5000):
         receive(sample(DISPLACEMENT, index))
@@ -52,9 +67,10 @@ def test_every_message_between_begin_and_end_is_written(tmp_path):
     assert recorder.figures().lost == 0
 
 
-def test_stream_before_begin_is_dropped_and_latched_message_is_written_first(tmp_path):
+def test_stream_before_begin_is_dropped_and_latched_message_is_written_first(tmp_path, clocked):
     recorder = recorder_of(tmp_path / 'bag')
-    receive, receive_latched = recorder.receiver('/displacement'), recorder.latched_receiver('/latched')
+    receive = clocked(recorder.receiver('/displacement'))
+    receive_latched = clocked(recorder.latched_receiver('/latched'))
     receive_latched(b'first')
     receive_latched(b'last')
     receive(sample(DISPLACEMENT, 0))
@@ -64,14 +80,14 @@ def test_stream_before_begin_is_dropped_and_latched_message_is_written_first(tmp
     recorder.end()
     assert messages_of(tmp_path / 'bag') == [
         ('/latched', b'last', START + 1),
-        ('/displacement', sample(DISPLACEMENT, 1), START + 2),
-        ('/latched', b'later', START + 3),
+        ('/displacement', sample(DISPLACEMENT, 1), START + 3),
+        ('/latched', b'later', START + 4),
     ]
 
 
-def test_message_that_is_under_way_at_the_end_is_taken(tmp_path):
+def test_message_that_is_under_way_at_the_end_is_taken(tmp_path, clocked):
     recorder = recorder_of(tmp_path / 'bag')
-    receive = recorder.receiver('/displacement')
+    receive = clocked(recorder.receiver('/displacement'))
     recorder.begin()
     wait = recorder._ending.wait
 
@@ -85,9 +101,10 @@ def test_message_that_is_under_way_at_the_end_is_taken(tmp_path):
     assert sample(DISPLACEMENT, 7) in [data for _, data, _ in messages_of(tmp_path / 'bag')]
 
 
-def test_messages_after_the_end_are_dropped(tmp_path):
+def test_messages_after_the_end_are_dropped(tmp_path, clocked):
     recorder = recorder_of(tmp_path / 'bag')
-    receive, receive_latched = recorder.receiver('/displacement'), recorder.latched_receiver('/latched')
+    receive = clocked(recorder.receiver('/displacement'))
+    receive_latched = clocked(recorder.latched_receiver('/latched'))
     recorder.begin()
     recorder.end()
     receive(sample(DISPLACEMENT, 0))
@@ -103,12 +120,12 @@ def test_recording_cannot_begin_twice(tmp_path):
         recorder.begin()
 
 
-def test_full_queue_loses_and_counts_without_waiting(tmp_path):
+def test_full_queue_loses_and_counts_without_waiting(tmp_path, clocked):
     size = len(sample(DISPLACEMENT, 0))
     recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size)
     stuck = threading.Event()
     recorder._writer.write = lambda *_: stuck.wait()
-    receive = recorder.receiver('/displacement')
+    receive = clocked(recorder.receiver('/displacement'))
     recorder.begin()
     for index in range(1000):
         receive(sample(DISPLACEMENT, index))
@@ -123,10 +140,10 @@ def test_full_queue_loses_and_counts_without_waiting(tmp_path):
     recorder.end()
 
 
-def test_missing_samples_are_seen_while_they_are_recorded(tmp_path):
+def test_missing_samples_are_seen_while_they_are_recorded(tmp_path, clocked):
     recorder = recorder_of(tmp_path / 'bag')
     recorder.watch('/displacement', DISPLACEMENT.rate, stamp_of)
-    receive = recorder.receiver('/displacement')
+    receive = clocked(recorder.receiver('/displacement'))
     recorder.begin()
     for index in (0, 1, 2, 5, 6, 10):
         receive(sample(DISPLACEMENT, index))
@@ -139,9 +156,9 @@ def test_missing_samples_are_seen_while_they_are_recorded(tmp_path):
 
 
 @pytest.mark.parametrize(('on_full', 'level'), [(OnFull.STOP, Level.ERROR), (OnFull.CONTINUE, Level.WARN)])
-def test_full_disk_is_an_error_or_a_warning_as_wished(tmp_path, on_full, level):
+def test_full_disk_is_an_error_or_a_warning_as_wished(tmp_path, clocked, on_full, level):
     recorder = recorder_of(tmp_path / 'bag', open_file=small_disk((1 << 20) + 100_000))
-    receive = recorder.receiver('/displacement')
+    receive = clocked(recorder.receiver('/displacement'))
     recorder.begin()
     index = 0
     while not recorder.figures().failure:
@@ -157,11 +174,11 @@ def test_full_disk_is_an_error_or_a_warning_as_wished(tmp_path, on_full, level):
     assert figures.queued_bytes == 0
 
 
-def test_rare_messages_reach_the_disk_without_waiting_for_a_full_chunk(tmp_path, monkeypatch):
+def test_rare_messages_reach_the_disk_without_waiting_for_a_full_chunk(tmp_path, clocked, monkeypatch):
     monkeypatch.setattr('mount_bags.recording._FLUSH_PERIOD', 0.0)
     recorder = recorder_of(tmp_path / 'bag')
     recorder.begin()
-    recorder.receiver('/displacement')(sample(DISPLACEMENT, 0))
+    clocked(recorder.receiver('/displacement'))(sample(DISPLACEMENT, 0))
     waited = threading.Event()
     for _ in range(1000):
         if recorder.figures().kept:

@@ -15,7 +15,7 @@ from mount_driver.quantisation import (
     quantised_flux_rate,
     quantised_setpoint_current,
 )
-from mount_init.initialisation import InitialisationResult
+from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_ros import topics
 from mount_ros.cdr import serialised
@@ -70,6 +70,8 @@ def run_core(
         pending = quantised_setpoint_current(setpoint)
         if mount.sample % _PROGRESS_EVERY == 0:
             progress(mount.sample / mount.run.samples)
+    if chain.controlling:
+        messages.write_off(stamp)  # as mount_control does when it is deactivated
     return CoreOutcome(
         samples=mount.sample,
         excitation_start=mount.run.excitation_start * SAMPLE_TIME,
@@ -118,6 +120,9 @@ class _Messages:
         acceleration = self._acceleration.pack(stamp, truth['chassis_acceleration'])
         write(topics.SIM_CHASSIS_ACCELERATION, acceleration, stamp)
         write(topics.SIM_MOUNT_FORCE, self._force.pack(stamp, truth['mount_force']), stamp)
+
+    def write_off(self, stamp: int) -> None:
+        self._write(topics.CURRENT_SETPOINT, self._setpoint.pack(stamp, (OFF,)), stamp)
 
     def write_trace(self, stamp: int, trace: bytes) -> None:
         self._write(topics.CONTROL_TRACE, self._trace.pack_record(stamp, trace), stamp)

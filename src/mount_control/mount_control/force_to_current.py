@@ -35,7 +35,7 @@ def resample(
     offset_current: float,
     highest_current: float,
 ) -> CurrentTable:
-    """Return the table of `current` (A) over `normal_force` (N), both (n,) and rising, on an even grid of forces.
+    """Return the table of `current` (A) over `normal_force` (N), (n,) and rising, on an even grid of forces.
 
     Raises `ForceTableError` where it does not start at the first touch or the offset current lies outside.
     """

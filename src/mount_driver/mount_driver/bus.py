@@ -18,7 +18,8 @@ from mount_driver.loopback import LoopbackMulticastBus
 MULTICAST_GROUP = '239.74.163.2'  # python-can's default IPv4 group, of administrative scope
 MULTICAST_PORT = 43113  # python-can's default port
 
-# 4 MiB hold about 5000 frames. The usual 208 KiB hold 256, a quarter of a second at 1 kHz (measured).
+# Measured: the usual 208 KiB hold 256 frames, a quarter of a second at 1 kHz; 4 MiB, which the kernel
+# doubles, hold 10000.
 _RECEIVE_BUFFER = 4 * 1024 * 1024  # bytes; the kernel gives what net.core.rmem_max allows
 _CAN_FD_MTU = 72  # bytes: what the kernel shows for an interface in FD mode
 

@@ -133,6 +133,7 @@ def test_in_lock_step_the_wall_clock_switches_nothing_off(make, samples):
 
 def test_in_lock_step_the_stamps_switch_off(make, samples):
     exchange, far = make()
+    assert far.nothing_for(0.03)  # time begins with the first sample, not before
     far.send(sample(100))
     samples.wait_for(1)
     exchange.send_setpoint(100 * MS, 2.0)

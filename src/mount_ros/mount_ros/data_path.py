@@ -6,7 +6,6 @@ its own node `<name>_io` and goes on receiving during a blocking activation.
 
 import threading
 from collections.abc import Callable
-from typing import Any
 
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
@@ -15,7 +14,7 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from mount_ros.message_types import message_class
-from mount_ros.qos import control_qos, publisher_qos, recording_qos
+from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Topic
 
 _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
@@ -48,11 +47,14 @@ class DataPath:
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`."""
-        self._subscribe(topic, callback, control_qos(topic, lockstep=self.lockstep))
-
-    def subscribe_all(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
-        """Like `subscribe`, with the deep reliable queue of a recorder."""
-        self._subscribe(topic, callback, recording_qos(topic))
+        subscription = self.node.create_subscription(
+            message_class(topic.type),
+            topic.name,
+            callback,
+            control_qos(topic, lockstep=self.lockstep),
+            raw=True,
+        )
+        self._subscriptions.append(subscription)
 
     def unmatched(self) -> list[str]:
         """Return the names of the topics that nobody on the other side has been found for yet.
@@ -76,12 +78,6 @@ class DataPath:
             self._thread.join()
             self._thread = None
             self.node.destroy_node()
-
-    def _subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: Any) -> None:
-        subscription = self.node.create_subscription(
-            message_class(topic.type), topic.name, callback, qos, raw=True
-        )
-        self._subscriptions.append(subscription)
 
     def _serve(self) -> None:
         executor = EventsExecutor(context=self._context)

@@ -4,6 +4,7 @@ import threading
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from mount_ros.collector import Collector
 from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Diagnostics, Level, Verdict
 
@@ -19,7 +20,7 @@ class SafeLifecycleNode(LifecycleNode):
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
         self.declare_parameter('lockstep', False)
-        self.data_path: DataPath | None = None
+        self.data_path: DataPath | Collector | None = None
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
@@ -57,8 +58,15 @@ class SafeLifecycleNode(LifecycleNode):
 
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
-        self.data_path = DataPath(self, lockstep=self.lockstep)
-        return self.data_path
+        path = DataPath(self, lockstep=self.lockstep)
+        self.data_path = path
+        return path
+
+    def open_collector(self) -> Collector:
+        """Create the data path of a node that takes all messages but answers none."""
+        collector = Collector(self)
+        self.data_path = collector
+        return collector
 
     def close(self) -> None:
         """Leave the active state and release everything; called once at the end of the process."""

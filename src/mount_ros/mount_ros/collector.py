@@ -1,0 +1,85 @@
+"""Takes everything that arrives on many topics, in batches, for those who need all of it but not at once.
+
+The middleware queues messages by itself; waking an executor for each of them costs several times what
+taking it does. A batch every few milliseconds loses nothing, and brings what a callback does not: when the
+message was sent and when it arrived.
+"""
+
+import operator
+import threading
+from collections.abc import Callable
+
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+from mount_ros.message_types import message_class
+from mount_ros.qos import recording_qos
+from mount_ros.topics import Topic
+
+Receive = Callable[[bytes, int, int], None]
+"""Takes (serialised message, time of arrival ns, time of sending ns), both of the system clock."""
+
+_PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold a second
+
+
+class Collector:
+    """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first."""
+
+    def __init__(self, owner: Node):
+        self.node = Node(
+            f'{owner.get_name()}_io',
+            namespace=owner.get_namespace(),
+            context=owner.context,
+            use_global_arguments=False,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        self._receivers: list[tuple[Subscription, Receive]] = []
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+
+    def collect(self, topic: Topic, receive: Receive) -> Subscription:
+        """Hand every message of `topic` to `receive`."""
+        subscription = self.node.create_subscription(
+            message_class(topic.type), topic.name, _never_called, recording_qos(topic), raw=True
+        )
+        self._receivers.append((subscription, receive))
+        return subscription
+
+    def unmatched(self) -> list[str]:
+        """Return the names of the topics that no publisher has been found for yet."""
+        return sorted(s.topic_name for s, _ in self._receivers if s.get_publisher_count() == 0)
+
+    def start(self) -> None:
+        """Begin to take messages."""
+        self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Take what is there, end the thread and destroy the node; safe to call twice."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+            self.node.destroy_node()
+
+    def _serve(self) -> None:
+        while not self._ending.wait(_PERIOD):
+            self._take_batch()
+        self._take_batch()
+
+    def _take_batch(self) -> None:
+        batch: list[tuple[int, int, bytes, Receive]] = []
+        for subscription, receive in self._receivers:
+            handle, kind = subscription.handle, subscription.msg_type
+            with handle:
+                while (taken := handle.take_message(kind, True)) is not None:
+                    raw, times = taken
+                    batch.append((times['received_timestamp'], times['source_timestamp'], raw, receive))
+        batch.sort(key=operator.itemgetter(0))
+        for received, sent, raw, receive in batch:
+            receive(raw, received, sent)
+
+
+def _never_called(_: bytes) -> None:
+    """No executor serves these subscriptions."""
