@@ -9,6 +9,7 @@ from mount_init.parameters import InitParameters
 from mount_models.specimen import default_specimen, load_specimen
 from mount_ros import topics
 from mount_ros.cdr import serialised
+from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Verdict
 from mount_ros.force_table_message import to_message
 from mount_ros.lifecycle import SafeLifecycleNode
@@ -48,6 +49,8 @@ class MountInit(SafeLifecycleNode):
 
     def activate(self) -> None:
         assert self._dialogue is not None
+        assert isinstance(self.data_path, DataPath)
+        self.data_path.wake()
         parameters = self._init_parameters
         self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
         ramp = Initialisation(self._specimen, parameters)
@@ -57,6 +60,7 @@ class MountInit(SafeLifecycleNode):
         result = ramp.result()
         assert ramp.last_stamp is not None
         self._publish_result(ramp.last_stamp, result)
+        self.data_path.rest()  # with the result latched nobody waits for an answer from here
         self._result = (ramp.last_stamp, result)
 
     def deactivate(self) -> None:

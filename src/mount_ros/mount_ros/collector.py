@@ -57,11 +57,12 @@ class Collector:
 
     def stop(self) -> None:
         """Take what is there, end the thread and destroy the node; safe to call twice."""
+        if self._ending.is_set():
+            return
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
-            self._thread = None
-            self.node.destroy_node()
+        self.node.destroy_node()
 
     def _serve(self) -> None:
         while not self._ending.wait(_PERIOD):

@@ -18,6 +18,7 @@ from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Topic
 
 _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
+_REST_PERIOD = 0.05  # s, chosen
 
 
 class DataPath:
@@ -36,6 +37,7 @@ class DataPath:
         self._context: Context = owner.context
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
+        self._resting = threading.Event()
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
 
@@ -67,22 +69,50 @@ class DataPath:
 
     def start(self) -> None:
         """Begin to serve the subscriptions."""
-        self._ending.clear()
         self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
         self._thread.start()
 
+    def rest(self) -> None:
+        """From now on only look at what came last, a few times a second: nobody waits for an answer."""
+        self._resting.set()
+
+    def wake(self) -> None:
+        """Serve each message at once again."""
+        self._resting.clear()
+
     def stop(self) -> None:
         """End the thread and destroy the node; safe to call twice."""
+        if self._ending.is_set():
+            return
         self._ending.set()
-        if self._thread is not None and self._thread is not threading.current_thread():
+        if self._thread is not None:
             self._thread.join()
-            self._thread = None
-            self.node.destroy_node()
+        self.node.destroy_node()
+
+    @property
+    def _serving(self) -> bool:
+        return not self._ending.is_set() and self._context.ok()
 
     def _serve(self) -> None:
+        while self._serving:
+            if self._resting.is_set():
+                self._look_seldom()
+            else:
+                self._execute()
+
+    def _execute(self) -> None:
         executor = EventsExecutor(context=self._context)
         executor.add_node(self.node)
         # spin() of this executor dispatches nothing in the pinned wheels; spin_once does.
-        while not self._ending.is_set() and self._context.ok():
+        while self._serving and not self._resting.is_set():
             executor.spin_once(_SPIN_PERIOD)
         executor.remove_node(self.node)
+
+    def _look_seldom(self) -> None:
+        while self._resting.is_set() and not self._ending.wait(_REST_PERIOD):
+            for subscription in self._subscriptions:
+                with subscription.handle:
+                    while (
+                        taken := subscription.handle.take_message(subscription.msg_type, True)
+                    ) is not None:
+                        subscription.callback(taken[0])
