@@ -23,7 +23,7 @@ from mount_bringup.core_run import run_core
 from mount_bringup.domain import domain_lock
 from mount_bringup.evaluation import load_drive
 from mount_bringup.figure import draw_drive
-from mount_bringup.graph import SIM, SIMULATED, GraphSettings
+from mount_bringup.graph import ANSWERING, SIM, SIMULATED, GraphSettings
 from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import print_summary, summarise, write_json
@@ -89,7 +89,8 @@ def _evaluate(
 def _drive_graph(
     order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
 ) -> dict[str, Any]:
-    settings = GraphSettings(order.namespace, order.domain, _node_parameters(order, folder))
+    together = ANSWERING if order.mode == 'lock-step' else ()
+    settings = GraphSettings(order.namespace, order.domain, _node_parameters(order, folder), together)
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
     with domain_lock(order.domain, order.namespace), _interrupting(supervisor):
         try:

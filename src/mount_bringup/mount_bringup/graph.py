@@ -6,19 +6,25 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class GraphNode:
-    """A lifecycle node: its name, which is also its package's, and the topics it cannot do without."""
+    """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without."""
 
     name: str
     package: str
+    class_name: str
     needs: tuple[str, ...]
 
 
-RECORDER = GraphNode('mount_recorder', 'mount_bags', ())
-DRIVER = GraphNode('mount_driver', 'mount_driver', ('current_setpoint', 'displacement', 'coil_ripple'))
-SIM = GraphNode('mount_sim', 'mount_sim', ())
-INIT = GraphNode('mount_init', 'mount_init', ('coil_ripple', 'current_setpoint'))
+RECORDER = GraphNode('mount_recorder', 'mount_bags', 'MountRecorder', ())
+DRIVER = GraphNode(
+    'mount_driver', 'mount_driver', 'MountDriver', ('current_setpoint', 'displacement', 'coil_ripple')
+)
+SIM = GraphNode('mount_sim', 'mount_sim', 'MountSim', ())
+INIT = GraphNode('mount_init', 'mount_init', 'MountInit', ('coil_ripple', 'current_setpoint'))
 CONTROL = GraphNode(
-    'mount_control', 'mount_control', ('displacement', 'current_setpoint', 'air_gap', 'current_force_table')
+    'mount_control',
+    'mount_control',
+    'MountControl',
+    ('displacement', 'current_setpoint', 'air_gap', 'current_force_table'),
 )
 
 SIMULATED: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
@@ -28,10 +34,18 @@ VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""
 
 
+ANSWERING: tuple[GraphNode, ...] = (DRIVER, INIT, CONTROL)
+"""The nodes that share a process in lock-step: while one of them works, the others wait for it anyway."""
+
+
 @dataclass(frozen=True)
 class GraphSettings:
-    """Where the graph lives and with which parameters: {node: {parameter: value}}."""
+    """Where the graph lives and with which parameters: {node: {parameter: value}}.
+
+    Nodes named in `together` share one process, all others have one of their own.
+    """
 
     namespace: str = ''
     domain: int = 0
     parameters: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    together: tuple[GraphNode, ...] = ()

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
@@ -19,14 +19,16 @@ _TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
 
 
 class NodeProcess:
-    """One node of the graph in a process of its own; its output goes to a log file."""
+    """One process of the graph with the nodes that live in it; its output goes to a log file."""
 
-    def __init__(self, node: GraphNode, settings: GraphSettings, folder: Path):
-        self.node = node
-        self.log_file = folder / f'{node.name}.log'
-        parameter_file = folder / f'{node.name}.yaml'
-        parameter_file.write_text(_parameter_text(settings.parameters.get(node.name, {})))
-        command = [sys.executable, '-c', f'from {node.package}.node import main; main()', '--ros-args']
+    def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
+        self.nodes = tuple(nodes)
+        self.name = ' + '.join(node.name for node in nodes)
+        stem = '_'.join(node.name for node in nodes)
+        self.log_file = folder / f'{stem}.log'
+        parameter_file = folder / f'{stem}.yaml'
+        parameter_file.write_text(_parameter_text(self.nodes, settings))
+        command = [sys.executable, '-c', _program(self.nodes), '--ros-args']
         command += ['--params-file', str(parameter_file)]
         if settings.namespace:
             command += ['-r', f'__ns:=/{settings.namespace.strip("/")}']
@@ -77,14 +79,38 @@ def end_all(processes: list[NodeProcess]) -> list[str]:
         code = process.wait()
         if code != 0 and not died_before:
             complaints.append(
-                f'{process.node.name} ended with code {code} after {time.monotonic() - begin:.1f} s: '
+                f'{process.name} ended with code {code} after {time.monotonic() - begin:.1f} s: '
                 f'{process.last_words()}'
             )
     return complaints
 
 
-def _parameter_text(parameters: Mapping[str, object]) -> str:
-    return yaml.safe_dump({'/**': {'ros__parameters': dict(parameters)}}, sort_keys=True)
+def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> list[NodeProcess]:
+    """Start the processes of `nodes` in order; a shared one starts where its first node stands."""
+    groups: list[list[GraphNode]] = []
+    shared: list[GraphNode] = []
+    for node in nodes:
+        if node not in settings.together:
+            groups.append([node])
+            continue
+        if not shared:
+            groups.append(shared)
+        shared.append(node)
+    return [NodeProcess(group, settings, folder) for group in groups]
+
+
+def _program(nodes: Sequence[GraphNode]) -> str:
+    imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in nodes)
+    classes = ', '.join(node.class_name for node in nodes)
+    return f'{imports}; from mount_ros.process import run_nodes; run_nodes([{classes}])'
+
+
+def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
+    tables = {
+        f'/**/{node.name}': {'ros__parameters': dict(settings.parameters.get(node.name, {}))}
+        for node in nodes
+    }
+    return yaml.safe_dump(tables, sort_keys=True)
 
 
 def _end_with_parent() -> None:

@@ -19,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
 from mount_bringup.graph import CONTROL, DRIVER, GraphNode, GraphSettings
-from mount_bringup.processes import NodeProcess, end_all
+from mount_bringup.processes import NodeProcess, end_all, start_processes
 from mount_ros.diagnostics import Level
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, SESSION
@@ -72,8 +72,7 @@ class Supervisor:
         )
         publisher = self._node.create_publisher(String, SESSION.name, publisher_qos(SESSION))
         say('starting the nodes')
-        for node in self._nodes:
-            self._processes.append(NodeProcess(node, self._settings, self._folder))
+        self._processes = start_processes(self._nodes, self._settings, self._folder)
         for node in self._nodes:
             self.transition(node, Transition.TRANSITION_CONFIGURE)
         publisher.publish(String(data=session(self._all_parameters())))
@@ -107,8 +106,7 @@ class Supervisor:
         self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.name}')
         self._node.destroy_client(client)
         if not answer.result().success:
-            process = next(p for p in self._processes if p.node is node)
-            raise GraphError(f'{node.name} refused to {label}: {_plain(process.last_words())}')
+            raise GraphError(f'{node.name} refused to {label}: {self._reason(node)}')
 
     def stop(self) -> list[str]:
         """End all nodes in reverse order and the supervisor's own; return a sentence per unclean end."""
@@ -120,6 +118,10 @@ class Supervisor:
             self._node.destroy_node()
             rclpy.try_shutdown(context=self._context)
         return complaints
+
+    def _reason(self, node: GraphNode) -> str:
+        process = next(process for process in self._processes if node in process.nodes)
+        return _plain(process.last_words())
 
     def _try_to_deactivate(self, node: GraphNode) -> None:
         # A node that cannot is ended by a signal, to which it answers in the same way.
@@ -198,7 +200,7 @@ class Supervisor:
             code = process.exit_code
             if code is not None:
                 raise GraphError(
-                    f'{process.node.name} ended with code {code}: {_plain(process.last_words())} '
+                    f'{process.name} ended with code {code}: {_plain(process.last_words())} '
                     f'(log: {process.log_file})'
                 )
         for node in self._nodes:

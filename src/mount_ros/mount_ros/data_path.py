@@ -1,13 +1,15 @@
 """The 1 kHz path of a node: a plain node of its own on an EventsExecutor in a thread of its own.
 
 While a lifecycle transition runs, the executor of its node serves nothing else. So the data path has
-its own node `<name>_io` and goes on receiving during a blocking activation.
+its own node `<name>_io` and goes on receiving during a blocking activation. Nodes that share a process may
+share the thread too: a message from one to the other then wakes nobody.
 """
 
 import threading
 from collections.abc import Callable
 
 from rclpy.context import Context
+from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -22,10 +24,11 @@ _REST_PERIOD = 0.05  # s, chosen
 
 
 class DataPath:
-    """Publishers and raw subscriptions of a node, served by one thread from `start` to `stop`."""
+    """Publishers and raw subscriptions of a node, served from `start` to `stop`."""
 
-    def __init__(self, owner: Node, *, lockstep: bool = False):
+    def __init__(self, owner: Node, *, lockstep: bool = False, thread: 'DataThread | None' = None):
         self.lockstep = lockstep
+        self._thread = thread or DataThread(owner.context)
         self.node = Node(
             f'{owner.get_name()}_io',
             namespace=owner.get_namespace(),
@@ -34,12 +37,11 @@ class DataPath:
             start_parameter_services=False,
             enable_rosout=False,
         )
-        self._context: Context = owner.context
-        self._thread: threading.Thread | None = None
-        self._ending = threading.Event()
-        self._resting = threading.Event()
+        self._serving = False
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
+        self._resting: _RareLook | None = None
+        self._stopped = False
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create a publisher of `topic`; publish messages or their serialised bytes with it."""
@@ -69,50 +71,104 @@ class DataPath:
 
     def start(self) -> None:
         """Begin to serve the subscriptions."""
-        self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
-        self._thread.start()
+        self._thread.add(self.node)
+        self._serving = True
 
     def rest(self) -> None:
         """From now on only look at what came last, a few times a second: nobody waits for an answer."""
-        self._resting.set()
+        if self._resting is None and self._serving:
+            self._thread.remove(self.node)
+            self._resting = _RareLook(self._subscriptions)
 
     def wake(self) -> None:
         """Serve each message at once again."""
-        self._resting.clear()
+        if self._resting is not None:
+            self._resting.end()
+            self._resting = None
+            self._thread.add(self.node)
 
     def stop(self) -> None:
-        """End the thread and destroy the node; safe to call twice."""
-        if self._ending.is_set():
+        """End serving and destroy the node; safe to call twice."""
+        if self._stopped:
             return
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._stopped = True
+        if self._resting is not None:
+            self._resting.end()
+        elif self._serving:
+            self._thread.remove(self.node)
         self.node.destroy_node()
 
-    @property
-    def _serving(self) -> bool:
-        return not self._ending.is_set() and self._context.ok()
 
-    def _serve(self) -> None:
-        while self._serving:
-            if self._resting.is_set():
-                self._look_seldom()
-            else:
-                self._execute()
+class DataThread:
+    """A thread with an EventsExecutor; it lives as long as it has nodes to serve."""
 
-    def _execute(self) -> None:
-        executor = EventsExecutor(context=self._context)
-        executor.add_node(self.node)
+    def __init__(self, context: Context):
+        self._context = context
+        self._executor: Executor | None = None
+        self._thread: threading.Thread | None = None
+        self._changes: list[tuple[Node, bool, threading.Event]] = []
+        self._guard = threading.Lock()
+
+    def add(self, node: Node) -> None:
+        """Serve `node` from now on."""
+        self._change(node, wanted=True)
+
+    def remove(self, node: Node) -> None:
+        """Return when `node` is served no more and none of its callbacks runs."""
+        self._change(node, wanted=False)
+
+    def _change(self, node: Node, *, wanted: bool) -> None:
+        done = threading.Event()
+        with self._guard:
+            self._changes.append((node, wanted, done))
+            if self._executor is None:
+                self._executor = EventsExecutor(context=self._context)
+                arguments = (self._executor,)
+                self._thread = threading.Thread(target=self._serve, args=arguments, name='data', daemon=True)
+                self._thread.start()
+            self._executor.wake()
+            thread = self._thread
+        done.wait()
+        if self._executor is None and thread is not None:
+            thread.join()  # an executor that outlives its context ends the process with an abort
+
+    def _serve(self, executor: Executor) -> None:
         # spin() of this executor dispatches nothing in the pinned wheels; spin_once does.
-        while self._serving and not self._resting.is_set():
+        while self._apply_changes(executor):
             executor.spin_once(_SPIN_PERIOD)
-        executor.remove_node(self.node)
 
-    def _look_seldom(self) -> None:
-        while self._resting.is_set() and not self._ending.wait(_REST_PERIOD):
+    def _apply_changes(self, executor: Executor) -> bool:
+        """Add and remove nodes; return whether there is anything left to serve."""
+        with self._guard:
+            changes, self._changes = self._changes, []
+            for node, wanted, _ in changes:
+                (executor.add_node if wanted else executor.remove_node)(node)
+            serving = bool(executor.get_nodes()) and self._context.ok()
+            if not serving:
+                self._executor = None
+            for _, _, done in changes:
+                done.set()
+            return serving
+
+
+class _RareLook:
+    """Takes what has come on some subscriptions a few times a second, in a thread of its own."""
+
+    def __init__(self, subscriptions: list[Subscription]):
+        self._subscriptions = subscriptions
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._look, name='rare_look', daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """Return when nothing is taken any more."""
+        self._ending.set()
+        self._thread.join()
+
+    def _look(self) -> None:
+        while not self._ending.wait(_REST_PERIOD):
             for subscription in self._subscriptions:
-                with subscription.handle:
-                    while (
-                        taken := subscription.handle.take_message(subscription.msg_type, True)
-                    ) is not None:
+                handle, kind = subscription.handle, subscription.msg_type
+                with handle:
+                    while (taken := handle.take_message(kind, True)) is not None:
                         subscription.callback(taken[0])

@@ -5,7 +5,7 @@ import threading
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mount_ros.collector import Collector
-from mount_ros.data_path import DataPath
+from mount_ros.data_path import DataPath, DataThread
 from mount_ros.diagnostics import Diagnostics, Level, Verdict
 
 
@@ -21,6 +21,7 @@ class SafeLifecycleNode(LifecycleNode):
         super().__init__(name, **arguments)
         self.declare_parameter('lockstep', False)
         self.data_path: DataPath | Collector | None = None
+        self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
@@ -58,7 +59,7 @@ class SafeLifecycleNode(LifecycleNode):
 
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
-        path = DataPath(self, lockstep=self.lockstep)
+        path = DataPath(self, lockstep=self.lockstep, thread=self.data_thread)
         self.data_path = path
         return path
 

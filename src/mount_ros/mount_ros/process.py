@@ -1,35 +1,60 @@
-"""The life of a node's process: start, spin, end with exit code 0 on SIGINT and SIGTERM."""
+"""The life of a process: nodes are made, served, and ended with exit code 0 on SIGINT and SIGTERM."""
 
 import gc
 import signal
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Sequence
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from mount_ros.data_path import DataThread
 from mount_ros.environment import prepare_environment
 from mount_ros.lifecycle import SafeLifecycleNode
 
 _SPIN_PERIOD = 0.1  # s: how soon a signal is noticed
 
+Create = Callable[[], SafeLifecycleNode]
 
-def run_node(create: Callable[[], SafeLifecycleNode], args: list[str] | None = None) -> None:
+
+def run_node(create: Create, args: list[str] | None = None) -> None:
     """Run one lifecycle node until the process is told to end by SIGINT or SIGTERM."""
+    run_nodes([create], args)
+
+
+def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
+    """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's services.
+
+    At the end they are closed in reverse order, so that who sends setpoints ends before who carries them.
+    """
     prepare_environment()
-    # Our own handlers: the context must still be valid while the node takes the current to 0 A.
+    # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    node = create()
+    nodes = [create() for create in creates]
+    data_thread = DataThread(nodes[0].context)
+    for node in nodes:
+        node.data_thread = data_thread
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: node.ending.set())
+        signal.signal(number, lambda *_: [node.ending.set() for node in nodes])
+    gc.freeze()  # what stands after set-up need not be looked at again
+    threads = [threading.Thread(target=_serve, args=(node,), name=node.get_name()) for node in nodes[1:]]
+    for thread in threads:
+        thread.start()
+    _serve(nodes[0])
+    # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
+    for thread in threads:
+        thread.join()
+    for node in reversed(nodes):
+        node.close()
+        node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def _serve(node: SafeLifecycleNode) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    gc.freeze()  # what stands after set-up need not be looked at again
     while rclpy.ok() and not node.ending.is_set():
         executor.spin_once(_SPIN_PERIOD)
-    # This order ends with code 0: the node leaves its work, threads are joined, then the context ends.
-    node.close()
     executor.remove_node(node)
     executor.shutdown()
-    node.destroy_node()
-    rclpy.try_shutdown()

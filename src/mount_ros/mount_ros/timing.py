@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 _BINS_PER_DECADE = 50  # chosen: 4.7 % wide bins
 _LOWEST = 1e-6  # s
 _DECADES = 7
@@ -27,10 +29,5 @@ class LatencyHistogram:
         """Return the duration in s below which `share` (0..1) of those counted lie; NaN if none was."""
         if self.count == 0:
             return math.nan
-        wanted = share * self.count
-        running = 0
-        for place, number in enumerate(self._bins):
-            running += number
-            if running >= wanted and number:
-                return min(_LOWEST * 10 ** ((place + 0.5) / _BINS_PER_DECADE), self.highest)
-        return self.highest
+        place = int(np.searchsorted(np.cumsum(self._bins), share * self.count))
+        return min(_LOWEST * 10 ** ((place + 0.5) / _BINS_PER_DECADE), self.highest)
