@@ -23,7 +23,7 @@ from mount_bringup.core_run import run_core
 from mount_bringup.domain import domain_lock
 from mount_bringup.evaluation import load_drive
 from mount_bringup.figure import draw_drive
-from mount_bringup.graph import ANSWERING, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph import LOCKSTEP_TOGETHER, SIM, SIMULATED, GraphSettings
 from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import print_summary, summarise, write_json
@@ -33,7 +33,7 @@ from mount_ros.topics import SESSION, TOPICS, Topic
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
 
-_FIRST_PORT = 43113  # UDP port of domain 0; each domain has its own CAN bus
+_FIRST_PORT = 43113  # UDP port of domain 0
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
 
 
@@ -89,7 +89,7 @@ def _evaluate(
 def _drive_graph(
     order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
 ) -> dict[str, Any]:
-    together = ANSWERING if order.mode == 'lock-step' else ()
+    together = LOCKSTEP_TOGETHER if order.mode == 'lock-step' else ()
     settings = GraphSettings(order.namespace, order.domain, _node_parameters(order, folder), together)
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
     with domain_lock(order.domain, order.namespace), _interrupting(supervisor):
@@ -176,11 +176,12 @@ def _progress(console: Console) -> Progress:
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
     lockstep = order.mode == 'lock-step'
-    port = _FIRST_PORT + order.domain
+    # One CAN bus for each domain; in lock-step both ends live in one process.
+    can = {'interface': 'virtual' if lockstep else 'udp_multicast', 'port': _FIRST_PORT + order.domain}
     added: dict[str, dict[str, Any]] = {
         'mount_recorder': {'uri': str(folder.recording), 'on_full': order.on_full},
-        'mount_driver': {'port': port},
-        'mount_sim': {'port': port},
+        'mount_driver': can,
+        'mount_sim': can,
         'mount_init': {},
         'mount_control': {},
     }

@@ -34,8 +34,9 @@ VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""
 
 
-ANSWERING: tuple[GraphNode, ...] = (DRIVER, INIT, CONTROL)
-"""The nodes that share a process in lock-step: while one of them works, the others wait for it anyway."""
+LOCKSTEP_TOGETHER: tuple[GraphNode, ...] = (DRIVER, SIM, INIT, CONTROL)
+"""The nodes that share a process in lock-step: while one of them works the others wait for it anyway, and
+handing over to another process costs more than the work."""
 
 
 @dataclass(frozen=True)

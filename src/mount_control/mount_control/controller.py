@@ -96,13 +96,14 @@ class Controller:
         self._tables = Tables(damper.table, table.currents)
         self._state = np.zeros(1, _STATE).view(np.uint8)
         self._trace = np.zeros(1, TRACE).view(np.uint8)
+        self._trace_record = self._trace.view(TRACE)[0]
         self._window = np.zeros(parameters.period_samples)
         self.restart(0.0)
 
     @property
     def trace(self) -> np.void:
         """The intermediates of the last step."""
-        return self._trace.view(TRACE)[0]
+        return self._trace_record
 
     @property
     def trace_bytes(self) -> bytes:

@@ -55,8 +55,8 @@ class MountControl(SafeLifecycleNode):
             raise ValueError('control_trace in the topic registry differs from what the controller traces')
         load_compiled_law(self._settings, self._damper, self._friction, self._contact)
         path = self.open_data_path()
-        self._setpoint_publisher = path.publisher(topics.CURRENT_SETPOINT)
-        self._trace_publisher = path.publisher(topics.CONTROL_TRACE)
+        self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
+        self._send_trace = path.sender(topics.CONTROL_TRACE)
         path.subscribe(topics.DISPLACEMENT, self._on_displacement)
         path.subscribe(topics.AIR_GAP, self._on_air_gap)
         path.subscribe(topics.CURRENT_FORCE_TABLE, self._on_table)
@@ -146,7 +146,7 @@ class MountControl(SafeLifecycleNode):
         if judgement is Judgement.RESTART:
             controller.restart(displacement)
         self._publish_setpoint(stamp, controller.step(displacement, missing))
-        self._trace_publisher.publish(self._trace.pack_record(stamp, controller.trace_bytes))
+        self._send_trace(self._trace.pack_record(stamp, controller.trace_bytes))
 
     def _table_is_outdated(self) -> bool:
         if not self._table_refusal and self._stream.start > self._activation:
@@ -163,7 +163,7 @@ class MountControl(SafeLifecycleNode):
         self._answer(stamp, displacement)
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
-        self._setpoint_publisher.publish(self._setpoint.pack(stamp, (current,)))
+        self._send_setpoint(self._setpoint.pack(stamp, (current,)))
 
     def _on_air_gap(self, raw: bytes) -> None:
         stamp, values, _ = self._gap_layout.unpack(raw)

@@ -36,8 +36,8 @@ class MountDriver(SafeLifecycleNode):
         self._settings = read(self, DriverParameters())
         self._codec = MountCodec()
         path = self.open_data_path()
-        self._publish_displacement = path.publisher(DISPLACEMENT).publish
-        self._publish_ripple = path.publisher(COIL_RIPPLE).publish
+        self._publish_displacement = path.sender(DISPLACEMENT)
+        self._publish_ripple = path.sender(COIL_RIPPLE)
         path.subscribe(CURRENT_SETPOINT, self._on_setpoint)
         path.start()
 

@@ -39,9 +39,9 @@ class MountInit(SafeLifecycleNode):
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
         path = self.open_data_path()
-        self._setpoint_publisher = path.publisher(topics.CURRENT_SETPOINT)
-        self._air_gap_publisher = path.publisher(topics.AIR_GAP)
-        self._table_publisher = path.publisher(topics.CURRENT_FORCE_TABLE)
+        self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
+        self._send_air_gap = path.sender(topics.AIR_GAP)
+        self._send_table = path.sender(topics.CURRENT_FORCE_TABLE)
         self._dialogue = CoilDialogue(self._publish_setpoint)
         path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
         path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
@@ -78,13 +78,13 @@ class MountInit(SafeLifecycleNode):
         return verdict(figures, self._specimen, self._init_parameters)
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
-        self._setpoint_publisher.publish(self._setpoint.pack(stamp, (current,)))
+        self._send_setpoint(self._setpoint.pack(stamp, (current,)))
 
     def _publish_result(self, stamp: int, result: InitialisationResult) -> None:
         numbers = [getattr(result, name) for name in self._air_gap.names]
         table = to_message(stamp, result.table)
-        self._air_gap_publisher.publish(self._air_gap.pack(stamp, numbers))
-        self._table_publisher.publish(serialised(table))
+        self._send_air_gap(self._air_gap.pack(stamp, numbers))
+        self._send_table(serialised(table))
         self.get_logger().info(
             f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
             f'offset current {result.offset_current:.3f} A'

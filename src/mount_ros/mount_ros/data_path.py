@@ -44,10 +44,14 @@ class DataPath:
         self._stopped = False
 
     def publisher(self, topic: Topic) -> Publisher:
-        """Create a publisher of `topic`; publish messages or their serialised bytes with it."""
+        """Create a publisher of `topic`."""
         publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
         self._publishers.append(publisher)
         return publisher
+
+    def sender(self, topic: Topic) -> Callable[[bytes], None]:
+        """Create a publisher of `topic` and return the function that publishes serialised messages, no more."""
+        return self.publisher(topic).handle.publish_raw
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`."""
@@ -133,9 +137,11 @@ class DataThread:
             thread.join()  # an executor that outlives its context ends the process with an abort
 
     def _serve(self, executor: Executor) -> None:
-        # spin() of this executor dispatches nothing in the pinned wheels; spin_once does.
+        # spin() of this executor dispatches nothing in the pinned wheels; spin_once does, one event a call.
+        spin_once = executor.spin_once
         while self._apply_changes(executor):
-            executor.spin_once(_SPIN_PERIOD)
+            while not self._changes:
+                spin_once(_SPIN_PERIOD)
 
     def _apply_changes(self, executor: Executor) -> bool:
         """Add and remove nodes; return whether there is anything left to serve."""
@@ -143,7 +149,7 @@ class DataThread:
             changes, self._changes = self._changes, []
             for node, wanted, _ in changes:
                 (executor.add_node if wanted else executor.remove_node)(node)
-            serving = bool(executor.get_nodes()) and self._context.ok()
+            serving = bool(executor.get_nodes())
             if not serving:
                 self._executor = None
             for _, _, done in changes:

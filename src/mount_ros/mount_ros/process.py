@@ -24,7 +24,7 @@ def run_node(create: Create, args: list[str] | None = None) -> None:
 
 
 def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
-    """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's services.
+    """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's rest.
 
     At the end they are closed in reverse order, so that who sends setpoints ends before who carries them.
     """

@@ -51,9 +51,9 @@ class MountSim(SafeLifecycleNode):
         self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
         self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
         path = self.open_data_path()
-        self._truth_publisher = path.publisher(topics.SIM_TRUTH)
-        self._acceleration_publisher = path.publisher(topics.SIM_CHASSIS_ACCELERATION)
-        self._force_publisher = path.publisher(topics.SIM_MOUNT_FORCE)
+        self._send_truth = path.sender(topics.SIM_TRUTH)
+        self._send_acceleration = path.sender(topics.SIM_CHASSIS_ACCELERATION)
+        self._send_force = path.sender(topics.SIM_MOUNT_FORCE)
         path.start()
         self._prepare_mount()
 
@@ -110,9 +110,9 @@ class MountSim(SafeLifecycleNode):
         truth = self._mount.truth
         if self._loop is not None and not self.lockstep:
             truth['setpoint_latency'] = self._loop.last_latency
-        self._truth_publisher.publish(self._truth.pack_record(stamp, self._mount.truth_bytes))
-        self._acceleration_publisher.publish(self._acceleration.pack(stamp, truth['chassis_acceleration']))
-        self._force_publisher.publish(self._force.pack(stamp, truth['mount_force']))
+        self._send_truth(self._truth.pack_record(stamp, self._mount.truth_bytes))
+        self._send_acceleration(self._acceleration.pack(stamp, truth['chassis_acceleration']))
+        self._send_force(self._force.pack(stamp, truth['mount_force']))
 
 
 def level_imu() -> Imu:

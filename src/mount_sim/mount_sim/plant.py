@@ -101,12 +101,13 @@ class PlantSimulation:
         self._step_time = step_time
         self._state = np.zeros(1, _STATE).view(np.uint8)
         self._truth = np.zeros(1, TRUTH).view(np.uint8)
+        self._truth_record = self._truth.view(TRUTH)[0]
         self._state.view(_STATE)['gap'] = plant.mechanics.rest_gap
 
     @property
     def truth(self) -> np.void:
         """The truth at the last `read`."""
-        return self._truth.view(TRUTH)[0]
+        return self._truth_record
 
     @property
     def truth_bytes(self) -> bytes:
