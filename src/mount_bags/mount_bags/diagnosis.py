@@ -34,7 +34,8 @@ class RecorderState:
 def judge(state: RecorderState, on_full: OnFull) -> Verdict:
     """Return level, sentence and figures of an active recorder."""
     level, sentence = _verdict(state, on_full)
-    return Verdict(level, sentence, _figures(state))
+    fatal = bool(state.figures.failure) and on_full is OnFull.STOP
+    return Verdict(level, sentence, {**_figures(state), 'fatal': fatal})
 
 
 def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:

@@ -102,6 +102,8 @@ def _drive_graph(
             figures = supervisor.figures(SIM)
         finally:
             complaints += supervisor.stop()
+            for note in supervisor.notes:
+                console.print(f'[yellow]note[/yellow] {note}')
     return {
         'scenario': order.scenario,
         'mode': order.mode,

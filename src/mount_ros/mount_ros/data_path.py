@@ -50,7 +50,7 @@ class DataPath:
         return publisher
 
     def sender(self, topic: Topic) -> Callable[[bytes], None]:
-        """Create a publisher of `topic` and return the function that publishes serialised messages, no more."""
+        """Create a publisher of `topic` and return the function that publishes its bytes, no more."""
         return self.publisher(topic).handle.publish_raw
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
