@@ -72,6 +72,10 @@ def drive(
     on_full: Annotated[
         str, typer.Option(help='full disk: stop the run, or continue without recording')
     ] = 'stop',
+    priority: Annotated[
+        int,
+        typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
+    ] = 10,
     domain: Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')] = None,
     namespace: Annotated[str, typer.Option(help='namespace of this mount, such as mount_right')] = '',
 ) -> None:
@@ -99,7 +103,7 @@ def drive(
     parameters = checked_settings(parameters)
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, on_full, out)
+    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, on_full, out, priority)
     console = Console()
     outcome = driving.drive(order, console)
     folder = outcome.folder

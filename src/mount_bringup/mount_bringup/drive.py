@@ -23,7 +23,7 @@ from mount_bringup.core_run import run_core
 from mount_bringup.domain import domain_lock
 from mount_bringup.evaluation import load_drive
 from mount_bringup.figure import draw_drive
-from mount_bringup.graph import LOCKSTEP_TOGETHER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph import LOCKSTEP_TOGETHER, SIM, SIMULATED, URGENT, GraphSettings
 from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import print_summary, summarise, write_json
@@ -48,6 +48,7 @@ class DriveOrder:
     namespace: str = ''
     on_full: str = 'stop'
     out: Path | None = None
+    priority: int = 0
 
 
 @dataclass
@@ -89,8 +90,15 @@ def _evaluate(
 def _drive_graph(
     order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
 ) -> dict[str, Any]:
-    together = LOCKSTEP_TOGETHER if order.mode == 'lock-step' else ()
-    settings = GraphSettings(order.namespace, order.domain, _node_parameters(order, folder), together)
+    lockstep = order.mode == 'lock-step'
+    settings = GraphSettings(
+        namespace=order.namespace,
+        domain=order.domain,
+        parameters=_node_parameters(order, folder),
+        together=LOCKSTEP_TOGETHER if lockstep else (),
+        urgent=() if lockstep else URGENT,
+        priority=order.priority,
+    )
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
     with domain_lock(order.domain, order.namespace), _interrupting(supervisor):
         try:

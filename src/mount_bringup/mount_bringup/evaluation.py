@@ -14,6 +14,7 @@ from mount_control.parameters import SAMPLE_TIME, ControlParameters
 from mount_models.damper import DamperCurve
 
 _SECOND = 1e9  # ns
+_MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')
 
 
 @dataclass(frozen=True)
@@ -88,15 +89,16 @@ def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCu
 
 
 def lost_samples(recording: Recording, samples_sent: int) -> int:
-    """Return how many samples are missing between the electronics and the recording, over all data topics.
+    """Return how many messages with measurements are missing between the electronics and the recording.
 
-    Gaps are seen in the stamps; what is missing at the ends of the measurements is seen against
-    `samples_sent`, the electronics' own count.
+    Gaps are seen in the stamps, what is missing at the ends against `samples_sent`, the electronics' own
+    count.
     """
     topics = audit(recording)
-    gaps = sum(topic.lost or 0 for topic in topics.values())
-    ends = sum(
-        samples_sent - (topics[recording.resolve(name)].expected or 0)
-        for name in ('displacement', 'coil_ripple', 'sim/truth')
-    )
-    return gaps + ends
+    measured = [topics[recording.resolve(name)] for name in _MEASURED]
+    return sum(samples_sent - topic.present + (topic.duplicated or 0) for topic in measured)
+
+
+def unanswered_samples(recording: Recording) -> int:
+    """Return how many displacement samples got no setpoint while the controller was active."""
+    return audit(recording)[recording.resolve('displacement')].unanswered or 0

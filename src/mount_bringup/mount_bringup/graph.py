@@ -34,6 +34,9 @@ VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""
 
 
+URGENT: tuple[GraphNode, ...] = (DRIVER, SIM, INIT, CONTROL)
+"""The nodes of the 1 kHz loop."""
+
 LOCKSTEP_TOGETHER: tuple[GraphNode, ...] = (DRIVER, SIM, INIT, CONTROL)
 """The nodes that share a process in lock-step: while one of them works the others wait for it anyway, and
 handing over to another process costs more than the work."""
@@ -43,10 +46,13 @@ handing over to another process costs more than the work."""
 class GraphSettings:
     """Where the graph lives and with which parameters: {node: {parameter: value}}.
 
-    Nodes named in `together` share one process, all others have one of their own.
+    Nodes named in `together` share one process, all others have one of their own. The processes of the
+    `urgent` nodes run at the real-time `priority` (SCHED_FIFO; 0: off) where the system permits it.
     """
 
     namespace: str = ''
     domain: int = 0
     parameters: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     together: tuple[GraphNode, ...] = ()
+    urgent: tuple[GraphNode, ...] = ()
+    priority: int = 0

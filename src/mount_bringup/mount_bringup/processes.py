@@ -1,5 +1,6 @@
 """The processes of the graph: started with their parameters, watched, ended in order."""
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import yaml
@@ -40,8 +42,11 @@ class NodeProcess:
                 stderr=subprocess.STDOUT,
                 env={**os.environ, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'},
                 start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
-                preexec_fn=_end_with_parent,
+                preexec_fn=partial(_prepare_child, self._priority(settings)),
             )
+
+    def _priority(self, settings: GraphSettings) -> int:
+        return settings.priority if any(node in settings.urgent for node in self.nodes) else 0
 
     @property
     def exit_code(self) -> int | None:
@@ -113,6 +118,11 @@ def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
     return yaml.safe_dump(tables, sort_keys=True)
 
 
-def _end_with_parent() -> None:
+def _prepare_child(priority: int) -> None:
     # Without its supervisor a node must not go on driving the coil.
     ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGINT)
+    if priority:
+        # Before the middleware makes its threads, so that they inherit it. Where it is not permitted the
+        # node runs as any other process.
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from mount_bags.reading import Recording
 from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
-from mount_bringup.evaluation import Drive, lost_samples, switching, tracking_error
+from mount_bringup.evaluation import Drive, lost_samples, switching, tracking_error, unanswered_samples
 
 _UM, _MM, _US = 1e6, 1e3, 1e6
 
@@ -35,6 +35,7 @@ def summarise(
         'duration_s': float(drive.time[-1] - max(drive.time[0], 0.0)),
         'samples': run['samples'],
         'lost_samples': lost_samples(recording, run['samples']),
+        'unanswered_samples': unanswered_samples(recording),
         'real_time_factor': run['real_time_factor'],
         'rest_gap_m': float(gap['rest_gap'][-1]),
         'contact_gap_m': float(gap['contact_gap'][-1]),
@@ -73,7 +74,7 @@ def print_summary(figures: dict[str, Any], console: Console) -> None:
     table.add_row(
         'friction force error', _percent(figures['tracking_error_rms'], 'rms of the peak wanted force')
     )
-    table.add_row('samples lost', f'{figures["lost_samples"]} of {figures["samples"]}')
+    table.add_row('samples lost', _losses_text(figures))
     table.add_row('latency', _latency_text(figures))
     table.add_row('speed', f'{figures["real_time_factor"]:.2f} x real time')
     console.print(table)
@@ -87,6 +88,12 @@ def _switching_text(figures: dict[str, Any]) -> str:
     shown = [f'{on:.2f} s to {f"{off:.2f} s" if off is not None else "the end"}' for on, off in pairs]
     more = f' and {len(shown) - 6} more' if len(shown) > 6 else ''
     return 'on from ' + ', '.join(shown[:6]) + more
+
+
+def _losses_text(figures: dict[str, Any]) -> str:
+    text = f'{figures["lost_samples"]} on {figures["samples"]} samples'
+    unanswered = figures['unanswered_samples']
+    return f'{text}; {unanswered} without an answer, this machine was late' if unanswered else text
 
 
 def _latency_text(figures: dict[str, Any]) -> str:
