@@ -15,10 +15,15 @@ class MeasurementStream:
     last: int | None = None
 
     def note(self, stamp: int) -> None:
-        """Take the stamp (ns) of a sample."""
-        if self.last is None or not 0 <= stamp - self.last <= _STREAM_BREAK:
-            self.start = stamp
-        self.last = stamp
+        """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
+        if self.last is None or abs(stamp - self.last) > _STREAM_BREAK:
+            self.start = self.last = stamp
+        elif stamp > self.last:
+            self.last = stamp
+
+    def holds(self, stamp: int) -> bool:
+        """Whether the samples have come without a break from `stamp` (ns) until now."""
+        return self.start is not None and self.last is not None and self.start <= stamp <= self.last
 
 
 def check_belongs(table_stamp: int | None, air_gap_stamp: int | None, stream: MeasurementStream) -> None:
@@ -35,12 +40,17 @@ def check_belongs(table_stamp: int | None, air_gap_stamp: int | None, stream: Me
             f'current_force_table (activation {_seconds(table_stamp)}) and air_gap '
             f'(activation {_seconds(air_gap_stamp)}) are of different activations; {remedy}'
         )
-    if stream.start is None:
+    if stream.start is None or stream.last is None:
         raise ForceTableError('no displacement was received; activate mount_driver first')
     if table_stamp < stream.start:
         raise ForceTableError(
             f'current_force_table is of {_seconds(table_stamp)}, but the measurements restarted at '
             f'{_seconds(stream.start)}; {remedy}'
+        )
+    if table_stamp > stream.last:
+        raise ForceTableError(
+            f'current_force_table is of {_seconds(table_stamp)}, but the newest displacement is of '
+            f'{_seconds(stream.last)}: the time of the measurements went back, or they stand still; {remedy}'
         )
 
 

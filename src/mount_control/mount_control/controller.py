@@ -14,6 +14,8 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
 from mount_models.record import record_bytes, record_dtype
 
+FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
+
 TRACE = np.dtype(
     [
         (name, 'f8')
@@ -119,7 +121,8 @@ class Controller:
     def step(self, displacement: float, bridged_samples: int = 0) -> float:
         """Take one displacement sample in m and return the current setpoint in A.
 
-        `bridged_samples` samples missing before it are replaced by a straight line.
+        `bridged_samples` samples missing before it are replaced by a straight line. NaN and what lies
+        beyond `FARTHEST_DISPLACEMENT` are answered with 0 A and leave no trace in the memory.
         """
         return step(
             self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
@@ -179,11 +182,31 @@ def run(law, tables, state, window, traces, displacements):
 
 @compiled
 def _step(law, tables, state, window, trace, displacement, bridged_samples):
+    if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
+        return _refuse(trace, displacement)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
         _advance(law, tables, state, window, trace, state.displacement + rise)
     trace.bridged_samples = bridged_samples
     return _advance(law, tables, state, window, trace, displacement)
+
+
+@compiled
+def _refuse(trace, displacement):
+    trace.displacement = displacement
+    trace.velocity = np.nan
+    trace.band_displacement = np.nan
+    trace.band_velocity = np.nan
+    trace.predicted_velocity = np.nan
+    trace.magnitude = np.nan
+    trace.damping_active = 0
+    trace.desired_force = 0.0
+    trace.friction_deflection = np.nan
+    trace.friction_coefficient = np.nan
+    trace.normal_force = 0.0
+    trace.current = 0.0
+    trace.bridged_samples = 0
+    return 0.0
 
 
 @compiled

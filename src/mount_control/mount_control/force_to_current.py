@@ -47,7 +47,7 @@ def resample(
     if not 0.0 < offset_current < highest_current:
         raise ForceTableError(
             f'offset_current ({offset_current:.3f} A) must lie within 0 .. {highest_current:g} A; '
-            'activate mount_init again'
+            'activate mount_init again, or raise highest_current'
         )
     forces = np.arange(0.0, normal_force[-1], FORCE_STEP)
     return CurrentTable(

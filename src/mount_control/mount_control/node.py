@@ -135,12 +135,17 @@ class MountControl(SafeLifecycleNode):
 
     def _answer_once(self, stamp: int, displacement: float) -> None:
         controller = self._controller
-        if controller is None or stamp <= self._activation:
+        if controller is None:
+            return
+        if self._table_is_outdated():
+            self._publish_setpoint(stamp, _OFF)
+            return
+        if stamp <= self._activation:
             return
         judgement, missing = self._watch.judge(stamp, displacement)
         if judgement is Judgement.IGNORE:
             return
-        if judgement is Judgement.INVALID or self._table_is_outdated():
+        if judgement is Judgement.INVALID:
             self._publish_setpoint(stamp, _OFF)
             return
         if judgement is Judgement.RESTART:
@@ -149,9 +154,10 @@ class MountControl(SafeLifecycleNode):
         self._send_trace(self._trace.pack_record(stamp, controller.trace_bytes))
 
     def _table_is_outdated(self) -> bool:
-        if not self._table_refusal and self._stream.start > self._activation:
+        if not self._table_refusal and not self._stream.holds(self._activation):
             self._table_refusal = (
-                'the measurements were interrupted for more than 1 s since the table was made; '
+                'the measurements were interrupted for more than 1 s since the table was made, or their time '
+                'went back; '
                 'deactivate mount_control and activate mount_init again'
             )
         return bool(self._table_refusal)

@@ -39,7 +39,11 @@ class ControlParameters(NamedTuple):
     longest_bridge: Annotated[
         float,
         Quantity(
-            's', 'longest gap in the samples that is bridged; a longer one starts afresh', 0.0, 0.1, 'chosen'
+            's',
+            'longest gap in the samples that is bridged; a longer one starts afresh',
+            0.002,
+            0.1,
+            'chosen',
         ),
     ] = 0.020
     displacement_range: Annotated[

@@ -1,0 +1,54 @@
+"""What the tests share: a force table as an initialisation makes it, controllers, a ROS domain."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from mount_control.controller import Controller
+from mount_control.force_to_current import resample
+from mount_control.parameters import ControlParameters
+from mount_models.damper import damper_curve
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_ros.testing import free_domain
+
+# Currents (A) and normal forces (N) of a closing actuator, rounded; the first is the touch of the pads.
+CURRENTS = np.array([0.4725, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])
+FORCES = np.array([0.0, 2.6, 35.0, 75.0, 180.6, 261.0, 304.8])
+OFFSET_CURRENT = 0.4935
+
+
+@pytest.fixture(scope='session')
+def table_rows():
+    """Currents (A), normal forces (N) and offset current (A) of an activation."""
+    return CURRENTS, FORCES, OFFSET_CURRENT
+
+
+@pytest.fixture(scope='session')
+def make_controller():
+    """Return a function that builds a controller with some parameters changed."""
+
+    def make(damper: str = 'viscous_2000', **changes) -> Controller:
+        parameters = ControlParameters(**changes)
+        table = resample(CURRENTS, FORCES, OFFSET_CURRENT, parameters.highest_current)
+        return Controller(parameters, damper_curve(damper), FrictionCoefficients(), FrictionContact(), table)
+
+    return make
+
+
+@pytest.fixture(scope='session')
+def sine():
+    """Return a function that samples a sine at 1 kHz: frequency (Hz), amplitude, duration (s)."""
+
+    def sampled(frequency: float, amplitude: float, duration: float):
+        return amplitude * np.sin(2.0 * np.pi * frequency * 1e-3 * np.arange(round(duration * 1e3)))
+
+    return sampled
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A ROS domain that no other test of this machine uses at the same time."""
+    with free_domain() as number:
+        yield number

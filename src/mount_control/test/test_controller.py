@@ -1,0 +1,213 @@
+"""The control law as a whole: a displacement goes in, a current comes out."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_control.controller import FARTHEST_DISPLACEMENT, TRACE, Controller
+from mount_control.force_to_current import resample
+from mount_control.parameters import ControlParameters
+from mount_models.damper import damper_curve
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.friction.simplified import faded_coefficient
+from mount_ros import topics
+
+SHAKING = st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=12)
+
+
+def _held(values, length=60):
+    """A signal that stays at each value for some samples."""
+    return np.repeat(np.array(values), length)
+
+
+def _equal(one, other):
+    return one.tobytes() == other.tobytes()
+
+
+def test_trace_has_the_names_of_its_topic():
+    assert TRACE.names == topics.CONTROL_TRACE.names
+    assert {TRACE[name] for name in TRACE.names} == {np.dtype('f8')}
+
+
+def test_trace_bytes_are_its_numbers(make_controller, sine):
+    controller = make_controller()
+    for x in sine(8.0, 1e-3, 0.4):
+        controller.step(x)
+    numbers = np.frombuffer(controller.trace_bytes, '<f8')
+    np.testing.assert_array_equal(numbers, [controller.trace[name] for name in TRACE.names])
+
+
+def test_single_steps_equal_a_run_to_the_bit(make_controller, sine):
+    displacement = sine(8.0, 1.3e-3, 0.7) + sine(21.0, 0.2e-3, 0.7)
+    displacement[400] = math.nan
+    single, whole = make_controller(), make_controller()
+    traces = whole.run(displacement)
+    for number, x in enumerate(displacement):
+        current = single.step(x)
+        assert current == traces['current'][number]
+        assert single.trace_bytes == traces[number].tobytes()
+
+
+def test_two_runs_in_a_row_equal_one(make_controller, sine):
+    displacement = sine(8.0, 1e-3, 0.6)
+    parts, whole = make_controller(), make_controller()
+    assert _equal(
+        np.concatenate([parts.run(displacement[:250]), parts.run(displacement[250:])]),
+        whole.run(displacement),
+    )
+
+
+def test_off_means_exactly_0_ampere(make_controller, sine):
+    displacement = np.r_[sine(8.0, 1e-3, 1.0), sine(8.0, 0.2e-3, 1.0)]
+    traces = make_controller().run(displacement)
+    off, on = traces[traces['damping_active'] == 0], traces[traces['damping_active'] == 1]
+    assert len(off) > 300
+    assert len(on) > 300
+    assert (off['current'] == 0.0).all()
+    assert (off['normal_force'] == 0.0).all()
+    assert (off['desired_force'] == 0.0).all()
+    assert (on['current'] >= 0.4935).all()  # the pads are ready for the next stroke
+
+
+def test_the_desired_force_is_the_damper_s_at_the_predicted_velocity(make_controller, sine):
+    traces = make_controller().run(sine(8.0, 1e-3, 1.0))
+    on = traces[traces['damping_active'] == 1]
+    velocity = on['predicted_velocity']
+    expected = np.sign(velocity) * 2000.0 * np.maximum(np.abs(velocity) - 0.004, 0.0)
+    np.testing.assert_allclose(on['desired_force'], expected, atol=1e-9)
+    assert (on['desired_force'] == 0.0).any()  # the dead zone is in use
+
+
+def test_normal_force_times_coefficient_is_the_desired_force(make_controller, sine):
+    traces = make_controller().run(sine(8.0, 1e-3, 1.0))
+    on = traces[traces['desired_force'] != 0.0]
+    made = on['normal_force'] * on['friction_coefficient']
+    np.testing.assert_allclose(made, np.abs(on['desired_force']), rtol=1e-12)
+
+
+def test_the_coefficient_is_the_friction_law_s_at_this_velocity_and_force(make_controller, sine):
+    traces = make_controller().run(sine(8.0, 1e-3, 1.0))
+    for place in range(500, 1000, 7):
+        now, velocity = traces[place], traces['predicted_velocity'][place]
+        if abs(velocity) < 0.006:
+            continue  # below 4 N the floor of the coefficient may act
+        deflection = np.sign(velocity) * traces['friction_deflection'][place - 1]
+        law = faded_coefficient(FrictionCoefficients(), velocity, deflection, now['normal_force'])
+        assert now['friction_coefficient'] == pytest.approx(law, rel=2e-3)
+
+
+@settings(deadline=None, max_examples=40)
+@given(SHAKING)
+def test_the_desired_force_is_odd(make_controller, values):
+    displacement = _held(values)
+    one, other = make_controller().run(displacement), make_controller().run(-displacement)
+    np.testing.assert_array_equal(one['desired_force'], -other['desired_force'])
+    np.testing.assert_array_equal(one['damping_active'], other['damping_active'])
+
+
+@settings(deadline=None, max_examples=40)
+@given(SHAKING, st.sampled_from([0.6, 1.5, 3.0]), st.sampled_from(['viscous_4000', 'progressive']))
+def test_current_stays_within_its_limits_for_any_bounded_input(make_controller, values, highest, damper):
+    traces = make_controller(damper, highest_current=highest).run(_held(values))
+    assert np.isfinite(traces['current']).all()
+    assert traces['current'].min() >= 0.0
+    assert traces['current'].max() <= highest
+    on = traces['damping_active'] == 1
+    assert (traces['current'][on] >= 0.4935).all()
+    assert (traces['current'][~on] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    'doubtful', [math.nan, math.inf, -math.inf, 1e300, np.nextafter(FARTHEST_DISPLACEMENT, 2.0)]
+)
+@pytest.mark.parametrize('shaken_for', [0.0, 1.0])
+def test_a_doubtful_displacement_gives_0_ampere_and_leaves_no_mark(
+    make_controller, sine, doubtful, shaken_for
+):
+    controller, undisturbed = make_controller(), make_controller()
+    for x in sine(8.0, 1e-3, shaken_for):
+        controller.step(x)
+        undisturbed.step(x)
+    assert controller.step(doubtful) == 0.0
+    assert controller.trace['current'] == 0.0
+    assert controller.trace['damping_active'] == 0.0
+    assert math.isnan(controller.trace['magnitude'])
+    for x in sine(8.0, 1e-3, 0.2):
+        assert controller.step(x) == undisturbed.step(x)
+        assert controller.trace_bytes == undisturbed.trace_bytes
+
+
+def test_missing_samples_are_replaced_by_a_straight_line(make_controller, sine):
+    displacement = sine(8.0, 1e-3, 0.5)
+    gap = slice(300, 304)  # of 4 samples
+    line = displacement.copy()
+    line[gap] = np.interp(np.arange(300, 304), [299, 304], displacement[[299, 304]])
+    bridged, complete = make_controller(), make_controller()
+    bridged.run(displacement[:300])
+    complete.run(line[:304])
+    current = bridged.step(displacement[304], bridged_samples=4)
+    assert current == pytest.approx(complete.step(displacement[304]), abs=1e-12)
+    assert bridged.trace['bridged_samples'] == 4.0
+    assert complete.trace['bridged_samples'] == 0.0
+    for name in TRACE.names[:-1]:
+        assert bridged.trace[name] == pytest.approx(complete.trace[name], rel=1e-9, abs=1e-12), name
+
+
+def test_restarting_forgets_the_past(make_controller, sine):
+    used = make_controller()
+    used.run(sine(8.0, 1e-3, 0.6))
+    used.restart(0.003)
+    fresh = make_controller()
+    fresh.restart(0.003)
+    displacement = 0.003 + sine(8.0, 1e-3, 0.6)
+    assert _equal(used.run(displacement), fresh.run(displacement))
+
+
+def test_a_mount_that_rests_anywhere_is_not_damped(make_controller):
+    controller = make_controller()
+    controller.restart(0.012)
+    traces = controller.run(np.full(1000, 0.012))
+    assert not traces['damping_active'].any()
+    assert traces['magnitude'].max() < 1e-15
+
+
+def test_a_static_sag_changes_nothing_but_the_displacement(make_controller, sine):
+    level, sagged = make_controller(), make_controller()
+    sagged.restart(-0.005)
+    displacement = sine(8.0, 1e-3, 1.0)
+    one, other = level.run(displacement), sagged.run(displacement - 0.005)
+    np.testing.assert_allclose(one['current'], other['current'], atol=1e-9)
+
+
+def test_more_damping_asks_for_more_current(make_controller, sine):
+    displacement = sine(8.0, 1e-3, 1.0)
+    peaks = [
+        make_controller(f'viscous_{c}').run(displacement)['current'].max() for c in (1000, 2000, 3000, 4000)
+    ]
+    assert (np.diff(peaks) > 0.1).all()
+
+
+def test_the_force_is_limited_by_the_table(table_rows, sine):
+    currents, forces, offset = table_rows
+    weak = resample(currents[:4], forces[:4], offset, 3.0)  # up to 1 A and 75 N
+    law = damper_curve('viscous_4000'), FrictionCoefficients(), FrictionContact()
+    traces = Controller(ControlParameters(), *law, weak).run(sine(8.0, 2e-3, 1.0))
+    assert traces['normal_force'].max() == 74.5
+    assert traces['current'].max() == weak.currents[-1] < 1.0
+
+
+def test_parameters_are_checked_by_the_controller_itself(make_controller):
+    with pytest.raises(ValueError, match='must lie below switch_on_level'):
+        make_controller(switch_off_level=0.0009)
+
+
+def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, sine):
+    traces = make_controller(eigenfrequency=10.0).run(sine(10.0, 1e-3, 1.0))
+    exceeded = int((traces['magnitude'] > 0.0008).argmax())
+    assert int(traces['damping_active'].argmax()) == exceeded + 99
+    assert ControlParameters(eigenfrequency=10.0).period_samples == 100
+    assert damper_curve('viscous_2000').force(0.104) == pytest.approx(200.0)

@@ -1,0 +1,74 @@
+"""The controller's verdict on itself, worst first."""
+
+from dataclasses import replace
+
+import pytest
+
+from mount_control.diagnosis import ControlFigures, verdict
+from mount_control.sample_watch import SampleCounts
+from mount_ros.diagnostics import Level
+
+GOOD = ControlFigures(
+    counts=SampleCounts(samples=10_000),
+    silence=0.001,
+    longest_silence=0.020,
+    table_refusal='',
+    damping_active=False,
+    current=0.0,
+    step_median=80e-6,
+    step_p99=210e-6,
+    last_stamp=123_000_000,
+)
+
+
+def _judged(**changes):
+    judged = verdict(replace(GOOD, **changes))
+    return judged.level, judged.sentence
+
+
+def test_all_is_well():
+    assert _judged() == (Level.OK, 'damping off')
+    assert _judged(damping_active=True) == (Level.OK, 'damping on')
+
+
+def test_an_outdated_table_is_an_error_with_its_reason():
+    level, sentence = _judged(table_refusal='the measurements were interrupted', silence=9.0)
+    assert (level, sentence) == (Level.ERROR, '0 A: the measurements were interrupted')
+
+
+def test_silence_is_an_error_with_value_limit_and_remedy():
+    assert _judged(silence=0.5, counts=SampleCounts(samples=10, invalid=3)) == (
+        Level.ERROR,
+        '0 A: no displacement for 0.50 s (limit 0.02 s); is mount_driver active and the electronics powered?',
+    )
+    assert _judged(silence=0.020)[0] is Level.OK
+
+
+def test_invalid_samples_are_a_warning():
+    level, sentence = _judged(counts=SampleCounts(samples=90, invalid=10, bridged=50))
+    assert level is Level.WARN
+    assert sentence.startswith('10 of 100 displacement samples were invalid and answered with 0 A')
+
+
+@pytest.mark.parametrize(('bridged', 'level'), [(0, Level.OK), (10, Level.OK), (11, Level.WARN)])
+def test_more_than_one_bridged_sample_in_a_thousand_is_a_warning(bridged, level):
+    judged = _judged(counts=SampleCounts(samples=10_000, bridged=bridged))
+    assert judged[0] is level
+    if level is Level.WARN:
+        assert judged[1].startswith('11 of 10000 samples were missing and bridged (limit 0.1 %)')
+
+
+def test_the_figures_hold_the_counts_and_the_last_stamp():
+    counts = SampleCounts(samples=5, bridged=4, restarts=3, ignored=2, invalid=1)
+    assert verdict(replace(GOOD, counts=counts, current=1.23456)).figures == {
+        'samples': 5,
+        'bridged': 4,
+        'restarts': 3,
+        'ignored': 2,
+        'invalid': 1,
+        'damping_active': False,
+        'current_a': '1.2346',
+        'step_median_us': '80',
+        'step_p99_us': '210',
+        'last_stamp': 123_000_000,
+    }

@@ -1,0 +1,62 @@
+"""Parameters of the controller are refused one by one and against each other."""
+
+import pytest
+
+from mount_control.parameters import ControlParameters, checked_parameters
+from mount_models.quantity import ParameterError, quantities
+
+
+def _refusal(**changes):
+    with pytest.raises(ParameterError) as caught:
+        checked_parameters(ControlParameters()._replace(**changes))
+    return str(caught.value)
+
+
+def test_defaults_are_accepted():
+    assert checked_parameters(ControlParameters()) == ControlParameters()
+
+
+def test_every_parameter_has_unit_meaning_and_a_closed_range_around_its_default():
+    notes = quantities(ControlParameters())
+    for name, default in ControlParameters()._asdict().items():
+        assert notes[name].unit, name
+        assert notes[name].meaning, name
+        assert notes[name].low <= default <= notes[name].high, name
+
+
+@pytest.mark.parametrize('name', ControlParameters._fields)
+def test_each_parameter_is_refused_beyond_both_ends_of_its_range(name):
+    note = quantities(ControlParameters())[name]
+    width = note.high - note.low
+    for value in (note.low - 0.01 * width, note.high + 0.01 * width, float('nan')):
+        assert f'{name} ({value:g} {note.unit}) must lie within' in _refusal(**{name: value})
+
+
+def test_the_off_level_must_lie_below_the_on_level():
+    expected = (
+        'switch_off_level (0.8 mm) must lie below switch_on_level (0.8 mm), '
+        'else damping switches on and off at every period'
+    )
+    assert _refusal(switch_off_level=0.0008) == expected
+    assert checked_parameters(ControlParameters(switch_off_level=0.00079))
+
+
+def test_the_lead_must_stay_below_an_eighth_of_a_period():
+    expected = (
+        'lead_time (13 ms) must stay below an eighth of a period (12.5 ms at 10 Hz); '
+        'a longer delay cannot be predicted'
+    )
+    assert _refusal(lead_time=0.013, eigenfrequency=10.0) == expected
+    assert checked_parameters(ControlParameters(lead_time=0.0124, eigenfrequency=10.0))
+
+
+def test_at_least_one_missing_sample_can_be_bridged():
+    """With less, every sample would start the controller afresh and damping would never switch on."""
+    assert 'longest_bridge (0.001 s) must lie within 0.002 .. 0.1 s' in _refusal(longest_bridge=0.001)
+
+
+@pytest.mark.parametrize(
+    ('frequency', 'samples'), [(8.0, 125), (7.9, 127), (2.0, 500), (20.0, 50), (3.0, 333)]
+)
+def test_a_period_is_counted_in_whole_samples(frequency, samples):
+    assert ControlParameters(eigenfrequency=frequency).period_samples == samples
