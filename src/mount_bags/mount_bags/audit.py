@@ -11,8 +11,10 @@ from rich.table import Table
 from mount_bags.reading import Recording
 from mount_bags.series import SeriesError, Times, registered_topic
 from mount_bags.stamps import stamp_statistics
-from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.topics import AIR_GAP, CURRENT_SETPOINT, DISPLACEMENT
 
+_NO_TIMES: Times = np.empty(0, np.int64)
+_TROUBLES = ('duplicated', 'out_of_order', 'unanswered')
 _PAUSE = 0.5  # s, chosen: a control that says nothing for so long was not active
 
 
@@ -54,17 +56,21 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     return {name: _audit_topic(recording, name) for name in recording}
 
 
-def setpoint_coverage(displacements: Times, setpoints: Times) -> SetpointCoverage:
-    """Return how the setpoints answer the displacements; both are stamps in ns.
+def setpoint_coverage(
+    displacements: Times, setpoints: Times, handovers: Times = _NO_TIMES
+) -> SetpointCoverage:
+    """Return how the setpoints answer the displacements; all are stamps in ns.
 
-    A setpoint has the stamp of the sample that it answers. Control is taken as active from one
-    setpoint to the next unless they are more than 0.5 s apart.
+    A setpoint has the stamp of the sample that it answers. Setpoints are taken as wanted from one to the
+    next unless they are more than 0.5 s apart, or the first is the last of an initialisation: `handovers`
+    are the stamps of the air gaps, after which the controller has yet to be activated.
     """
     answers = np.unique(setpoints)
     samples = np.unique(displacements)
     if answers.size == 0:
         return SetpointCoverage(0, 0, 0)
-    pauses = np.flatnonzero(np.diff(answers) > _PAUSE * 1e9)
+    is_pause = (np.diff(answers) > _PAUSE * 1e9) | np.isin(answers[:-1], handovers)
+    pauses = np.flatnonzero(is_pause)
     begins = answers[np.concatenate([[0], pauses + 1])]
     ends = answers[np.concatenate([pauses, [answers.size - 1]])]
     span = np.searchsorted(begins, samples, side='right') - 1
@@ -90,22 +96,22 @@ def as_json(audits: Mapping[str, TopicAudit]) -> dict[str, dict[str, Any]]:
 
 
 def as_table(audits: Mapping[str, TopicAudit]) -> Table:
-    """Return the figures as a table for people."""
-    table = Table(title='Was anything lost?')
-    table.add_column('topic')
-    for title in ('expected', 'present', 'lost', 'duplicated', 'out of order', 'longest gap', 'unanswered'):
-        table.add_column(title, justify='right')
-    table.add_column('remark')
+    """Return the figures as a table for people; columns of troubles that nobody has are left out."""
+    table = Table(title='Was anything lost?', title_justify='left')
+    table.add_column('topic', no_wrap=True)
+    for title in ('expected', 'present', 'lost', 'longest gap'):
+        table.add_column(title, justify='right', no_wrap=True)
+    troubles = [name for name in _TROUBLES if any(getattr(entry, name) for entry in audits.values())]
+    for name in troubles:
+        table.add_column(name.replace('_', ' '), justify='right')
     for name, entry in audits.items():
-        counts = (entry.expected, entry.present, entry.lost, entry.duplicated, entry.out_of_order)
         gap = '' if math.isnan(entry.longest_gap_s) else f'{1e3 * entry.longest_gap_s:.1f} ms'
         table.add_row(
             name,
-            *map(_cell, counts),
+            *map(_cell, (entry.expected, entry.present, entry.lost)),
             gap,
-            _cell(entry.unanswered),
-            entry.remark,
-            style=None if entry.sound else 'red',
+            *(_cell(getattr(entry, trouble)) for trouble in troubles),
+            style=None if entry.sound else 'yellow',
         )
     return table
 
@@ -117,7 +123,10 @@ def _audit_topic(recording: Recording, name: str) -> TopicAudit:
         remark = '' if len(series) else 'no message'
         return TopicAudit(None, len(series), None, None, None, math.nan, remark=remark)
     try:
-        statistics = stamp_statistics(series.stamps, topic.rate)
+        stamps = series.stamps
+        if topic is CURRENT_SETPOINT:
+            stamps = _without_handovers(stamps, _handovers(recording, name), topic.rate)
+        statistics = stamp_statistics(stamps, topic.rate)
     except SeriesError as error:
         return TopicAudit(None, len(series), None, None, None, math.nan, remark=str(error))
     return TopicAudit(
@@ -137,9 +146,27 @@ def _unanswered(recording: Recording, name: str) -> int | None:
     if setpoints not in recording or not len(recording[setpoints]):
         return None
     try:
-        return setpoint_coverage(recording[name].stamps, recording[setpoints].stamps).unanswered
+        handovers = _handovers(recording, setpoints)
+        return setpoint_coverage(recording[name].stamps, recording[setpoints].stamps, handovers).unanswered
     except SeriesError:
         return None
+
+
+def _handovers(recording: Recording, setpoints: str) -> Times:
+    """Return the stamps (ns) of the air gaps that belong to the topic `setpoints`."""
+    air_gaps = f'{setpoints.removesuffix(CURRENT_SETPOINT.name)}{AIR_GAP.name}'
+    return recording[air_gaps].stamps if air_gaps in recording else _NO_TIMES
+
+
+def _without_handovers(stamps: Times, handovers: Times, rate: float) -> Times:
+    """Return the stamps with the pause after each handover taken out."""
+    period = round(1e9 / rate)
+    shifted = stamps.copy()
+    for handover in handovers:
+        after = stamps[stamps > handover]
+        if after.size and handover in stamps:
+            shifted[stamps > handover] -= after.min() - handover - period
+    return shifted
 
 
 def _cell(count: int | None) -> str:

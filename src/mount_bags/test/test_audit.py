@@ -49,6 +49,15 @@ def test_setpoints_are_only_asked_for_while_control_was_active():
     assert setpoint_coverage(samples, np.empty(0, np.int64)).asked == 0
 
 
+def test_the_pause_between_initialisation_and_control_is_no_loss():
+    samples = START + PERIOD * np.arange(1000)
+    handover = samples[299]
+    setpoints = np.concatenate([samples[:300], samples[400:]])
+    handed_over = setpoint_coverage(samples, setpoints, np.array([handover]))
+    assert (handed_over.asked, handed_over.unanswered, handed_over.spans) == (900, 0, 2)
+    assert setpoint_coverage(samples, setpoints).unanswered == 100
+
+
 def test_topics_without_a_rate_have_no_expectation(tmp_path):
     writer = BagWriter(tmp_path / 'bag')
     writer.add_topic('/session', 'std_msgs/msg/String')

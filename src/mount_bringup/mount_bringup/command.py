@@ -116,6 +116,39 @@ def drive(
         raise typer.Exit(1)
 
 
+@app.command(name='audit', epilog='Example: `engine-mount audit bags/2026-11-20_18-03-11_motorway/recording`')
+def audit_recording(
+    recording: Annotated[Path, typer.Argument(help='folder of a recording, or an MCAP file')],
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='write the figures to this file')
+    ] = None,
+) -> None:
+    """Tell whether anything was lost in a recording; exit code 1 if so."""
+    import json
+
+    from mount_bags.audit import as_json, as_table, audit
+    from mount_bags.reading import open_recording
+
+    console = Console()
+    opened = open_recording(recording)
+    audits = audit(opened)
+    console.print(as_table(audits))
+    for warning in opened.warnings:
+        console.print(f'[yellow]note[/yellow] {warning}')
+    if json_file is not None:
+        json_file.write_text(json.dumps(as_json(audits), indent=2) + '\n')
+    if any(entry.lost for entry in audits.values()):
+        raise typer.Exit(1)
+
+
+@app.command()
+def bench() -> None:
+    """Measure what matters for speed, each figure beside its alternative in the same run."""
+    from mount_bringup.bench import print_bench
+
+    print_bench(Console())
+
+
 @app.command()
 def prepare() -> None:
     """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""

@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from std_msgs.msg import String
 
+from mount_bags.audit import as_table, audit
 from mount_bags.reading import Recording, open_recording
 from mount_bags.writer import BagWriter
 from mount_bringup.core_chain import Parameters, control_parameters
@@ -84,6 +85,7 @@ def _evaluate(
     draw_drive(drive_data, control.switch_on_level, control.switch_off_level, title, folder.figure)
     write_json(figures, folder.summary)
     print_summary(figures, console)
+    console.print(as_table(audit(recording)))
     return figures
 
 

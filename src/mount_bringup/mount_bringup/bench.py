@@ -1,0 +1,148 @@
+"""Performance figures as ratios: ours and its alternative in turn, in one run, medians of several."""
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cantools
+import numpy as np
+from mcap.writer import Writer
+from rclpy.serialization import deserialize_message, serialize_message
+from rich.console import Console
+from rich.table import Table
+from sensor_msgs.msg import JointState
+
+from mount_bags.writer import BagWriter
+from mount_bringup.core_run import run_core
+from mount_control.controller import Controller
+from mount_control.force_to_current import resample
+from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_driver.codec import DATABASE_FILE, Measurement, MountCodec
+from mount_models.damper import damper_curve
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_ros.scalars import ScalarsLayout
+from mount_ros.topics import CONTROL_TRACE
+
+_ROUNDS = 7
+_STAMP = 1_700_000_000_000_000_000
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared, seconds for one of ours and one of the other."""
+
+    what: str
+    ours: float
+    other_name: str
+    other: float
+
+
+def print_bench(console: Console) -> None:
+    """Measure and print all comparisons."""
+    table = Table(title=f'medians of {_ROUNDS} rounds, in turn')
+    for title in ('what', 'ours', 'beside', 'other', 'ratio'):
+        table.add_column(title, justify='left' if title in ('what', 'beside') else 'right', no_wrap=True)
+    with console.status('measuring'):
+        for row in (_packing(), _unpacking(), _coding(), _writing(), _control(), _closed_loop()):
+            faster = f'{row.other / row.ours:.1f}'
+            table.add_row(row.what, _duration(row.ours), row.other_name, _duration(row.other), faster)
+    console.print(table)
+
+
+def _packing() -> Comparison:
+    layout, numbers = ScalarsLayout(CONTROL_TRACE), tuple(float(n) for n in range(len(CONTROL_TRACE.names)))
+
+    def general() -> bytes:
+        return serialize_message(JointState(name=list(CONTROL_TRACE.names), position=list(numbers)))
+
+    ours, other = _in_turn(lambda: layout.pack(_STAMP, numbers), general, 2000)
+    return Comparison('pack a control_trace', ours, 'rclpy message', other)
+
+
+def _unpacking() -> Comparison:
+    layout = ScalarsLayout(CONTROL_TRACE)
+    raw = layout.pack(_STAMP, tuple(float(n) for n in range(len(CONTROL_TRACE.names))))
+    ours, other = _in_turn(lambda: layout.unpack(raw), lambda: deserialize_message(raw, JointState), 2000)
+    return Comparison('unpack a control_trace', ours, 'rclpy message', other)
+
+
+def _coding() -> Comparison:
+    codec = MountCodec()
+    database = cantools.database.load_file(DATABASE_FILE)
+    assert isinstance(database, cantools.database.can.Database)
+    message = database.get_message_by_name('MountMeasurement')
+    frame = codec.encode_measurement(Measurement(7, 7000, 1e-4, 0.2, 300.0, 110.0), 7)
+    ours, other = _in_turn(lambda: codec.decode_measurement(frame), lambda: message.decode(frame), 2000)
+    return Comparison('decode one CAN frame with CRC', ours, 'cantools, no CRC', other)
+
+
+def _writing() -> Comparison:
+    count, raw = 20_000, ScalarsLayout(CONTROL_TRACE).pack(_STAMP, tuple([0.0] * len(CONTROL_TRACE.names)))
+    with tempfile.TemporaryDirectory() as folder:
+        places = iter(range(1000))
+
+        def ours() -> None:
+            writer = BagWriter(Path(folder) / f'ours_{next(places)}')
+            writer.add_topic('/control_trace', CONTROL_TRACE.type)
+            for index in range(count):
+                writer.write('/control_trace', raw, _STAMP + index)
+            writer.close()
+
+        def other() -> None:
+            with (Path(folder) / f'other_{next(places)}.mcap').open('wb') as stream:
+                writer = Writer(stream, chunk_size=64 * 1024)
+                writer.start('ros2')
+                schema = writer.register_schema(CONTROL_TRACE.type, 'ros2msg', b'')
+                channel = writer.register_channel('/control_trace', 'cdr', schema)
+                for index in range(count):
+                    writer.add_message(channel, _STAMP + index, raw, _STAMP + index)
+                writer.finish()
+
+        first, second = _in_turn(ours, other, 1)
+    return Comparison('write a message to a bag', first / count, 'mcap.writer', second / count)
+
+
+def _control() -> Comparison:
+    table = resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
+    controller = Controller(
+        ControlParameters(), damper_curve('viscous_2000'), FrictionCoefficients(), FrictionContact(), table
+    )
+    displacement = 1e-3 * np.sin(2.0 * np.pi * 8.0 * np.arange(60_000) * SAMPLE_TIME)
+    ours = _median_time(lambda: controller.run(displacement)) / len(displacement)
+    return Comparison('one control step', ours, 'real time', SAMPLE_TIME)
+
+
+def _closed_loop() -> Comparison:
+    order = {'mount_sim': {'scenario': 'bench', 'timeline.duration': 2.0}}
+    samples = run_core(order, lambda *_: None).samples
+    ours = _median_time(lambda: run_core(order, lambda *_: None), rounds=3) / samples
+    return Comparison('one sample, plant and control', ours, 'real time', SAMPLE_TIME)
+
+
+def _in_turn(ours: Callable[[], object], other: Callable[[], object], repeats: int) -> tuple[float, float]:
+    """Return the median seconds of one call of each, measured A B A B ..."""
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(_ROUNDS):
+        for place, call in enumerate((ours, other)):
+            begin = time.perf_counter()
+            for _ in range(repeats):
+                call()
+            times[place].append((time.perf_counter() - begin) / repeats)
+    return statistics.median(times[0]), statistics.median(times[1])
+
+
+def _median_time(call: Callable[[], object], rounds: int = _ROUNDS) -> float:
+    times = []
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def _duration(seconds: float) -> str:
+    return f'{1e6 * seconds:.2f} us'
