@@ -14,7 +14,7 @@ from mount_bags.stamps import stamp_statistics
 from mount_ros.topics import AIR_GAP, CURRENT_SETPOINT, DISPLACEMENT
 
 _NO_TIMES: Times = np.empty(0, np.int64)
-_TROUBLES = ('duplicated', 'out_of_order', 'unanswered')
+_TROUBLES = {'duplicated': 'twice', 'out_of_order': 'order', 'unanswered': 'unanswered'}
 _PAUSE = 0.5  # s, chosen: a control that says nothing for so long was not active
 
 
@@ -103,7 +103,7 @@ def as_table(audits: Mapping[str, TopicAudit]) -> Table:
         table.add_column(title, justify='right', no_wrap=True)
     troubles = [name for name in _TROUBLES if any(getattr(entry, name) for entry in audits.values())]
     for name in troubles:
-        table.add_column(name.replace('_', ' '), justify='right')
+        table.add_column(_TROUBLES[name], justify='right')
     for name, entry in audits.items():
         gap = '' if math.isnan(entry.longest_gap_s) else f'{1e3 * entry.longest_gap_s:.1f} ms'
         table.add_row(

@@ -70,7 +70,7 @@ def run_core(
         pending = quantised_setpoint_current(setpoint)
         if mount.sample % _PROGRESS_EVERY == 0:
             progress(mount.sample / mount.run.samples)
-    if chain.controlling:
+    if chain.controlling and setpoint != OFF:
         messages.write_off(stamp)  # as mount_control does when it is deactivated
     return CoreOutcome(
         samples=mount.sample,

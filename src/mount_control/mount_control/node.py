@@ -40,6 +40,7 @@ class MountControl(SafeLifecycleNode):
         self._stream = MeasurementStream()
         self._last_message: bytes | None = None
         self._table_refusal = ''
+        self._last_setpoint = (0, _OFF)  # stamp ns, A
         self._answering = threading.Lock()
 
     def configure(self) -> None:
@@ -78,9 +79,10 @@ class MountControl(SafeLifecycleNode):
             self._answer_waiting_sample()
 
     def deactivate(self) -> None:
-        self._controller = None
-        if self._stream.last is not None:
-            self._publish_setpoint(self._stream.last, _OFF)
+        with self._answering:  # no answer may overtake the last 0 A
+            self._controller = None
+            if self._last_setpoint[1] != _OFF:
+                self._publish_setpoint(self._last_setpoint[0], _OFF)
 
     def cleanup(self) -> None:
         self._table, self._air_gap = None, None
@@ -169,6 +171,7 @@ class MountControl(SafeLifecycleNode):
         self._answer(stamp, displacement)
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
+        self._last_setpoint = (stamp, current)
         self._send_setpoint(self._setpoint.pack(stamp, (current,)))
 
     def _on_air_gap(self, raw: bytes) -> None:
