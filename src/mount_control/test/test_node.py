@@ -1,0 +1,414 @@
+"""The node between a driver and an initialisation that the test plays, in the real middleware."""
+
+import gc
+import math
+import time
+
+import numpy as np
+import pytest
+import rclpy
+from lifecycle_msgs.msg import State, Transition
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from mount_control.controller import Controller
+from mount_control.force_to_current import resample
+from mount_control.node import MountControl
+from mount_control.parameters import ControlParameters
+from mount_models.damper import damper_curve
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_ros import topics
+from mount_ros.cdr import serialised
+from mount_ros.data_path import DataPath
+from mount_ros.diagnostics import Level
+from mount_ros.environment import prepare_environment
+from mount_ros.force_table_message import to_message
+from mount_ros.scalars import ScalarsLayout
+
+LIMIT = 30.0  # s
+MS = 1_000_000  # ns
+ACTIVATION = 5000 * MS
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+
+
+class Surroundings:
+    """Plays driver and initialisation, and keeps what the controller sends."""
+
+    def __init__(self, context, table_rows):
+        currents, forces, self._offset_current = table_rows
+        self._rows = np.array([currents, forces])
+        self.node = Node('surroundings', context=context)
+        self.path = DataPath(self.node, lockstep=True)
+        self._layouts = {
+            topic: ScalarsLayout(topic)
+            for topic in (
+                topics.DISPLACEMENT,
+                topics.AIR_GAP,
+                topics.CURRENT_SETPOINT,
+                topics.CONTROL_TRACE,
+            )
+        }
+        self.setpoints, self.traces = [], []
+        self._displacement = self.path.publisher(topics.DISPLACEMENT)
+        self._air_gap = self.path.publisher(topics.AIR_GAP)
+        self._table = self.path.publisher(topics.CURRENT_FORCE_TABLE)
+        self.path.subscribe(topics.CURRENT_SETPOINT, lambda raw: self.setpoints.append(self._setpoint(raw)))
+        self.path.subscribe(topics.CONTROL_TRACE, lambda raw: self.traces.append(self._trace(raw)))
+        self.path.start()
+
+    def send(self, milliseconds, displacement=0.0):
+        """Send a displacement sample, by its time in ms after the activation of the table."""
+        stamp = ACTIVATION + round(milliseconds * MS)
+        self._displacement.publish(self._layouts[topics.DISPLACEMENT].pack(stamp, (displacement,)))
+
+    def send_air_gap(self, stamp=ACTIVATION, offset_current=None):
+        offset = self._offset_current if offset_current is None else offset_current
+        numbers = (508e-6, 349e-6, 1e-6, 1e-7, 22.3, offset)
+        self._air_gap.publish(self._layouts[topics.AIR_GAP].pack(stamp, numbers))
+
+    def send_table(self, stamp=ACTIVATION, rows=None):
+        self._table.publish(serialised(to_message(stamp, self._rows if rows is None else rows)))
+
+    def send_raw_table(self, raw):
+        self._table.publish(raw)
+
+    def initialise(self):
+        """Send what a finished initialisation leaves behind."""
+        self.send(-1.0)
+        self.send(0.0)
+        self.send_air_gap()
+        self.send_table()
+
+    def _setpoint(self, raw):
+        stamp, (current,), _ = self._layouts[topics.CURRENT_SETPOINT].unpack(raw)
+        return (stamp - ACTIVATION) / MS, current
+
+    def _trace(self, raw):
+        stamp, numbers, _ = self._layouts[topics.CONTROL_TRACE].unpack(raw)
+        names = self._layouts[topics.CONTROL_TRACE].names
+        return (stamp - ACTIVATION) / MS, dict(zip(names, numbers, strict=True))
+
+    def close(self):
+        self.path.stop()
+        self.node.destroy_node()
+
+
+def wait_until(condition, what):
+    limit = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < limit, f'{what}: not within {LIMIT} s'
+        time.sleep(0.002)
+
+
+@pytest.fixture
+def context(domain):
+    prepare_environment()
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    rclpy.try_shutdown(context=context)
+
+
+@pytest.fixture
+def make_control(context):
+    """Return a function that creates a controller node with parameters."""
+    made = []
+
+    def make(**parameters):
+        values = {'lockstep': True, **parameters}
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        made.append(MountControl(context=context, parameter_overrides=overrides))
+        return made[-1]
+
+    yield make
+    for node in made:
+        node.close()
+        node.destroy_node()
+    del node
+    made.clear()
+    gc.collect()  # until then rclpy keeps the services of a lifecycle node in the graph
+
+
+@pytest.fixture
+def around(context, table_rows):
+    surroundings = Surroundings(context, table_rows)
+    yield surroundings
+    surroundings.close()
+
+
+@pytest.fixture
+def configured(make_control, around):
+    """Return a function that configures a controller node and waits until both sides know each other."""
+
+    def make(**parameters):
+        control = make_control(**parameters)
+        assert control.trigger_configure() == SUCCESS
+        wait_until(lambda: not around.path.unmatched(), 'matched by the surroundings')
+        wait_until(lambda: not control.data_path.unmatched(), 'matched by the controller')
+        return control
+
+    return make
+
+
+@pytest.fixture
+def active(configured, around):
+    """Return a function that brings a controller node to work on a table of this activation."""
+
+    def make(**parameters):
+        control = configured(**parameters)
+        around.initialise()
+        assert control.trigger_activate() == SUCCESS
+        return control
+
+    return make
+
+
+def _answers(around, count):
+    wait_until(lambda: len(around.setpoints) >= count, f'{count} setpoints')
+    return around.setpoints
+
+
+def _shake(around, sine, every=1):
+    """Shake until damping is on, 400 ms, and wait for each answer; return all setpoints."""
+    displacement = sine(8.0, 1e-3, 0.4)
+    for number, ms in enumerate(range(every, 401, every)):
+        around.send(ms, displacement[ms - 1])
+        _answers(around, number + 1)
+    return around.setpoints
+
+
+def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
+    active, around, sine, table_rows
+):
+    active()
+    displacement = sine(8.0, 1e-3, 0.5)
+    for number, x in enumerate(displacement):
+        around.send(number + 1, x)
+        _answers(around, number + 1)
+    wait_until(lambda: len(around.traces) == len(displacement), 'all traces')
+    assert [ms for ms, _ in around.setpoints] == list(range(1, len(displacement) + 1))
+    assert [ms for ms, _ in around.traces] == [ms for ms, _ in around.setpoints]
+
+    core = Controller(
+        ControlParameters(),
+        damper_curve('viscous_2000'),
+        FrictionCoefficients(),
+        FrictionContact(),
+        resample(*table_rows, 3.0),
+    )
+    core.restart(displacement[0])
+    expected = core.run(displacement)
+    assert [current for _, current in around.setpoints] == expected['current'].tolist()
+    assert expected['current'].max() > 0.9
+    for (_, trace), record in zip(around.traces, expected, strict=True):
+        np.testing.assert_array_equal(list(trace.values()), list(record.tolist()))
+
+
+def test_what_came_up_to_the_activation_is_not_answered(configured, around):
+    control = configured(lockstep=False)
+    around.initialise()
+    assert control.trigger_activate() == SUCCESS
+    around.send(0.0)  # once more
+    around.send(1.0)
+    assert _answers(around, 1) == [(1.0, 0.0)]
+
+
+def test_in_lock_step_the_sample_that_waits_is_answered_at_activation(configured, around):
+    control = configured()
+    around.initialise()
+    around.send(1.0, 0.001)
+    wait_until(lambda: control._stream.last == ACTIVATION + MS, 'the sample')
+    assert control.trigger_activate() == SUCCESS
+    assert _answers(around, 1) == [(1.0, 0.0)]
+
+
+def test_repeated_and_overtaken_samples_are_ignored(active, around):
+    control = active()
+    for ms in (1.0, 2.0, 2.0, 1.0, 3.0):
+        around.send(ms)
+    assert _answers(around, 3) == [(1.0, 0.0), (2.0, 0.0), (3.0, 0.0)]
+    verdict = control.judge()
+    assert verdict.level is Level.OK
+    assert (verdict.figures['samples'], verdict.figures['ignored']) == (3, 2)
+    assert verdict.figures['last_stamp'] == ACTIVATION + 3 * MS
+
+
+def test_an_invalid_displacement_is_answered_with_0_ampere_and_no_trace(active, around, sine):
+    control = active()
+    assert _shake(around, sine)[-1][1] > 0.4
+    around.send(401, math.nan)
+    assert _answers(around, 401)[-1] == (401.0, 0.0)
+    around.send(402, 0.021)  # beyond the sensor's range
+    assert _answers(around, 402)[-1] == (402.0, 0.0)
+    around.send(403, 0.0)
+    assert _answers(around, 403)[-1][1] > 0.4
+    wait_until(lambda: len(around.traces) == 401, 'the traces')
+    assert around.traces[-1][1]['bridged_samples'] == 2.0
+    verdict = control.judge()
+    assert verdict.level is Level.WARN
+    assert verdict.sentence.startswith('2 of 403 displacement samples were invalid')
+
+
+def test_deactivation_leaves_0_ampere_and_silence(active, around, sine):
+    control = active()
+    assert _shake(around, sine)[-1][1] > 0.4
+    assert control.trigger_deactivate() == SUCCESS
+    assert _answers(around, 401)[-1] == (400.0, 0.0)
+    around.send(401, 0.001)
+    wait_until(lambda: control._stream.last == ACTIVATION + 401 * MS, 'the sample')
+    assert control.trigger_activate() == SUCCESS  # the same measurements, so the same table holds
+    assert _answers(around, 402)[401:] == [(401.0, 0.0)]
+
+
+def test_the_end_of_the_process_leaves_0_ampere(active, around, sine):
+    control = active()
+    assert _shake(around, sine)[-1][1] > 0.4
+    control.close()
+    assert _answers(around, 401)[-1] == (400.0, 0.0)
+
+
+def test_measurements_that_restart_make_the_table_invalid(active, around):
+    control = active()
+    around.send(1.0)
+    around.send(1002.0)
+    around.send(1003.0)
+    assert _answers(around, 3)[1:] == [(1002.0, 0.0), (1003.0, 0.0)]
+    verdict = control.judge()
+    assert verdict.level is Level.ERROR
+    assert verdict.sentence.startswith('0 A: the measurements were interrupted for more than 1 s')
+    assert len(around.traces) == 1
+
+
+def test_measurements_whose_time_goes_back_make_the_table_invalid(active, around):
+    control = active()
+    around.send(1.0)
+    around.send(-3000.0)
+    assert _answers(around, 2)[1:] == [(-3000.0, 0.0)]
+    assert 'or their time went back' in control.judge().sentence
+    assert control.trigger_deactivate() == SUCCESS
+    assert control.trigger_activate() == FAILURE
+    assert 'the time of the measurements went back' in control._refusal
+
+
+@pytest.mark.parametrize(
+    ('sent', 'reason'),
+    [
+        (lambda around: None, 'no current_force_table was received; activate mount_init (again)'),
+        (lambda around: around.send_air_gap(), 'no current_force_table was received'),
+        (lambda around: around.send_table(), 'no air_gap was received'),
+        (
+            lambda around: (around.send_air_gap(), around.send_table(ACTIVATION - MS)),
+            '(activation 4.999 s) and air_gap (activation 5.000 s) are of different activations',
+        ),
+        (
+            lambda around: (around.send_air_gap(), around.send_table()),
+            'no displacement was received; activate mount_driver first',
+        ),
+        (
+            lambda around: (around.send_air_gap(), around.send_table(), around.send(5.0)),
+            'is of 5.000 s, but the measurements restarted at 5.005 s',
+        ),
+        (
+            lambda around: (around.send_air_gap(), around.send_table(), around.send(-5.0)),
+            'is of 5.000 s, but the newest displacement is of 4.995 s',
+        ),
+        (
+            lambda around: (
+                around.send(0.0),
+                around.send_air_gap(offset_current=math.nan),
+                around.send_table(),
+            ),
+            'offset_current (nan A) must lie within 0 .. 3 A',
+        ),
+        (
+            lambda around: (
+                around.send(0.0),
+                around.send_air_gap(),
+                around.send_table(rows=[[0.5, 3.0], [5.0, 300.0]]),
+            ),
+            'starts at 5.00 N (limit 1 N), not at the first touch of the pads',
+        ),
+    ],
+)
+def test_without_a_table_of_this_activation_the_node_does_not_become_active(configured, around, sent, reason):
+    control = configured()
+    sent(around)
+    assert control.trigger_activate() == FAILURE
+    assert reason in control._refusal
+    assert not control.active
+    assert all(current == 0.0 for _, current in around.setpoints)
+
+
+def test_a_refusal_is_not_the_end(configured, around):
+    control = configured()
+    assert control.trigger_activate() == FAILURE
+    around.initialise()
+    assert control.trigger_activate() == SUCCESS
+
+
+def test_a_message_that_is_no_table_takes_the_old_one_away(configured, around):
+    control = configured()
+    around.initialise()
+    message = to_message(ACTIVATION, [[0.47, 3.0], [0.0, 300.0]])
+    message.layout.dim[1].label = 'of yesterday'
+    around.send_raw_table(serialised(message))
+    wait_until(lambda: control._air_gap is not None and control._table is None, 'the message')
+    assert control.trigger_activate() == FAILURE
+    assert 'no current_force_table was received' in control._refusal
+
+
+def test_latched_results_are_found_by_a_controller_that_comes_later(around, configured):
+    around.send_air_gap()
+    around.send_table()
+    control = configured()
+    around.send(0.0)
+    assert control.trigger_activate() == SUCCESS
+
+
+def test_after_cleanup_the_old_table_is_forgotten(active, around):
+    control = active()
+    assert control.trigger_deactivate() == SUCCESS
+    assert control.trigger_cleanup() == SUCCESS
+    assert (control._table, control._air_gap, control._stream.start) == (None, None, None)
+
+
+def test_a_transition_that_is_not_valid_is_refused_and_the_node_goes_on(active, around):
+    control = active()
+    assert control._LifecycleNodeMixin__change_state(Transition.TRANSITION_CONFIGURE) == FAILURE
+    assert control.active
+    around.send(1.0)
+    assert _answers(around, 1) == [(1.0, 0.0)]
+    assert control._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'reason'),
+    [
+        ({'switch_off_level': 0.0009}, 'switch_off_level (0.9 mm) must lie below switch_on_level (0.8 mm)'),
+        ({'damper': 'soft'}, "no damper curve is called 'soft'; known are viscous_1000"),
+        ({'lead_time': 0.0149, 'eigenfrequency': 12.0}, 'must stay below an eighth of a period'),
+    ],
+)
+def test_parameters_that_cannot_work_are_refused_at_configure(make_control, parameters, reason):
+    control = make_control(**parameters)
+    assert control.trigger_configure() == FAILURE
+    assert reason in control._refusal
+    assert control.data_path is None
+
+
+def test_silence_is_told_in_real_time(active, around):
+    control = active(lockstep=False)
+    around.send(1.0)
+    _answers(around, 1)
+    wait_until(lambda: control.judge().level is Level.ERROR, 'the verdict on silence')
+    assert '0 A: no displacement for' in control.judge().sentence
+
+
+def test_missing_samples_are_bridged_and_counted(active, around, sine):
+    control = active()
+    assert _shake(around, sine, every=2)[-1][1] > 0.4
+    verdict = control.judge()
+    assert (verdict.figures['bridged'], verdict.level) == (199, Level.WARN)
+    assert verdict.sentence.startswith('199 of 200 samples were missing and bridged')
