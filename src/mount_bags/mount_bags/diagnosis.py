@@ -34,8 +34,9 @@ class RecorderState:
 def judge(state: RecorderState, on_full: OnFull) -> Verdict:
     """Return level, sentence and figures of an active recorder."""
     level, sentence = _verdict(state, on_full)
-    fatal = bool(state.figures.failure) and on_full is OnFull.STOP
-    return Verdict(level, sentence, {**_figures(state), 'fatal': fatal})
+    failed = bool(state.figures.failure)
+    fatal = failed and on_full is OnFull.STOP
+    return Verdict(level, sentence, {**_figures(state), 'failed': failed, 'fatal': fatal})
 
 
 def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:

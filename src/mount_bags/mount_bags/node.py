@@ -18,7 +18,7 @@ from mount_ros.diagnostics import Verdict
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.process import run_node
 from mount_ros.scalars import stamp_of
-from mount_ros.topics import TOPICS, Delivery, Topic, topic
+from mount_ros.topics import CURRENT_SETPOINT, TOPICS, Delivery, Topic, topic
 
 _PARAMETERS = {
     'uri': ('', 'folder that the recording creates; it must not exist'),
@@ -97,7 +97,8 @@ class MountRecorder(SafeLifecycleNode):
         writer, recorder = self._present_writer(), self._present_recorder()
         name = collector.node.resolve_topic_name(entry.name)
         writer.add_topic(name, entry.type, partial(_offers, collector, name))
-        if entry.delivery is Delivery.STREAM:
+        # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
+        if entry.delivery is Delivery.STREAM and entry is not CURRENT_SETPOINT:
             recorder.watch(name, entry.rate, stamp_of)
         latched = entry.delivery is Delivery.LATCHED
         receive = recorder.latched_receiver(name) if latched else recorder.receiver(name)

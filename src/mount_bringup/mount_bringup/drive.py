@@ -24,7 +24,7 @@ from mount_bringup.core_run import run_core
 from mount_bringup.domain import domain_lock
 from mount_bringup.evaluation import load_drive
 from mount_bringup.figure import draw_drive
-from mount_bringup.graph import LOCKSTEP_TOGETHER, SIM, SIMULATED, URGENT, GraphSettings
+from mount_bringup.graph import LOCKSTEP_TOGETHER, RECORDER, SIM, SIMULATED, URGENT, GraphSettings
 from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import print_summary, summarise, write_json
@@ -110,6 +110,8 @@ def _drive_graph(
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
             _watch_drive(order, supervisor, limit, console)
             figures = supervisor.figures(SIM)
+            if supervisor.figures(RECORDER).get('failed') == 'True':
+                supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
         finally:
             complaints += supervisor.stop()
             for note in supervisor.notes:
@@ -131,6 +133,8 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
 
         def finished() -> bool:
             figures = supervisor.figures(SIM)
+            if supervisor.figures(RECORDER).get('failed') == 'True':
+                supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
             share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
             progress.update(task, completed=share)
             return figures.get('sentence') == FINISHED

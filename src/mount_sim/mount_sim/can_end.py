@@ -22,6 +22,10 @@ class ReceivedSetpoint:
     setpoint: Setpoint
     arrival: float
 
+    def answers(self, counter: int) -> bool:
+        """Whether it answers the sample with this counter."""
+        return self.setpoint.enable and self.setpoint.answered_counter == counter
+
 
 class CanEnd:
     """Electronics' side of `mount.dbc` on an open bus."""
@@ -70,11 +74,14 @@ class CanEnd:
         self._bus.send(frame)
 
     def wait_for_answer(self, number: int, limit: float) -> ReceivedSetpoint | None:
-        """Return the setpoint that answers sample `number`, or None after `limit` s without it."""
+        """Return the setpoint that answers sample `number`, or None after `limit` s without it.
+
+        A frame that switches off answers none, whatever number it carries.
+        """
         end = time.monotonic() + limit
         while (remaining := end - time.monotonic()) > 0.0:
             received = self._receive(min(remaining, _RECEIVE_PATIENCE))
-            if received is not None and received.setpoint.answered_counter == number & _COUNTER_MASK:
+            if received is not None and received.answers(number & _COUNTER_MASK):
                 return received
             if self._ending.is_set():
                 return None

@@ -89,10 +89,12 @@ def advance_current(electronics, coil, actuator, current, gap, wanted, dt):
     """Return the coil current (A) after `dt` s of the current loop, within what the link voltage allows.
 
     The loop asks for the voltage that would close the error with its bandwidth; slow changes of flux
-    reach the whole core, so the inductance is the mean incremental one. Motion adds no voltage here.
+    reach the whole core, so the inductance is the mean incremental one. Motion adds no voltage here. The
+    mean rate over the step makes the decay exact: by its first value the loop would be 7 % too fast.
     """
     inductance = mean_incremental_inductance(actuator, current, gap)
-    rate = 2.0 * np.pi * electronics.current_bandwidth * (wanted - current)
+    decayed = -np.expm1(-2.0 * np.pi * electronics.current_bandwidth * dt)
+    rate = decayed / dt * (wanted - current)
     voltage = coil.resistance * current + inductance * rate
     voltage = min(max(voltage, -coil.link_voltage), coil.link_voltage)
     after = current + dt * (voltage - coil.resistance * current) / inductance

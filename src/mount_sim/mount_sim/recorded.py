@@ -1,8 +1,8 @@
 """Recorded vertical acceleration as excitation: read, checked, resampled.
 
-NPY: a file of values, with its times beside it (`x_value.npy` and `x_t.npy`, or `time_file`), or a folder
-of such pairs. CSV: a header line and columns. MCAP: a topic and a field. Refused are a missing file, an
-unknown column, NaN, time that does not rise and gaps; each with the place where it was found.
+NPY: a file of values, with its times beside it (`x_value.npy` and `x_t.npy`), or a folder of such pairs.
+CSV: a header line and columns. MCAP: a topic and a field. Refused are a missing file, an unknown column,
+NaN, time that does not rise and gaps; each with the place where it was found.
 """
 
 import csv
@@ -176,16 +176,24 @@ def _npy_pairs(path: Path) -> dict[str, tuple[Path, Path]]:
 
 def _numbers(file: Path) -> NDArray[np.float64]:
     try:
-        return np.asarray(np.load(file, allow_pickle=False), dtype=float)
+        loaded = np.load(file, allow_pickle=False)
     except (ValueError, OSError, EOFError) as error:
         raise RecordedInputError(f'{file} is no readable NPY file of numbers: {error}') from None
+    if not isinstance(loaded, np.ndarray) or loaded.dtype.kind not in 'fiu' or not 1 <= loaded.ndim <= 2:
+        what = f'{loaded.dtype} of shape {loaded.shape}' if isinstance(loaded, np.ndarray) else 'an archive'
+        raise RecordedInputError(
+            f'{file} holds {what}; needed are real numbers, (samples,) or (samples, columns)'
+        )
+    return loaded.astype(float)
 
 
 def _load_csv(
     path: Path, column: str, time_column: str
 ) -> tuple[str, NDArray[np.float64], NDArray[np.float64]]:
-    with path.open(newline='', encoding='utf-8', errors='replace') as stream:
-        rows = [row for row in csv.reader(stream) if row and not row[0].startswith('#')]
+    with path.open(newline='', encoding='utf-8-sig', errors='replace') as stream:
+        reader = csv.reader(stream)
+        numbered = [(reader.line_num, row) for row in reader if row and not row[0].startswith('#')]
+    lines, rows = [line for line, _ in numbered], [row for _, row in numbered]
     if len(rows) < 2:
         raise RecordedInputError(f'{path} holds {len(rows)} lines; needed are a header and the samples')
     header = [name.strip() for name in rows[0]]
@@ -198,7 +206,7 @@ def _load_csv(
             times[number], values[number] = float(row[time_place]), float(row[value_place])
         except (ValueError, IndexError):
             raise RecordedInputError(
-                f'{path}, line {number + 2}: {",".join(row)!r} is not a line of numbers'
+                f'{path}, line {lines[number + 1]}: {",".join(row)!r} is not a line of numbers'
             ) from None
     return header[value_place], times, values
 

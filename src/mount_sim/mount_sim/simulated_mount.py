@@ -52,7 +52,7 @@ class SimulatedMount:
     @property
     def enabled(self) -> bool:
         """Whether the coil driver is on: setpoints come in time."""
-        return self._silent <= self._patience
+        return self._silent < self._patience
 
     @property
     def truth(self) -> np.void:
