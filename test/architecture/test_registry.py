@@ -1,0 +1,182 @@
+"""The registry of topics, the nodes and docs/interface.md say the same."""
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from cantools.database.can import Database
+
+from mount_bringup.graph import SIMULATED
+from mount_control.controller import TRACE
+from mount_driver.codec import DATABASE_FILE
+from mount_ros import topics
+from mount_ros.qos import publisher_qos
+from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, SESSION, SIM_TRUTH, TOPICS, Delivery, Topic
+from mount_sim.plant import TRUTH
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SOURCES = REPOSITORY / 'src'
+MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themselves
+    'mount_ros/collector.py',
+    'mount_ros/data_path.py',
+    'mount_ros/diagnostics.py',
+    'mount_bringup/supervisor.py',
+}
+
+
+def test_interface_lists_every_topic_and_no_other():
+    listed = {row['topic']: row for row in table('Topics')}
+    assert set(listed) == {topic.name for topic in TOPICS}
+    for topic in TOPICS:
+        row = listed[topic.name]
+        assert row['type'] == topic.type.replace('/msg/', '/')
+        assert row['delivery'] == topic.delivery.value
+        assert (row['rate'] == '1 kHz') == (topic.rate == 1000.0), topic.name
+
+
+def test_interface_lists_every_scalar_with_its_units_and_no_other():
+    listed = [(row['topic'], row['scalar'], row['unit'], row['rate of change']) for row in table('Scalars')]
+    assert listed == [
+        (topic.name, scalar.name, scalar.unit, scalar.derivative_unit)
+        for topic in TOPICS
+        for scalar in topic.scalars
+    ]
+
+
+def test_interface_tells_the_depth_of_each_delivery():
+    listed = {row['delivery']: row for row in table('Delivery')}
+    assert set(listed) == {delivery.value for delivery in Delivery}
+    for topic in TOPICS:
+        offered, row = publisher_qos(topic), listed[topic.delivery.value]
+        assert row['depth'] == str(offered.depth)
+        assert row['durability'] == offered.durability.name.lower().replace('_', ' ')
+        assert row['reliability'] == offered.reliability.name.lower()
+
+
+def test_interface_names_publishers_and_subscribers_as_the_nodes_have_them():
+    for row in table('Topics'):
+        name = row['topic']
+        if name in (DIAGNOSTICS.name, SESSION.name):
+            continue  # of every node; of the supervisor
+        assert names(row['published by']) == ends_of_nodes('sender', name), f'publishers of {name}'
+        assert names(row['taken by']) == ends_of_nodes('subscribe', name), f'subscribers of {name}'
+
+
+def test_control_traces_what_the_registry_declares():
+    assert TRACE.names == CONTROL_TRACE.names
+
+
+def test_the_plant_gives_what_the_registry_declares():
+    assert TRUTH.names == SIM_TRUTH.names
+
+
+def test_every_topic_that_a_source_names_is_registered():
+    used = {(file, name) for file in python_files() for name in topics_used_in(file)}
+    assert len(used) > 20, 'the search no longer finds what it looks for'
+    unknown = [
+        f'{file.name}: {name}'
+        for file, name in used
+        if not hasattr(topics, name) or (isinstance(getattr(topics, name), Topic) and not registered(name))
+    ]
+    assert unknown == []
+
+
+def test_publishers_and_subscriptions_are_opened_by_the_registry_alone():
+    opening = {
+        file.relative_to(SOURCES).parts[0] + '/' + file.name
+        for file in python_files()
+        if re.search(r'\.create_(publisher|subscription)\(', file.read_text())
+    }
+    assert opening == MAY_CREATE_ENDS
+
+
+def test_the_graph_waits_for_registered_topics():
+    needed = {name for node in SIMULATED for name in node.needs}
+    assert needed
+    assert needed <= {topic.name for topic in TOPICS}
+
+
+@pytest.mark.parametrize('message', ['MountMeasurement', 'MountSetpoint', 'MountStatus'])
+def test_interface_lists_the_signals_of_the_dbc(message):
+    database = Database()
+    database.add_dbc_file(DATABASE_FILE)
+    signals = sorted(database.get_message_by_name(message).signals, key=lambda signal: signal.start)
+    listed = [
+        (row['signal'], row['bits'], float(row['step']), row['unit'], row['range']) for row in table(message)
+    ]
+    assert listed == [
+        (
+            signal.name,
+            f'{signal.start}'
+            if signal.length == 1
+            else f'{signal.start}..{signal.start + signal.length - 1}',
+            float(signal.scale),
+            signal.unit or '1',
+            f'{signal.minimum} .. {signal.maximum}',
+        )
+        for signal in signals
+    ]
+
+
+def test_interface_lists_the_figures_of_a_drive():
+    source = ast.parse((SOURCES / 'mount_bringup/mount_bringup/summary.py').read_text())
+    function = next(
+        node for node in source.body if isinstance(node, ast.FunctionDef) and node.name == 'summarise'
+    )
+    figures = next(node for node in ast.walk(function) if isinstance(node, ast.Return)).value
+    assert isinstance(figures, ast.Dict)
+    keys = [key.value for key in figures.keys if isinstance(key, ast.Constant)]
+    assert [row['figure'] for row in table('Figures')] == keys
+
+
+@cache
+def table(heading: str) -> list[dict[str, str]]:
+    """Return the first table below a heading of docs/interface.md, code marks removed."""
+    text = (REPOSITORY / 'docs' / 'interface.md').read_text()
+    section = re.split(rf'^#+ {heading}$', text, flags=re.MULTILINE)[1]
+    lines = re.findall(r'(?:^\|.*\|\n)+', section, flags=re.MULTILINE)[0].splitlines()
+    header, *rows = [
+        [cell.strip().replace('`', '') for cell in line[1:-1].split('|')]
+        for line in lines
+        if not line.startswith('|---')
+    ]
+    return [dict(zip(header, row, strict=True)) for row in rows]
+
+
+def bits(start: int, length: int) -> str:
+    return f'{start}' if length == 1 else f'{start}..{start + length - 1}'
+
+
+def names(cell: str) -> set[str]:
+    return {name for name in re.split(r', *', cell) if name}
+
+
+def ends_of_nodes(kind: str, topic_name: str) -> set[str]:
+    """Return the nodes that publish or take a topic on their data path; the recorder takes all."""
+    found = {'mount_recorder'} if kind == 'subscribe' else set()
+    for node in SIMULATED:
+        source = (SOURCES / node.package / node.package / 'node.py').read_text()
+        for constant in re.findall(rf'path\.{kind}\((?:topics\.)?([A-Z_]+)', source):
+            if getattr(topics, constant).name == topic_name:
+                found.add(node.name)
+    return found
+
+
+def python_files() -> list[Path]:
+    return sorted(SOURCES.glob('*/mount_*/**/*.py'))
+
+
+def topics_used_in(file: Path) -> Iterator[str]:
+    """Return the constants that a file takes from the registry, by either way of importing it."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module == 'mount_ros.topics':
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == 'topics' and node.attr.isupper():
+            yield node.attr
+
+
+def registered(constant: str) -> bool:
+    return getattr(topics, constant) in TOPICS
