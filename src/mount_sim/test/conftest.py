@@ -1,0 +1,54 @@
+"""What the tests share: simulated mounts by their parameters, and runs of them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mount_models.quantity import with_flattened
+from mount_sim.parameters import SimParameters
+from mount_sim.scenario import build_excitation
+from mount_sim.simulated_mount import SimulatedMount
+
+
+def sim_parameters(**changes: Any) -> SimParameters:
+    """Parameters with some changed; `bench__amplitude` stands for `bench.amplitude`."""
+    return with_flattened(
+        SimParameters(), {name.replace('__', '.'): value for name, value in changes.items()}
+    )
+
+
+@pytest.fixture(scope='session')
+def parameters() -> Callable[..., SimParameters]:
+    return sim_parameters
+
+
+@pytest.fixture(scope='session')
+def make_mount() -> Callable[..., SimulatedMount]:
+    """Return a function that builds a simulated mount; by default on the bench for 0.3 s."""
+
+    def make(**changes: Any) -> SimulatedMount:
+        defaults = {'scenario': 'bench', 'timeline__start': 0.0, 'timeline__duration': 0.3}
+        chosen = sim_parameters(**{**defaults, **changes})
+        return SimulatedMount(chosen.plant, build_excitation(chosen), chosen.seed)
+
+    return make
+
+
+@pytest.fixture(scope='session')
+def drive() -> Callable[..., tuple[np.ndarray, np.ndarray]]:
+    """Return a function that runs a mount to its end; `setpoint` gives A or None for each sample number.
+
+    It returns the readings (n, 4) and the truth of all samples.
+    """
+
+    def run(mount: SimulatedMount, setpoint: Callable[[int], float | None] = lambda number: None):
+        readings, truths = [], []
+        while not mount.finished:
+            readings.append(mount.measure())
+            truths.append(mount.truth.copy())
+            mount.advance(setpoint(mount.sample))
+        return np.array(readings), np.array(truths)
+
+    return run

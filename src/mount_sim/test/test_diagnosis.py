@@ -1,0 +1,55 @@
+"""The simulator's verdict on itself."""
+
+from mount_ros.diagnostics import Level
+from mount_sim.diagnosis import DRIVING, FINISHED, verdict
+from mount_sim.loop import LoopFigures
+from mount_sim.simulated_mount import Run
+
+RUN = Run(samples=20_000, excitation_start=5000)
+
+
+def _judged(lockstep=False, **changes):
+    figures = LoopFigures(**{'samples': 4000, 'answered': 3990, 'wall_time': 2.0, **changes})
+    return verdict(figures, RUN, lockstep=lockstep)
+
+
+def test_under_way_and_finished():
+    assert (_judged().level, _judged().sentence) == (Level.OK, DRIVING)
+    ended = _judged(samples=20_000, overruns=20_000)
+    assert (ended.level, ended.sentence) == (Level.OK, FINISHED)
+
+
+def test_figures_tell_the_progress():
+    assert _judged().figures == {
+        'samples': 4000,
+        'samples_of_run': 20_000,
+        'simulated_s': '4.000',
+        'excitation_start_s': '5.000',
+        'real_time_factor': '2.0000',
+        'answered': 3990,
+        'overruns': 0,
+        'latency_median_s': 'nan',
+        'latency_p99_s': 'nan',
+        'fatal': False,
+    }
+    assert _judged(wall_time=0.0).figures['real_time_factor'] == 'nan'
+
+
+def test_a_failure_is_an_error_and_names_the_sample_that_waits():
+    judged = _judged(failure='sample 3999 (3.999 s) was not answered within 10 s')
+    assert judged.level is Level.ERROR
+    assert judged.sentence == 'sample 3999 (3.999 s) was not answered within 10 s'
+    assert (judged.figures['fatal'], judged.figures['waiting_stamp']) == (True, 3_999_000_000)
+
+
+def test_a_machine_too_busy_for_real_time_is_a_warning():
+    assert _judged(overruns=200).level is Level.OK
+    busy = _judged(overruns=201)
+    assert busy.level is Level.WARN
+    assert busy.sentence.startswith('201 of 4000 samples were late (limit 5 %)')
+    assert _judged(overruns=201, lockstep=True).level is Level.OK
+
+
+def test_the_first_second_is_not_judged_by_a_few_samples():
+    assert _judged(samples=100, overruns=50).level is Level.OK
+    assert _judged(samples=100, overruns=51).level is Level.WARN

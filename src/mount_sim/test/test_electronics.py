@@ -1,0 +1,111 @@
+"""Current loop, ripple measurement and noise of the simulated electronics."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from mount_models.actuator.reluctance import ReluctanceActuator, mean_incremental_inductance
+from mount_models.coil.ripple import RippleCoil, incremental_inductance
+from mount_sim.electronics import ElectronicsParameters, Noise, advance_current, read_sensors
+
+ACTUATOR, COIL = ReluctanceActuator(), RippleCoil()
+DT, GAP = 5e-5, 349e-6
+
+
+def _loop(wanted, current=0.0, **changes):
+    """Coil currents after each step of the loop, for an array of wanted currents."""
+    electronics = ElectronicsParameters(**changes)
+    currents = []
+    for target in wanted:
+        current = advance_current(electronics, COIL, ACTUATOR, current, GAP, target, DT)
+        currents.append(current)
+    return np.array(currents)
+
+
+@pytest.mark.parametrize('bandwidth', [100.0, 400.0, 1000.0])
+def test_small_signals_follow_with_the_stated_bandwidth(bandwidth):
+    """At its bandwidth a sine of the current is 3 dB down; found by halving on the frequency."""
+
+    def gain(frequency):
+        periods = 12
+        times = DT * np.arange(round(periods / frequency / DT))
+        angle = 2.0 * math.pi * frequency * times
+        response = _loop(1.0 + 1e-3 * np.sin(angle), 1.0, current_bandwidth=bandwidth) - 1.0
+        half = len(times) // 2
+        basis = np.c_[np.sin(angle), np.cos(angle), np.ones_like(angle)][half:]
+        (a, b, _), *_ = np.linalg.lstsq(basis, response[half:], rcond=None)
+        return math.hypot(a, b) / 1e-3
+
+    low, high = 0.5 * bandwidth, 2.0 * bandwidth
+    for _ in range(8):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if gain(middle) > math.sqrt(0.5) else (low, middle)
+    assert math.sqrt(low * high) == pytest.approx(bandwidth, rel=0.05)
+
+
+def test_a_small_step_decays_with_the_loop_s_time_constant():
+    error = 1.0 - _loop(np.full(40, 1.0), 0.99)
+    assert error[19] / 0.01 == pytest.approx(math.exp(-20 * DT * 2.0 * math.pi * 400.0), rel=1e-3)
+
+
+@pytest.mark.parametrize('wanted', [[3.0] * 400, [0.0, 3.0] * 200, [2.0] * 50 + [0.0] * 100 + [3.0] * 200])
+def test_the_coil_never_sees_more_than_the_link_voltage(wanted):
+    currents = np.r_[0.0, _loop(wanted)]
+    for before, after in itertools.pairwise(currents):
+        inductance = mean_incremental_inductance(ACTUATOR, before, GAP)
+        voltage = COIL.resistance * before + inductance * (after - before) / DT
+        assert voltage <= COIL.link_voltage * (1.0 + 1e-9)
+        assert voltage >= -COIL.link_voltage * (1.0 + 1e-9) or after == 0.0
+
+
+def test_a_large_step_rises_as_14_volt_allow():
+    first = _loop([3.0])[0]
+    assert first / DT == pytest.approx(14.0 / mean_incremental_inductance(ACTUATOR, 0.0, GAP), rel=1e-9)
+    rise = int(np.argmax(_loop([3.0] * 1000) > 2.7)) * DT
+    assert 0.003 < rise < 0.030  # far slower than the 0.9 ms of the loop alone
+
+
+def test_the_current_reaches_its_setpoint_and_0_exactly():
+    assert _loop([1.5] * 2000)[-1] == pytest.approx(1.5, abs=1e-6)
+    assert _loop([0.0] * 1000, 3.0)[-1] == 0.0
+    assert (_loop([0.0] * 1000, 3.0) >= 0.0).all()
+
+
+def _readings(count=20_000, current=0.2, gap=492e-6, seed=1, **changes):
+    electronics = ElectronicsParameters(**changes)
+    noise = Noise(seed)
+    return np.array(
+        [read_sensors(electronics, COIL, ACTUATOR, 1e-3, current, gap, noise.next()) for _ in range(count)]
+    )
+
+
+def test_without_noise_the_ripple_shows_the_coil_s_inductance():
+    readings = _readings(1, displacement_noise=0.0, ripple_noise=0.0)[0]
+    inductance = ACTUATOR.turns * ACTUATOR.gap_area * readings[3] / readings[2]
+    assert inductance == pytest.approx(incremental_inductance(COIL, ACTUATOR, 0.2, 492e-6), rel=1e-12)
+    assert (readings[0], readings[1]) == (1e-3, 0.2)
+
+
+@pytest.mark.parametrize('sigma', [0.01, 0.03])
+def test_ripple_noise_is_the_scatter_of_the_inductance(sigma):
+    readings = _readings(ripple_noise=sigma)
+    inductance = readings[:, 3] / readings[:, 2]
+    assert np.std(inductance) / np.mean(inductance) == pytest.approx(sigma, rel=0.03)
+    for slope in (readings[:, 2], readings[:, 3]):
+        assert np.std(slope) / np.mean(slope) == pytest.approx(sigma * math.sqrt(0.5), rel=0.03)
+
+
+def test_displacement_and_current_have_their_own_noise():
+    readings = _readings(displacement_noise=5e-6, current_noise=0.004)
+    assert np.std(readings[:, 0]) == pytest.approx(5e-6, rel=0.03)
+    assert np.std(readings[:, 1]) == pytest.approx(0.004, rel=0.03)
+    assert abs(np.corrcoef(readings.T)[0, 1]) < 0.03
+
+
+def test_noise_belongs_to_its_seed_and_does_not_repeat():
+    np.testing.assert_array_equal(_readings(5000, seed=3), _readings(5000, seed=3))
+    one = _readings(10_000, seed=3)
+    assert not (one == _readings(10_000, seed=4)).all(axis=1).any()
+    assert len(np.unique(one[:, 0])) == 10_000

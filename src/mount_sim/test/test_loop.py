@@ -1,0 +1,249 @@
+"""The electronics on a virtual bus, with a host that the test plays."""
+
+import itertools
+import math
+import threading
+
+import can
+import pytest
+
+from mount_driver.codec import MountCodec, Setpoint
+from mount_driver.e2e_receiver import AliveCounter
+from mount_sim.can_end import CanEnd
+from mount_sim.electronics import ElectronicsParameters, Reading
+from mount_sim.faults import Fault, FaultParameters
+from mount_sim.loop import ElectronicsLoop, NoAnswerError
+
+CODEC = MountCodec()
+LIMIT = 20.0  # s
+_channels = itertools.count()
+
+
+def _bus(channel):
+    return can.Bus(interface='virtual', channel=channel, protocol=can.CanProtocol.CAN_FD)
+
+
+def _frame(data, identifier=CODEC.setpoint.frame_id):
+    return can.Message(arbitration_id=identifier, data=data, is_fd=True, is_extended_id=False)
+
+
+class Host:
+    """Answers each measurement by a function; keeps what it received."""
+
+    def __init__(self, channel):
+        self.bus = _bus(channel)
+        self.samples, self.statuses = [], []
+        self._alive = AliveCounter()
+
+    def send(self, setpoint, damage=0):
+        data = CODEC.encode_setpoint(setpoint, self._alive.next())
+        data[-1] ^= damage
+        self.bus.send(_frame(data))
+
+    def receive(self):
+        """Take one frame; return the sample if it was one."""
+        frame = self.bus.recv(LIMIT)
+        assert frame is not None
+        if frame.arbitration_id == CODEC.status.frame_id:
+            self.statuses.append(CODEC.decode_status(frame.data))
+            return None
+        self.samples.append(CODEC.decode_measurement(frame.data))
+        return self.samples[-1]
+
+    def answer_each(self, count, current):
+        while len(self.samples) < count:
+            sample = self.receive()
+            if sample is not None:
+                self.send(Setpoint(current(sample), sample.sample_counter))
+
+
+@pytest.fixture
+def ends():
+    """Return (far end, host) on a bus of their own."""
+    channel = f'test_loop_{next(_channels)}'
+    end, host = CanEnd(_bus(channel)), Host(channel)
+    yield end, host
+    end.close()
+    host.bus.shutdown()
+
+
+def _loop(mount, end, fault='none', published=None, **electronics):
+    parameters = ElectronicsParameters(**electronics)
+    publish = (published if published is not None else []).append
+    return ElectronicsLoop(mount, end, parameters, Fault(FaultParameters(fault, 0.0, 10.0)), publish)
+
+
+def _in_thread(target, *arguments):
+    thread = threading.Thread(target=target, args=arguments)
+    thread.start()
+    return thread
+
+
+# The end of the bus
+
+
+def test_a_measurement_arrives_as_it_was_sent(ends):
+    end, host = ends
+    end.send_measurement(70_000, 2**32 + 5, Reading(1.5e-3, 0.5, 250.0, math.nan), enabled=False)
+    sample = host.receive()
+    assert (sample.sample_counter, sample.microseconds, sample.enabled) == (70_000 - 65_536, 5, False)
+    assert sample.displacement == pytest.approx(1.5e-3)
+    assert math.isnan(sample.flux_rate)
+
+
+def test_only_the_answer_to_the_asked_sample_ends_the_wait(ends):
+    end, host = ends
+    for counter in (6, 8, 7):
+        host.send(Setpoint(0.1 * counter, counter))
+    received = end.wait_for_answer(7, LIMIT)
+    assert received.setpoint == Setpoint(pytest.approx(0.7), 7, True)
+    assert end.latest is received
+    assert end.wait_for_answer(7, 0.01) is None
+
+
+def test_a_counter_that_has_wrapped_still_answers(ends):
+    end, host = ends
+    host.send(Setpoint(0.5, 4))
+    assert end.wait_for_answer(65_536 + 4, LIMIT) is not None
+
+
+def test_a_frame_that_switches_off_answers_no_sample(ends):
+    end, host = ends
+    host.send(Setpoint(0.0, 7, enable=False))
+    assert end.wait_for_answer(7, 0.05) is None
+    assert not end.latest.setpoint.enable  # but it is taken over where nobody waits
+
+
+def test_damaged_and_foreign_frames_are_no_setpoints(ends):
+    end, host = ends
+    host.send(Setpoint(0.5, 7), damage=0x10)
+    host.bus.send(_frame(b'\0' * 8, identifier=0x123))
+    assert end.wait_for_answer(7, 0.05) is None
+    assert end.corrupt_setpoints == 1
+    assert end.latest is None
+
+
+def test_closing_twice_does_no_harm(ends):
+    end, _ = ends
+    end.listen()
+    end.close()
+    end.close()
+
+
+# Lock-step
+
+
+def test_in_lock_step_each_sample_waits_for_its_answer(ends, make_mount):
+    end, host = ends
+    mount, published = make_mount(), []
+    loop = _loop(mount, end, published=published)
+    answering = _in_thread(host.answer_each, 300, lambda sample: 0.001 * sample.sample_counter)
+    loop.run_in_lockstep(threading.Event(), LIMIT)
+    answering.join()
+    assert mount.finished
+    assert published == list(range(300))
+    assert [sample.sample_counter for sample in host.samples] == list(range(300))
+    assert [sample.microseconds for sample in host.samples] == [1000 * k for k in range(300)]
+    assert all(sample.enabled for sample in host.samples)
+    assert (loop.figures.samples, loop.figures.answered, loop.figures.overruns) == (300, 300, 0)
+    assert loop.figures.latency.count == 300
+    assert loop.figures.wall_time > 0.0
+    assert len(host.statuses) == 3  # 10 Hz
+    assert host.statuses[0].supply_voltage == pytest.approx(14.0)
+
+
+def test_lock_step_over_the_bus_equals_plain_function_calls(ends, make_mount):
+    end, host = ends
+    over_bus, truths = make_mount(), []
+    loop = ElectronicsLoop(
+        over_bus,
+        end,
+        ElectronicsParameters(),
+        Fault(FaultParameters()),
+        lambda number: truths.append(over_bus.truth_bytes),
+    )
+    answering = _in_thread(host.answer_each, 300, lambda sample: 1.0)
+    loop.run_in_lockstep(threading.Event(), LIMIT)
+    answering.join()
+    plain, answer = make_mount(), None
+    for number in range(300):
+        plain.measure()
+        assert plain.truth_bytes == truths[number]
+        plain.advance(answer)
+        answer = 1.0
+
+
+def test_an_answer_that_does_not_come_ends_the_run_and_names_the_sample(ends, make_mount):
+    end, host = ends
+    loop = _loop(make_mount(), end)
+    answering = _in_thread(host.answer_each, 20, lambda sample: 0.0)
+    with pytest.raises(NoAnswerError, match=r'sample 20 \(0\.020 s\) was not answered within 0\.5 s'):
+        loop.run_in_lockstep(threading.Event(), 0.5)
+    answering.join()
+    assert loop.figures.samples == 21
+
+
+def test_the_first_sample_waits_for_whoever_answers_it(ends, make_mount):
+    end, host = ends
+    loop, ending = _loop(make_mount(), end), threading.Event()
+    running = _in_thread(loop.run_in_lockstep, ending, 0.0)  # no patience at all
+    assert host.receive() is not None
+    running.join(0.7)
+    assert running.is_alive()
+    ending.set()
+    running.join()
+    assert loop.figures.samples == 1
+
+
+# Faults and real time
+
+
+def test_a_deaf_end_switches_off_on_its_own_and_says_so(ends, make_mount):
+    end, host = ends
+    mount = make_mount()
+    answering = _in_thread(host.answer_each, 300, lambda sample: 1.0)
+    loop = _loop(mount, end, 'deaf')
+    loop.run_in_lockstep(threading.Event(), LIMIT)
+    answering.join()
+    assert mount.truth['coil_current'] == 0.0
+    assert [sample.enabled for sample in host.samples] == [True] * 20 + [False] * 280
+    assert [status.setpoint_timeout for status in host.statuses[:3]] == [False, True, True]
+    assert loop.figures.answered == 1  # the last one, after the run
+
+
+def test_a_frame_that_switches_off_brings_0_ampere_in_real_time(ends, make_mount):
+    end, host = ends
+    mount, ending = make_mount(timeline__duration=20.0), threading.Event()
+    loop = _loop(mount, end)
+    running = _in_thread(loop.run_in_real_time, ending)
+    try:
+        sample = _next_sample(host)
+        while mount.truth['coil_current'] < 0.5:
+            host.send(Setpoint(1.0, sample.sample_counter))
+            sample = _next_sample(host)
+        assert loop.figures.answered > 0
+        while mount.truth['coil_current'] > 0.0:
+            host.send(Setpoint(1.0, sample.sample_counter, enable=False))
+            sample = _next_sample(host)
+    finally:
+        ending.set()
+        running.join()
+
+
+def _next_sample(host):
+    while (sample := host.receive()) is None:
+        pass
+    return sample
+
+
+def test_in_real_time_a_run_takes_its_time_by_the_electronics_clock(ends, make_mount):
+    end, host = ends
+    mount = make_mount(timeline__duration=0.2)
+    loop = _loop(mount, end)
+    loop.run_in_real_time(threading.Event())
+    assert mount.finished
+    assert loop.figures.samples == 200
+    assert loop.figures.wall_time >= 0.198
+    while len(host.samples) < 200:
+        host.receive()
+    assert [sample.enabled for sample in host.samples] == [True] * 20 + [False] * 180

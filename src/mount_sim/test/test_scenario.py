@@ -1,0 +1,103 @@
+"""From the parameters of a scenario to its excitation."""
+
+import numpy as np
+import pytest
+
+from mount_models.quantity import ParameterError
+from mount_sim.excitation import Seat
+from mount_sim.scenario import STEP_TIME, build_excitation
+
+
+def _refusal(chosen):
+    with pytest.raises(ParameterError) as caught:
+        build_excitation(chosen)
+    return str(caught.value)
+
+
+def test_an_unknown_scenario_is_refused_with_the_known_ones(parameters):
+    assert _refusal(parameters(scenario='race')) == (
+        "scenario 'race' is unknown; known are motorway, bench, recorded"
+    )
+
+
+def test_the_bench_moves_the_mount_on_a_sine_faded_in_over_one_period(parameters):
+    excitation = build_excitation(parameters(scenario='bench', timeline__duration=2.0, timeline__start=1.5))
+    assert (excitation.seat, excitation.start, excitation.step_time) == (Seat.BENCH, 1.5, STEP_TIME)
+    assert excitation.duration == pytest.approx(2.0)
+    times = np.arange(40_000) * STEP_TIME
+    sine = 1e-3 * np.sin(2 * np.pi * 8.0 * times)
+    np.testing.assert_allclose(excitation.values[2500:], sine[2500:], atol=1e-15)
+    # it begins and ends its fade without a corner: no acceleration far above the sine's own
+    acceleration = np.abs(np.diff(np.r_[0.0, 0.0, excitation.values], 2)) / STEP_TIME**2
+    assert acceleration.max() < 2.5 * 1e-3 * (2 * np.pi * 8.0) ** 2
+    assert np.abs(excitation.values).max() <= 1e-3
+
+
+def test_the_gap_comes_after_a_third_of_the_drive_unless_told_otherwise(parameters):
+    def entry(**changes):
+        chosen = parameters(
+            timeline__duration=6.0, motorway__roughness=0.0, motorway__gap_depth=0.03, **changes
+        )
+        values = build_excitation(chosen).values
+        hollow = np.flatnonzero(values < -1e-9) * STEP_TIME
+        return hollow[0], hollow[-1], values.min()
+
+    begin, end, depth = entry()
+    assert begin == pytest.approx(2.0, abs=2 * STEP_TIME)
+    assert end - begin == pytest.approx(1.0 / 33.0, abs=3 * STEP_TIME)
+    assert depth == pytest.approx(-0.03, rel=1e-4)
+    assert entry(motorway__gap_time=4.5)[0] == pytest.approx(4.5, abs=2 * STEP_TIME)
+
+
+def test_a_gap_after_the_end_of_the_drive_is_refused(parameters):
+    chosen = parameters(timeline__duration=3.0, motorway__gap_time=3.0)
+    assert 'motorway.gap_time (3 s) must lie before the end of the drive (3 s)' in _refusal(chosen)
+    without = parameters(timeline__duration=3.0, motorway__gap_time=3.0, motorway__gap_depth=0.0)
+    assert build_excitation(without).seat is Seat.VEHICLE
+
+
+def test_without_a_duration_the_drive_takes_15_s(parameters):
+    for scenario in ('bench', 'motorway'):
+        assert build_excitation(parameters(scenario=scenario)).duration == pytest.approx(15.0)
+
+
+def test_the_road_belongs_to_the_seed(parameters):
+    def road(seed):
+        return build_excitation(parameters(timeline__duration=1.0, seed=seed)).values
+
+    np.testing.assert_array_equal(road(7), road(7))
+    assert np.abs(road(7) - road(8)).max() > 1e-4
+    smooth = build_excitation(parameters(timeline__duration=1.0, motorway__roughness=0.0, seed=7)).values
+    assert np.abs(road(7) - smooth).max() > 1e-4
+
+
+@pytest.fixture
+def recording(tmp_path):
+    times = np.arange(2000) / 200.0
+    np.save(tmp_path / 'z_value.npy', np.sin(2 * np.pi * 8.0 * times))
+    np.save(tmp_path / 'z_t.npy', times)
+    return str(tmp_path / 'z_value.npy')
+
+
+def test_a_recording_shakes_the_chassis_and_gives_its_length(parameters, recording):
+    excitation = build_excitation(parameters(scenario='recorded', recorded__file=recording))
+    assert excitation.seat is Seat.ACCELERATED_CHASSIS
+    assert excitation.duration == pytest.approx(9.995, abs=1e-4)
+    shorter = build_excitation(
+        parameters(scenario='recorded', recorded__file=recording, timeline__duration=4.0)
+    )
+    np.testing.assert_array_equal(shorter.values, excitation.values[:80_000])
+
+
+def test_a_recording_is_scaled(parameters, recording):
+    plain, scaled = (
+        build_excitation(parameters(scenario='recorded', recorded__file=recording, recorded__scale=scale))
+        for scale in (1.0, -9.81)
+    )
+    np.testing.assert_allclose(scaled.values, -9.81 * plain.values)
+
+
+def test_what_a_recording_cannot_give_is_refused(parameters, recording):
+    assert 'scenario recorded needs a file: CSV, NPY or MCAP' in _refusal(parameters(scenario='recorded'))
+    too_long = parameters(scenario='recorded', recorded__file=recording, timeline__duration=10.5)
+    assert 'duration (10.5 s) is longer than the recording z.0 (9.995 s)' in _refusal(too_long)

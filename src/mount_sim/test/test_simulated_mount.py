@@ -1,0 +1,145 @@
+"""Electronics and plant together, sample by sample."""
+
+import numpy as np
+import pytest
+
+from mount_models.closing import ClosingError
+from mount_models.quantity import ParameterError
+from mount_ros import topics
+from mount_sim.excitation import Seat
+from mount_sim.plant import TRUTH, Plant, PlantSimulation
+
+
+def test_truth_has_the_names_of_its_topic():
+    assert TRUTH.names == topics.SIM_TRUTH.names
+    assert {TRUTH[name] for name in TRUTH.names} == {np.dtype('f8')}
+
+
+def test_truth_bytes_are_its_numbers(make_mount):
+    mount = make_mount()
+    mount.measure()
+    numbers = np.frombuffer(mount.truth_bytes, '<f8')
+    np.testing.assert_array_equal(numbers, [mount.truth[name] for name in TRUTH.names])
+
+
+def test_a_run_is_the_rest_and_then_the_excitation(make_mount, drive):
+    mount = make_mount(timeline__start=0.1, timeline__duration=0.25)
+    assert (mount.run.samples, mount.run.excitation_start) == (350, 100)
+    _, truth = drive(mount)
+    assert mount.time == pytest.approx(0.35)
+    assert mount.finished
+    assert (truth['displacement'][:101] == 0.0).all()
+    assert (truth['displacement'][102:] != 0.0).all()
+
+
+def test_a_setpoint_takes_effect_at_the_sample_after_the_one_it_answers(make_mount):
+    """As on the bus: the answer to sample k is there when sample k+1 is taken, and acts from then on."""
+    mount, answer, currents = make_mount(), None, []
+    for number in range(6):
+        mount.measure()
+        currents.append((mount.truth['current_setpoint'], mount.truth['coil_current']))
+        mount.advance(answer)
+        answer = 1.0 if number >= 2 else 0.0  # sample 2 is the first one answered with 1 A
+    assert [setpoint for setpoint, _ in currents] == [0.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+    assert [current > 0.0 for _, current in currents] == [False, False, False, False, True, True]
+
+
+@pytest.mark.parametrize(('timeout', 'samples'), [(0.020, 20), (0.005, 5)])
+def test_without_setpoints_the_electronics_go_to_0_ampere_on_their_own(make_mount, drive, timeout, samples):
+    last = 50
+    mount = make_mount(electronics__setpoint_timeout=timeout)
+    enabled = []
+
+    def setpoint(number):
+        enabled.append(mount.enabled)
+        return 1.0 if number <= last else None
+
+    _, truth = drive(mount, setpoint)
+    setpoints = truth['current_setpoint']  # of the step that ends at the sample
+    assert (setpoints[1 : last + 1 + samples] == 1.0).all()
+    assert (setpoints[last + 1 + samples :] == 0.0).all()
+    assert (truth['coil_current'][last + samples + 60 :] == 0.0).all()
+    assert enabled == [number < last + 1 + samples for number in range(300)]
+
+
+def test_a_setpoint_after_a_timeout_switches_on_again(make_mount, drive):
+    _, truth = drive(make_mount(), lambda number: 1.0 if number < 10 or number >= 100 else None)
+    assert truth['coil_current'][99] == 0.0
+    assert truth['coil_current'][299] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize('scenario', ['bench', 'motorway'])
+def test_off_means_no_friction_at_all(make_mount, drive, scenario):
+    mount = make_mount(scenario=scenario, timeline__duration=1.0, motorway__gap_depth=0.03)
+    _, truth = drive(mount)
+    assert np.abs(truth['displacement']).max() > 0.9e-3
+    assert (truth['friction_force'] == 0.0).all()
+    assert (truth['normal_force'] == 0.0).all()
+
+
+def test_friction_needs_a_closed_actuator_and_opposes_the_motion(make_mount, drive):
+    _, truth = drive(make_mount(timeline__duration=1.0), lambda number: 1.0)
+    assert truth['normal_force'][-500:].min() > 60.0
+    work = np.sum(truth['friction_force'] * truth['velocity']) * 1e-3
+    assert work > 3.0  # J: it takes energy out
+    _, open_truth = drive(make_mount(timeline__duration=1.0), lambda number: 0.3)
+    assert (open_truth['friction_force'] == 0.0).all()
+
+
+def test_equal_seeds_give_equal_readings_to_the_bit(make_mount, drive):
+    def readings(seed):
+        mount = make_mount(scenario='motorway', timeline__duration=1.0, seed=seed)
+        numbers, truth = drive(mount, lambda number: 0.001 * number)
+        return numbers.tobytes(), truth.tobytes()
+
+    assert readings(5) == readings(5)
+    assert readings(5)[0] != readings(6)[0]
+    assert readings(5)[1] != readings(6)[1]
+
+
+def test_the_noise_is_no_part_of_the_truth(make_mount, drive):
+    quiet, quiet_truth = drive(make_mount(electronics__displacement_noise=0.0))
+    noisy, noisy_truth = drive(make_mount(electronics__displacement_noise=1e-4))
+    assert quiet_truth.tobytes() == noisy_truth.tobytes()
+    np.testing.assert_array_equal(quiet[:, 0], quiet_truth['displacement'])
+    assert np.std(noisy[:, 0] - noisy_truth['displacement']) == pytest.approx(1e-4, rel=0.2)
+
+
+@pytest.mark.parametrize(('depth', 'peak'), [(0.030, 3.55e-3), (0.020, 2.37e-3), (0.010, 1.18e-3)])
+def test_a_gap_in_the_road_without_damping_shakes_the_engine(make_mount, drive, depth, peak):
+    mount = make_mount(
+        scenario='motorway', timeline__duration=3.0, motorway__gap_depth=depth, motorway__roughness=0.0
+    )
+    _, truth = drive(mount)
+    assert np.abs(truth['displacement']).max() == pytest.approx(peak, rel=0.005)
+    # the chassis follows, the engine more so: the mount is between them
+    relative = truth['engine_displacement'] - truth['chassis_displacement']
+    np.testing.assert_allclose(relative, truth['displacement'], atol=1e-12)
+    assert truth['road_height'].min() == pytest.approx(-depth, rel=1e-3)
+
+
+def test_the_gaps_of_the_truth_are_those_of_the_parameters(make_mount, drive):
+    mount = make_mount(mechanics__rest_gap=500e-6, mechanics__contact_gap=340e-6)
+    _, truth = drive(mount, lambda number: 1.0)
+    assert set(truth['rest_gap']) == {500e-6}
+    assert set(truth['contact_gap']) == {340e-6}
+    assert truth['gap'][0] == 500e-6
+    closed = 340e-6 - truth['normal_force'][-1] / 2e7
+    assert truth['gap'][-1] == pytest.approx(closed, abs=1e-9)
+
+
+def test_the_bench_force_is_elastomer_plus_friction(make_mount, drive):
+    _, free = drive(make_mount())
+    _, damped = drive(make_mount(), lambda number: 1.0)
+    np.testing.assert_allclose(
+        damped['mount_force'] - damped['friction_force'], free['mount_force'], atol=1e-9
+    )
+
+
+def test_an_impossible_plant_is_refused():
+    crossed = Plant()._replace(mechanics=Plant().mechanics._replace(rest_gap=340e-6))
+    with pytest.raises(ClosingError):
+        PlantSimulation(crossed, Seat.BENCH, 5e-5)
+    negative = Plant()._replace(friction=Plant().friction._replace(scale=-1.0))
+    with pytest.raises(ParameterError, match='scale'):
+        PlantSimulation(negative, Seat.BENCH, 5e-5)
