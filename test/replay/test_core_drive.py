@@ -1,0 +1,215 @@
+"""Acceptance of the whole chain: initialisation, control and plant as plain function calls.
+
+Plant and controller share the friction law unless a test says otherwise; so the figures say how well the
+chain works, not how well the law describes a real mount.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mount_bringup.core_chain import chosen_damper, control_parameters
+from mount_bringup.core_run import CoreOutcome, run_core
+from mount_bringup.evaluation import Drive, switching, tracking_error
+from mount_ros import topics
+from mount_ros.scalars import ScalarsLayout
+from mount_ros.topics import Topic
+
+PERIOD = 0.125  # s, of 8 Hz
+BENCH = {
+    'scenario': 'bench',
+    'timeline.start': 2.8,
+    'timeline.duration': 4.0,
+    'electronics.ripple_noise': 0.0,
+}
+SHORT = {**BENCH, 'timeline.duration': 0.2}
+UNREACHABLE = {'switch_on_level': 0.009}  # m: damping never goes on
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A core run: its outcome and the scalars of its topics, each with stamps (ns)."""
+
+    outcome: CoreOutcome
+    settings: dict[str, dict[str, Any]]
+    tables: dict[str, tuple[NDArray[np.int64], dict[str, NDArray[np.float64]]]]
+
+    def __getitem__(self, topic: Topic) -> dict[str, NDArray[np.float64]]:
+        return self.tables[topic.name][1]
+
+    def stamps(self, topic: Topic) -> NDArray[np.int64]:
+        return self.tables[topic.name][0]
+
+    @property
+    def drive(self) -> Drive:
+        """The signals as the evaluation of a drive wants them."""
+        truth, samples = self[topics.SIM_TRUTH], self.stamps(topics.DISPLACEMENT)
+        zero = round(self.outcome.excitation_start * 1e9)
+        places = np.searchsorted(samples, self.stamps(topics.CONTROL_TRACE))
+        active, current = np.zeros(len(samples), bool), np.zeros(len(samples))
+        active[places] = self[topics.CONTROL_TRACE]['damping_active'] > 0.5
+        current[places] = self[topics.CONTROL_TRACE]['current']
+        return Drive(
+            time=(samples - zero) / 1e9,
+            displacement=self[topics.DISPLACEMENT]['mount'],
+            current=current,
+            damping_active=active,
+            true_time=(self.stamps(topics.SIM_TRUTH) - zero) / 1e9,
+            true_velocity=truth['velocity'],
+            friction_force=truth['friction_force'],
+            excitation_start=zero,
+        )
+
+    @property
+    def tracking(self) -> float:
+        """Rms error of the friction force as a share of the wanted peak."""
+        return tracking_error(self.drive, control_parameters(self.settings), chosen_damper(self.settings))
+
+
+def _run(sim: dict[str, Any], control: dict[str, Any] | None = None) -> Recorded:
+    settings = {'mount_sim': sim, 'mount_control': control or {}}
+    wanted = (topics.DISPLACEMENT, topics.CONTROL_TRACE, topics.SIM_TRUTH, topics.CURRENT_SETPOINT)
+    rows: dict[str, list[tuple[int, tuple[float, ...]]]] = {topic.name: [] for topic in wanted}
+    layouts = {topic.name: ScalarsLayout(topic) for topic in wanted}
+
+    def write(topic: Topic, raw: bytes, stamp: int) -> None:
+        if topic.name in rows:
+            rows[topic.name].append(layouts[topic.name].unpack(raw)[:2])
+
+    outcome = run_core(settings, write)
+    tables = {
+        name: (
+            np.array([stamp for stamp, _ in entries]),
+            dict(zip(layouts[name].names, np.array([numbers for _, numbers in entries]).T, strict=True)),
+        )
+        for name, entries in rows.items()
+        if entries
+    }
+    return Recorded(outcome, settings, tables)
+
+
+def _initialisation(**changes: Any):
+    """The result of an initialisation with some of the plant's parameters changed."""
+    settings = {'mount_sim': {**SHORT, **{name.replace('__', '.'): v for name, v in changes.items()}}}
+    result = run_core(settings, lambda topic, raw, stamp: None).result
+    assert result is not None
+    return result
+
+
+@pytest.fixture(scope='module')
+def matched() -> Recorded:
+    """Bench, 8 Hz, 1 mm, viscous_2000; controller and plant have the same friction, no ripple noise."""
+    return _run(BENCH)
+
+
+def test_friction_force_follows_the_damper(matched):
+    assert matched.tracking <= 0.02
+
+
+def test_friction_force_is_never_far_from_the_damper_s(matched):
+    """The same in the largest error of a sample, over the last 2 s: at most 4 % of the peak."""
+    settled = matched.drive.damping_active & (matched.drive.time > 2.0)
+    time, force = matched.drive.time[settled], matched[topics.SIM_TRUTH]['friction_force'][settled]
+    # what the plant shows at a sample is the force of the step that has just ended, half a sample ago
+    velocity = 1e-3 * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * time)
+    wanted = chosen_damper({}).force(velocity)
+    assert np.abs(force - wanted).max() <= 0.04 * np.abs(wanted).max()
+
+
+def test_friction_force_follows_the_damper_after_a_noisy_initialisation():
+    errors = [_run({**BENCH, 'electronics.ripple_noise': 0.01, 'seed': seed}).tracking for seed in (1, 2, 3)]
+    assert max(errors) <= 0.03
+
+
+@pytest.mark.parametrize('scale', [0.85, 1.15])
+def test_friction_force_follows_where_the_plant_s_friction_differs(scale):
+    assert _run({**BENCH, 'friction.scale': scale}).tracking <= 0.13
+
+
+def test_the_mount_force_is_nearly_a_sine(matched):
+    harmonics = _harmonics(matched)
+    assert harmonics[0] == pytest.approx(209.5, rel=0.01)
+    distortion = np.sqrt(np.sum(harmonics[1:] ** 2)) / harmonics[0]
+    assert distortion <= 0.03
+
+
+def _harmonics(recorded: Recorded) -> NDArray[np.float64]:
+    """Amplitudes (N) of harmonics 1 to 8 of the mount force over whole periods, damping settled."""
+    time, force = recorded.drive.true_time, recorded[topics.SIM_TRUTH]['mount_force']
+    first = int(np.searchsorted(time, 1.0 - 1e-9))
+    count = 24 * round(PERIOD / 1e-3)
+    spectrum = np.abs(np.fft.rfft(force[first : first + count])) * 2.0 / count
+    return spectrum[24 : 24 * 9 : 24]
+
+
+def test_damping_takes_energy_out_and_none_goes_back(matched):
+    settled = matched.drive.true_time > 1.0
+    truth = matched[topics.SIM_TRUTH]
+    power = truth['friction_force'][settled] * truth['velocity'][settled]
+    assert power.min() >= -0.05 * power.max()
+    dissipated = power.sum() * 1e-3 / (settled.sum() * 1e-3 / PERIOD)
+    ideal = _dissipation_of_the_damper()
+    assert dissipated == pytest.approx(ideal, rel=0.03)
+
+
+def _dissipation_of_the_damper() -> float:
+    """Work per period (J) of the selected damper at 8 Hz and 1 mm."""
+    time = np.arange(0.0, PERIOD, 1e-5)
+    velocity = 1e-3 * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * time)
+    return float(np.sum(chosen_damper({}).force(velocity) * velocity) * 1e-5)
+
+
+def test_damping_goes_on_one_period_after_the_magnitude_exceeds_its_level(matched):
+    times = switching(matched.drive)
+    assert len(times.on) == 1
+    assert times.off == ()
+    magnitude = matched[topics.CONTROL_TRACE]['magnitude']
+    exceeded = matched.stamps(topics.CONTROL_TRACE)[np.argmax(magnitude > 0.0008)]
+    on = round(1e9 * times.on[0]) + matched.drive.excitation_start
+    assert (on - exceeded) / 1e9 == pytest.approx(0.124)
+
+
+def test_the_current_stays_far_from_its_limits(matched):
+    current = matched[topics.CURRENT_SETPOINT]['coil_current'][2800:]
+    assert 0.9 < current.max() < 1.2
+    assert set(current[:100]) == {0.0}
+
+
+def test_with_damping_off_there_is_no_friction_at_all_after_initialisation():
+    recorded = _run({**BENCH, 'timeline.duration': 1.0}, UNREACHABLE)
+    truth, time = recorded[topics.SIM_TRUTH], recorded.drive.true_time
+    during = time < -0.01
+    assert truth['normal_force'][during].max() > 200.0  # the ramp of the initialisation closes the actuator
+    assert np.abs(truth['displacement']).max() > 0.99e-3
+    assert (truth['friction_force'][~during] == 0.0).all()
+    assert (truth['coil_current'][~during] == 0.0).all()
+    assert (recorded[topics.CONTROL_TRACE]['current'] == 0.0).all()
+
+
+# Initialisation against the truth, through the whole chain
+
+
+@pytest.mark.parametrize(
+    ('contact_gap', 'rest_gap'),
+    [
+        (300e-6, 480e-6),
+        (300e-6, 540e-6),
+        (349e-6, 508e-6),
+        (400e-6, 510e-6),
+        (440e-6, 500e-6),
+        (440e-6, 540e-6),
+    ],
+)
+def test_without_noise_the_gaps_are_measured_within_a_micrometre(contact_gap, rest_gap):
+    result = _initialisation(mechanics__contact_gap=contact_gap, mechanics__rest_gap=rest_gap)
+    assert result.contact_gap == pytest.approx(contact_gap, abs=1e-6)
+    assert result.rest_gap == pytest.approx(rest_gap, abs=1e-6)
+
+
+def test_with_noise_the_gaps_of_20_seeds_stay_within_their_targets():
+    results = [_initialisation(electronics__ripple_noise=0.01, seed=seed) for seed in range(20)]
+    assert max(abs(result.rest_gap - 508e-6) for result in results) <= 4e-6
+    assert max(abs(result.contact_gap - 349e-6) for result in results) <= 2e-6
