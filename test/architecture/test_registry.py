@@ -1,17 +1,31 @@
-"""The registry of topics, the nodes and docs/interface.md say the same."""
+"""The registry of topics, the nodes, docs/interface.md and the tables of READMEs say the same."""
 
 import ast
+import math
 import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
+import typer
 from cantools.database.can import Database
 
+from mount_bringup.command import app
 from mount_bringup.graph import SIMULATED
 from mount_control.controller import TRACE
 from mount_driver.codec import DATABASE_FILE
+from mount_models.actuator.law import ForceLaw
+from mount_models.actuator.reluctance import ReluctanceActuator
+from mount_models.closing import ClosingMechanics
+from mount_models.coil.ripple import RippleCoil
+from mount_models.damper import DegressiveDamper, ProgressiveDamper, ViscousDamper
+from mount_models.elastomer import Elastomer
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.quantity import quantities
+from mount_models.road import Gap, RandomRoad, Sweep
+from mount_models.vehicle import Vehicle
 from mount_ros import topics
 from mount_ros.qos import publisher_qos
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, SESSION, SIM_TRUTH, TOPICS, Delivery, Topic
@@ -25,6 +39,11 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
     'mount_ros/diagnostics.py',
     'mount_bringup/supervisor.py',
 }
+
+PARAMETER_SETS = (
+    ForceLaw, ReluctanceActuator, RippleCoil, ClosingMechanics, FrictionCoefficients, FrictionContact,
+    ViscousDamper, DegressiveDamper, ProgressiveDamper, Elastomer, Vehicle, RandomRoad, Gap, Sweep,
+)  # fmt: skip
 
 
 def test_interface_lists_every_topic_and_no_other():
@@ -132,10 +151,39 @@ def test_interface_lists_the_figures_of_a_drive():
     assert [row['figure'] for row in table('Figures')] == keys
 
 
+def test_models_readme_lists_every_parameter_with_unit_range_and_source():
+    listed: dict[str, list[tuple[str, ...]]] = {}
+    for row in table('Parameters', 'src/mount_models/README.md'):
+        name, *values = row.values()
+        listed.setdefault(name, []).append(tuple(values))
+    assert set(listed) == {kind.__name__ for kind in PARAMETER_SETS}
+    for kind in PARAMETER_SETS:
+        defaults = kind._field_defaults
+        assert listed[kind.__name__] == [
+            (
+                name,
+                f'{defaults[name]:g}' if name in defaults else '',
+                note.unit,
+                f'{note.low:g} .. {note.high:g}' if note.low > -math.inf else '',
+                note.source,
+            )
+            for name, note in quantities(kind).items()
+        ]
+
+
+def test_bringup_readme_lists_every_option_of_drive():
+    command = typer.main.get_command(app)
+    assert isinstance(command, typer.core.TyperGroup)
+    options = {parameter.opts[0] for parameter in command.commands['drive'].params}
+    assert {row['option'].split()[0] for row in table('drive', 'src/mount_bringup/README.md')} == options
+    commands = {row['command'].split()[1] for row in table('Commands', 'src/mount_bringup/README.md')}
+    assert commands == set(command.commands)
+
+
 @cache
-def table(heading: str) -> list[dict[str, str]]:
-    """Return the first table below a heading of docs/interface.md, code marks removed."""
-    text = (REPOSITORY / 'docs' / 'interface.md').read_text()
+def table(heading: str, file: str = 'docs/interface.md') -> list[dict[str, str]]:
+    """Return the first table below a heading of a page, code marks removed."""
+    text = (REPOSITORY / file).read_text()
     section = re.split(rf'^#+ {heading}$', text, flags=re.MULTILINE)[1]
     lines = re.findall(r'(?:^\|.*\|\n)+', section, flags=re.MULTILINE)[0].splitlines()
     header, *rows = [
