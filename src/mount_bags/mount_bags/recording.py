@@ -16,8 +16,8 @@ from mount_bags.writer import BagWriter, RecordingError
 MEMORY_LIMIT = 64 * 1024 * 1024  # bytes, chosen: half a minute of a full drive with the simulator's truth
 _DRAIN_PERIOD = 0.02  # s, chosen: what a crash may cost besides the chunk being filled
 _FLUSH_PERIOD = 1.0  # s, chosen: the same where messages are rare
-_QUIET_PERIOD = 0.05  # s, chosen: after the last publisher stopped, so long may a message be under way
-_SETTLE_LIMIT = 0.5  # s, chosen
+_QUIET_PERIOD = 0.15  # s, chosen: several heartbeats of a writer, in which a missing message is repaired
+_SETTLE_LIMIT = 5.0  # s, chosen
 
 Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns)."""

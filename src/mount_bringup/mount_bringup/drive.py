@@ -198,7 +198,8 @@ def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str
         'mount_recorder': {'uri': str(folder.recording), 'on_full': order.on_full},
         'mount_driver': can,
         'mount_sim': can,
-        'mount_init': {},
+        # Nothing but a stalled process may end a ramp in lock-step.
+        'mount_init': {'silence_timeout': 10.0} if lockstep else {},
         'mount_control': {},
     }
     return {

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,22 +47,30 @@ def load_drive(recording: Recording, excitation_start: float) -> Drive:
         recording['control_trace'],
         recording['sim/truth'],
     )
-    zero = int(truth.stamps[0]) + round(excitation_start * _SECOND)
-    active = np.zeros(len(displacement.stamps), dtype=bool)
-    current = np.zeros(len(displacement.stamps))
-    places = np.searchsorted(displacement.stamps, trace.stamps)
-    active[places] = trace['damping_active'] > 0.5
-    current[places] = trace['current']
+    zero = int(truth.stamps.min()) + round(excitation_start * _SECOND)
+    shown, traced, seen = (np.argsort(series.stamps) for series in (displacement, trace, truth))
+    stamps = displacement.stamps[shown]
+    active = np.zeros(len(stamps), dtype=bool)
+    current = np.zeros(len(stamps))
+    places, of_trace = _common(stamps, trace.stamps[traced])
+    active[places] = (trace['damping_active'][traced] > 0.5)[of_trace]
+    current[places] = trace['current'][traced][of_trace]
     return Drive(
-        time=(displacement.stamps - zero) / _SECOND,
-        displacement=displacement['mount'],
+        time=(stamps - zero) / _SECOND,
+        displacement=displacement['mount'][shown],
         current=current,
         damping_active=active,
-        true_time=(truth.stamps - zero) / _SECOND,
-        true_velocity=truth['velocity'],
-        friction_force=truth['friction_force'],
+        true_time=(truth.stamps[seen] - zero) / _SECOND,
+        true_velocity=truth['velocity'][seen],
+        friction_force=truth['friction_force'][seen],
         excitation_start=zero,
     )
+
+
+def _common(stamps: NDArray[np.int64], others: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return where the stamps that both have stand in each."""
+    _, places, of_others = np.intersect1d(stamps, others, return_indices=True)
+    return places, of_others
 
 
 def switching(drive: Drive) -> Switching:

@@ -5,7 +5,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from mount_ros.topics import Delivery, Topic
 
 CONTROL_DEPTH = 10  # measured: depth 1 loses 0.1 to 0.5 % at 1 kHz, 10 loses nothing
-STREAM_DEPTH = 1000  # chosen: a second of data for a recorder that the scheduler lets wait
+STREAM_DEPTH = 5000  # chosen: five seconds of data for a recorder that the scheduler lets wait
 MARK_DEPTH = 100  # chosen
 
 
