@@ -79,7 +79,12 @@ class Collector:
                     batch.append((times['received_timestamp'], times['source_timestamp'], raw, receive))
         batch.sort(key=operator.itemgetter(0))
         for received, sent, raw, receive in batch:
-            receive(raw, received, sent)
+            try:
+                receive(raw, received, sent)
+            except Exception as error:
+                # The border of the thread: what one message does must not cost all others.
+                text = f'a message was not taken: {type(error).__name__}: {error}'
+                self.node.get_logger().error(text, throttle_duration_sec=1.0)
 
 
 def _never_called(_: bytes) -> None:

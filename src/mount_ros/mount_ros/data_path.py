@@ -54,11 +54,14 @@ class DataPath:
         return self.publisher(topic).handle.publish_raw
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
-        """Call `callback` with the serialised bytes of each message of `topic`."""
+        """Call `callback` with the serialised bytes of each message of `topic`.
+
+        An exception costs the message that it came with, and is logged; later ones are served.
+        """
         subscription = self.node.create_subscription(
             message_class(topic.type),
             topic.name,
-            callback,
+            self._surviving(topic, callback),
             control_qos(topic, lockstep=self.lockstep),
             raw=True,
         )
@@ -101,6 +104,19 @@ class DataPath:
         elif self._serving:
             self._thread.remove(self.node)
         self.node.destroy_node()
+
+    def _surviving(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        # The border of the data thread: an exception would end it, and with it every node that it serves.
+        logger = self.node.get_logger()
+
+        def guarded(raw: bytes) -> None:
+            try:
+                callback(raw)
+            except Exception as error:
+                text = f'message of {topic.name} not used: {type(error).__name__}: {error}'
+                logger.error(text, throttle_duration_sec=1.0)
+
+        return guarded
 
 
 class DataThread:

@@ -2,7 +2,9 @@
 
 import gc
 import signal
+import sys
 import threading
+import traceback
 from collections.abc import Callable, Sequence
 
 import rclpy
@@ -27,6 +29,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's rest.
 
     At the end they are closed in reverse order, so that who sends setpoints ends before who carries them.
+    An exception in one of them ends all in the same way, with exit code 1.
     """
     prepare_environment()
     # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
@@ -38,10 +41,23 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: [node.ending.set() for node in nodes])
     gc.freeze()  # what stands after set-up need not be looked at again
-    threads = [threading.Thread(target=_serve, args=(node,), name=node.get_name()) for node in nodes[1:]]
+    failed: list[SafeLifecycleNode] = []
+
+    def serve(node: SafeLifecycleNode) -> None:
+        try:
+            _serve(node)
+        except Exception as error:
+            # The border of the process: nobody would close the nodes, and the others would live on alone.
+            traceback.print_exc()
+            node.get_logger().fatal(f'{type(error).__name__}: {error}')
+            failed.append(node)
+            for each in nodes:
+                each.ending.set()
+
+    threads = [threading.Thread(target=serve, args=(node,), name=node.get_name()) for node in nodes[1:]]
     for thread in threads:
         thread.start()
-    _serve(nodes[0])
+    serve(nodes[0])
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for thread in threads:
         thread.join()
@@ -49,12 +65,16 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         node.close()
         node.destroy_node()
     rclpy.try_shutdown()
+    if failed:
+        sys.exit(1)
 
 
 def _serve(node: SafeLifecycleNode) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    while rclpy.ok() and not node.ending.is_set():
-        executor.spin_once(_SPIN_PERIOD)
-    executor.remove_node(node)
-    executor.shutdown()
+    try:
+        while rclpy.ok() and not node.ending.is_set():
+            executor.spin_once(_SPIN_PERIOD)
+    finally:
+        executor.remove_node(node)
+        executor.shutdown()

@@ -1,0 +1,199 @@
+"""The data path between two nodes: served at once, now and then, or no more."""
+
+import threading
+
+import pytest
+from rclpy.node import Node
+
+from mount_ros.data_path import DataPath, DataThread
+from mount_ros.scalars import ScalarsLayout
+from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
+
+LIMIT = 30.0  # s
+
+
+class End:
+    """A node with a data path that keeps the stamps of what it receives and in which thread it did."""
+
+    def __init__(self, context, name, thread=None):
+        self.node = Node(name, context=context)
+        self.path = DataPath(self.node, lockstep=True, thread=thread)
+        self.stamps = []
+        self.threads = set()
+        self.layout = ScalarsLayout(DISPLACEMENT)
+
+    def take(self, raw):
+        self.stamps.append(self.layout.unpack(raw)[0])
+        self.threads.add(threading.current_thread().name)
+
+    def close(self):
+        stopping = threading.Thread(target=self.path.stop, daemon=True)
+        stopping.start()
+        stopping.join(LIMIT)
+        assert not stopping.is_alive(), 'the path does not end'
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def make_end(context):
+    made = []
+
+    def make(name, thread=None):
+        made.append(End(context, name, thread))
+        return made[-1]
+
+    yield make
+    for end in made:
+        end.close()
+
+
+@pytest.fixture
+def pair(make_end, wait_until):
+    """A sender and a receiver of the displacement, connected, and the function that sends a stamp."""
+    sender, receiver = make_end('sender'), make_end('receiver')
+    publish = sender.path.sender(DISPLACEMENT)
+    receiver.path.subscribe(DISPLACEMENT, receiver.take)
+    sender.path.start()
+    receiver.path.start()
+    wait_until(lambda: not sender.path.unmatched() and not receiver.path.unmatched(), 'connection')
+    return receiver, lambda stamp: publish(sender.layout.pack(stamp, (0.0,)))
+
+
+def test_messages_arrive_in_the_thread_of_the_data(pair, wait_until):
+    receiver, send = pair
+    for stamp in range(20):
+        send(stamp)
+        wait_until(lambda stamp=stamp: receiver.stamps[-1:] == [stamp], 'arrival')
+    assert receiver.stamps == list(range(20))
+    assert receiver.threads == {'data'}
+
+
+def test_data_arrives_while_the_owner_serves_nothing(pair, wait_until):
+    receiver, send = pair  # nobody spins the owners' nodes here
+    send(1)
+    wait_until(lambda: receiver.stamps == [1], 'arrival')
+
+
+def test_a_resting_path_still_takes_what_comes_and_a_woken_one_serves_at_once_again(pair, wait_until):
+    receiver, send = pair
+    receiver.path.rest()
+    receiver.path.rest()  # a second time changes nothing
+    for stamp in range(5):
+        send(stamp)
+    wait_until(lambda: receiver.stamps == [0, 1, 2, 3, 4], 'arrival at rest')
+    assert receiver.threads == {'rare_look'}
+    receiver.threads.clear()
+    receiver.path.wake()
+    receiver.path.wake()
+    send(5)
+    wait_until(lambda: receiver.stamps[-1] == 5, 'arrival after waking')
+    assert receiver.threads == {'data'}
+
+
+def test_what_came_during_rest_is_not_lost_by_waking(pair, wait_until):
+    receiver, send = pair
+    for turn in range(10):
+        receiver.path.rest()
+        send(turn)
+        receiver.path.wake()
+        wait_until(lambda turn=turn: receiver.stamps[-1:] == [turn], 'arrival')
+    assert receiver.stamps == list(range(10))
+
+
+def test_a_resting_path_can_be_stopped(pair):
+    receiver, _ = pair
+    receiver.path.rest()
+    receiver.path.stop()
+    assert not [thread for thread in threading.enumerate() if thread.name == 'rare_look']
+
+
+def test_a_path_that_was_never_started_neither_rests_nor_hangs(make_end):
+    end = make_end('idle')
+    end.path.subscribe(DISPLACEMENT, end.take)
+    end.path.rest()
+    end.path.wake()
+    end.path.stop()
+    end.path.stop()
+
+
+@pytest.mark.parametrize('resting', [False, True])
+def test_a_callback_that_raises_costs_its_own_message_only(pair, wait_until, capfd, resting):
+    receiver, send = pair
+    take = receiver.take
+
+    def choke(raw):
+        take(raw)
+        if receiver.stamps[-1] == 1:
+            raise ValueError('indigestible')
+
+    receiver.take = choke
+    receiver.path.subscribe(DISPLACEMENT, choke)
+    wait_until(lambda: receiver.path.node.count_subscribers('displacement') == 2, 'second subscription')
+    if resting:
+        receiver.path.rest()
+    seen = len(receiver.stamps)
+    for stamp in range(4):
+        send(stamp)
+    wait_until(lambda: len(receiver.stamps) >= seen + 7, 'arrival of all messages')
+    assert 'message of displacement not used: ValueError: indigestible' in capfd.readouterr().err
+
+
+def test_the_end_does_not_hang_after_a_callback_that_raised(make_end, wait_until):
+    sender, receiver = make_end('sender'), make_end('receiver')
+    publish = sender.path.sender(DISPLACEMENT)
+    raised = threading.Event()
+
+    def choke(raw):
+        raised.set()
+        raise RuntimeError('indigestible')
+
+    receiver.path.subscribe(DISPLACEMENT, choke)
+    receiver.path.start()
+    wait_until(lambda: not receiver.path.unmatched() and not sender.path.unmatched(), 'connection')
+    publish(sender.layout.pack(1, (0.0,)))
+    assert raised.wait(LIMIT)
+    receiver.close()
+
+
+def test_topics_without_another_side_are_named_once_and_in_order(make_end):
+    end = make_end('alone')
+    end.path.sender(CURRENT_SETPOINT)
+    end.path.sender(COIL_RIPPLE)
+    end.path.subscribe(AIR_GAP, end.take)
+    assert end.path.unmatched() == ['/air_gap', '/coil_ripple', '/current_setpoint']
+
+
+def test_nodes_that_share_a_thread_are_served_until_the_last_one_leaves(context, make_end, wait_until):
+    thread = DataThread(context)
+    one, other, sender = make_end('one', thread), make_end('other', thread), make_end('sender', thread)
+    publish = sender.path.sender(DISPLACEMENT)
+    for end in (one, other):
+        end.path.subscribe(DISPLACEMENT, end.take)
+    for end in (one, other, sender):
+        end.path.start()
+    wait_until(lambda: sender.path.node.count_subscribers('displacement') == 2, 'both subscriptions')
+    wait_until(lambda: not any(end.path.unmatched() for end in (one, other, sender)), 'connection')
+    assert len([t for t in threading.enumerate() if t.name == 'data']) == 1
+    publish(sender.layout.pack(1, (0.0,)))
+    wait_until(lambda: 1 in one.stamps and 1 in other.stamps, 'arrival at both')
+    one.path.stop()
+    publish(sender.layout.pack(2, (0.0,)))
+    wait_until(lambda: 2 in other.stamps, 'arrival at the one that stayed')
+    assert 2 not in one.stamps
+    other.path.stop()
+    sender.path.stop()
+    assert not [t for t in threading.enumerate() if t.name == 'data']
+
+
+def test_a_thread_serves_again_after_its_last_node_has_left(context, make_end, wait_until):
+    thread = DataThread(context)
+    sender = make_end('sender')
+    publish = sender.path.sender(DISPLACEMENT)
+    for name in ('first', 'second'):
+        end = make_end(name, thread)
+        end.path.subscribe(DISPLACEMENT, end.take)
+        end.path.start()
+        wait_until(lambda end=end: not end.path.unmatched() and not sender.path.unmatched(), 'connection')
+        publish(sender.layout.pack(3, (0.0,)))
+        wait_until(lambda end=end: 3 in end.stamps, 'arrival')
+        end.path.stop()

@@ -1,0 +1,129 @@
+"""The end of a process, as a supervisor sees it."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from mount_ros.testing import free_domain
+
+LIMIT = 30.0  # s
+
+PROGRAM = """
+import sys, threading
+from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.process import run_nodes
+from mount_ros.topics import DISPLACEMENT
+
+class Probe(SafeLifecycleNode):
+    def __init__(self):
+        super().__init__(next(names))
+        self.create_timer(0.01, self._first_turn)
+        self.trigger_configure()
+        self.trigger_activate()
+    def configure(self):
+        path = self.open_data_path()
+        path.subscribe(DISPLACEMENT, lambda raw: None)
+        path.start()
+    def deactivate(self):
+        print(self.get_name(), 'deactivate', flush=True)
+        {at_the_end}
+    def cleanup(self):
+        print(self.get_name(), 'cleanup', flush=True)
+    def _first_turn(self):
+        if not hasattr(self, 'served'):
+            self.served = True
+            print(self.get_name(), 'served', flush=True)
+        {in_service}
+
+names = iter(['one', 'two'])
+run_nodes([Probe] * {count})
+print('over', flush=True)
+"""
+
+
+class Process:
+    """A process with some nodes; `lines` are what it has said."""
+
+    def __init__(self, domain, count, in_service='pass', at_the_end='pass'):
+        program = PROGRAM.format(count=count, in_service=in_service, at_the_end=at_the_end)
+        self._process = subprocess.Popen(
+            [sys.executable, '-c', program],
+            env={**os.environ, 'ROS_DOMAIN_ID': str(domain)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.lines = []
+
+    def wait_for(self, *lines):
+        wanted = set(lines)
+        for line in self._process.stdout:
+            self.lines.append(line.strip())
+            if wanted <= set(self.lines):
+                return
+        pytest.fail(f'{wanted - set(self.lines)} not said; {self._process.stderr.read()}')
+
+    def end(self, number=None):
+        """Return exit code and errors after a signal, or after nothing if it ends on its own."""
+        if number is not None:
+            self._process.send_signal(number)
+        out, errors = self._process.communicate(timeout=LIMIT)
+        self.lines += out.splitlines()
+        return self._process.returncode, errors
+
+    def kill(self):
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.communicate()
+
+
+@pytest.fixture
+def start():
+    started = []
+    with free_domain() as domain:
+        yield lambda *arguments, **more: started.append(Process(domain, *arguments, **more)) or started[-1]
+        for process in started:
+            process.kill()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_deactivates_the_node_and_the_exit_code_is_0(start, number):
+    process = start(1)
+    process.wait_for('one served')
+    code, errors = process.end(number)
+    assert (code, errors) == (0, '')
+    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_nodes_of_one_process_are_closed_in_reverse_order(start, number):
+    process = start(2)
+    process.wait_for('one served', 'two served')
+    code, errors = process.end(number)
+    assert (code, errors) == (0, '')
+    said = [line for line in process.lines if 'served' not in line]
+    assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup', 'over']
+
+
+def test_a_step_that_raises_at_the_end_does_not_keep_the_others_from_theirs(start):
+    process = start(2, at_the_end="raise ValueError('stuck')")
+    process.wait_for('one served', 'two served')
+    code, errors = process.end(signal.SIGINT)
+    assert code == 0
+    assert errors.count('deactivate failed: ValueError: stuck') == 2
+    assert process.lines[-1] == 'over'
+
+
+@pytest.mark.parametrize('name', ['one', 'two'])
+def test_an_exception_in_a_node_ends_all_nodes_of_its_process_with_code_1(start, name):
+    process = start(
+        2, in_service=f"if self.get_name() == '{name}': raise RuntimeError('nobody foresaw this')"
+    )
+    code, errors = process.end()
+    assert code == 1
+    assert f'[FATAL] [{name}]: RuntimeError: nobody foresaw this' in errors
+    said = [line for line in process.lines if 'served' not in line]
+    assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup']
