@@ -1,0 +1,250 @@
+"""A node that fails closed, seen from outside: by its services and its diagnostics."""
+
+import threading
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from mount_ros.data_path import DataPath
+from mount_ros.diagnostics import Level, Verdict
+from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.qos import publisher_qos
+from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT
+
+LIMIT = 30.0  # s
+CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
+DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
+UNCONFIGURED, INACTIVE = State.PRIMARY_STATE_UNCONFIGURED, State.PRIMARY_STATE_INACTIVE
+ACTIVE = State.PRIMARY_STATE_ACTIVE
+
+
+class Probe(SafeLifecycleNode):
+    """Notes its steps; a step listed in `faults` raises."""
+
+    def __init__(self, **arguments):
+        super().__init__('probe', **arguments)
+        self.steps = []
+        self.faults = {}
+        self.verdict = Verdict(Level.OK, 'at work', {'turns': 3})
+
+    def configure(self):
+        self.open_data_path().subscribe(DISPLACEMENT, lambda raw: None)
+        self._step('configure')
+
+    def activate(self):
+        self._step('activate')
+
+    def deactivate(self):
+        self._step('deactivate')
+
+    def cleanup(self):
+        self._step('cleanup')
+
+    def judge(self):
+        return self.verdict
+
+    def _step(self, name):
+        self.steps.append(name)
+        if name in self.faults:
+            raise self.faults[name]
+
+
+class Operator:
+    """Asks the node for transitions and listens to what it says."""
+
+    def __init__(self, context):
+        self.node = Node('operator', context=context)
+        self.said = []
+        self._change = self.node.create_client(ChangeState, '/mount_right/probe/change_state')
+        self._state = self.node.create_client(GetState, '/mount_right/probe/get_state')
+        self.node.create_subscription(
+            DiagnosticArray,
+            DIAGNOSTICS.name,
+            lambda message: self.said.extend(message.status),
+            publisher_qos(DIAGNOSTICS),
+        )
+
+    def change(self, transition):
+        return self._ask(self._change, ChangeState.Request(transition=Transition(id=transition))).success
+
+    @property
+    def state(self):
+        return self._ask(self._state, GetState.Request()).current_state.id
+
+    def heard(self, level, sentence):
+        return any((status.level[0], status.message) == (level, sentence) for status in self.said)
+
+    def _ask(self, client, request):
+        assert client.wait_for_service(LIMIT)
+        done = threading.Event()
+        future = client.call_async(request)
+        future.add_done_callback(lambda _: done.set())
+        assert done.wait(LIMIT), 'the node does not answer'
+        return future.result()
+
+
+@pytest.fixture
+def probe(context, serve):
+    probe = Probe(context=context, namespace='mount_right')
+    serve(probe)
+    yield probe
+    probe.faults.clear()
+    probe.close()
+
+
+@pytest.fixture
+def operator(context, serve, probe, wait_until):
+    operator = Operator(context)
+    serve(operator.node)
+    wait_until(lambda: operator.heard(Level.OK, 'inactive'), 'first diagnostics')
+    return operator
+
+
+def test_a_node_goes_through_its_steps(probe, operator):
+    assert [operator.change(transition) for transition in (CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP)] == [
+        True
+    ] * 4
+    assert probe.steps == ['configure', 'activate', 'deactivate', 'cleanup']
+    assert operator.state == UNCONFIGURED
+
+
+@pytest.mark.parametrize('transition', [ACTIVATE, DEACTIVATE, CLEANUP])
+def test_a_transition_that_is_not_valid_is_answered_with_no_and_the_node_lives(
+    probe, operator, capfd, transition
+):
+    assert not operator.change(transition)
+    assert f'transition {transition} refused' in capfd.readouterr().err
+    assert probe.steps == []
+    assert operator.change(CONFIGURE)
+    assert operator.change(ACTIVATE)
+    assert operator.state == ACTIVE
+
+
+def test_a_second_activation_is_refused_and_the_node_stays_active(probe, operator):
+    operator.change(CONFIGURE)
+    operator.change(ACTIVATE)
+    assert not operator.change(ACTIVATE)
+    assert operator.state == ACTIVE
+    assert probe.active
+    assert probe.steps == ['configure', 'activate']
+
+
+@pytest.mark.parametrize(
+    ('error', 'sentence'),
+    [
+        (ValueError('gap (1 mm) is too wide; shim it'), 'gap (1 mm) is too wide; shim it'),
+        (OSError('bus can0 is down; bring it up'), 'bus can0 is down; bring it up'),
+        (RuntimeError('nobody foresaw this'), 'RuntimeError: nobody foresaw this'),
+        (KeyError('gap'), "KeyError: 'gap'"),
+    ],
+)
+@pytest.mark.parametrize('step', ['configure', 'activate'])
+def test_a_refused_step_says_why_and_can_be_tried_again(
+    probe, operator, wait_until, capfd, step, error, sentence
+):
+    steps = {'configure': (CONFIGURE, UNCONFIGURED), 'activate': (ACTIVATE, INACTIVE)}
+    transition, state_after = steps[step]
+    if step == 'activate':
+        assert operator.change(CONFIGURE)
+    probe.faults[step] = error
+    assert not operator.change(transition)
+    assert operator.state == state_after
+    assert not probe.active
+    assert f'{step} failed: {sentence}' in capfd.readouterr().err
+    wait_until(lambda: operator.heard(Level.ERROR, sentence), 'the sentence in the diagnostics')
+
+    probe.faults.clear()
+    operator.said.clear()
+    assert operator.change(transition)
+    if step == 'configure':
+        assert operator.change(ACTIVATE)
+    assert operator.state == ACTIVE
+    wait_until(lambda: operator.heard(Level.OK, 'at work'), 'good diagnostics')
+
+
+def test_a_failed_activation_is_followed_by_deactivate(probe, operator):
+    operator.change(CONFIGURE)
+    probe.faults['activate'] = ValueError('no')
+    operator.change(ACTIVATE)
+    assert probe.steps == ['configure', 'activate', 'deactivate']
+
+
+def test_a_failed_configuration_is_followed_by_cleanup_and_leaves_no_data_path(probe, operator):
+    probe.faults['configure'] = ValueError('no')
+    operator.change(CONFIGURE)
+    assert probe.steps == ['configure', 'cleanup']
+    assert probe.data_path is None
+
+
+def test_a_deactivation_that_raises_leaves_the_active_state_all_the_same(probe, operator, capfd):
+    operator.change(CONFIGURE)
+    operator.change(ACTIVATE)
+    probe.faults['deactivate'] = ValueError('stuck')
+    assert operator.change(DEACTIVATE)
+    assert operator.state == INACTIVE
+    assert not probe.active
+    assert 'deactivate failed: ValueError: stuck' in capfd.readouterr().err
+
+
+def test_cleaning_up_ends_the_data_path(probe, operator):
+    operator.change(CONFIGURE)
+    assert isinstance(probe.data_path, DataPath)
+    operator.change(CLEANUP)
+    assert probe.data_path is None
+
+
+@pytest.mark.parametrize(
+    ('transitions', 'steps'),
+    [
+        ((), ['cleanup']),
+        ((CONFIGURE,), ['cleanup']),
+        ((CONFIGURE, ACTIVATE), ['deactivate', 'cleanup']),
+    ],
+)
+def test_closing_leaves_the_active_state_first(probe, operator, transitions, steps):
+    for transition in transitions:
+        assert operator.change(transition)
+    probe.steps.clear()
+    probe.close()
+    assert probe.steps == steps
+    assert not probe.active
+
+
+def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(probe, operator, wait_until):
+    operator.change(CONFIGURE)
+    operator.change(ACTIVATE)
+    wait_until(lambda: operator.heard(Level.OK, 'at work'), 'diagnostics of the active node')
+    status = next(status for status in operator.said if status.message == 'at work')
+    assert (status.name, status.hardware_id) == ('mount_right/probe', 'mount_right')
+    figures = {entry.key: entry.value for entry in status.values}
+    assert figures == {'turns': '3', 'state': 'active', 'unmatched': '/mount_right/displacement'}
+
+
+def test_a_change_of_the_verdict_is_told_at_once_and_no_change_once_a_second(probe, operator, wait_until):
+    operator.change(CONFIGURE)
+    operator.change(ACTIVATE)
+    before = probe._diagnostics._beats  # ten in a second
+    for turn in range(10):
+        probe.verdict = Verdict(Level.WARN, f'turn {turn}')
+        wait_until(lambda turn=turn: operator.heard(Level.WARN, f'turn {turn}'), 'the new sentence')
+    assert probe._diagnostics._beats - before < 50
+
+    def told():
+        return sum(status.message == 'turn 9' for status in operator.said)
+
+    once, before = told(), probe._diagnostics._beats
+    wait_until(lambda: told() >= once + 2, 'the same sentence again')
+    assert probe._diagnostics._beats - before >= 10
+
+
+def test_lockstep_is_a_parameter_of_every_node(context):
+    one = Probe(context=context)
+    assert not one.lockstep
+    other = Probe(context=context, parameter_overrides=[Parameter('lockstep', value=True)])
+    assert other.lockstep
+    for node in (one, other):
+        node.destroy_node()

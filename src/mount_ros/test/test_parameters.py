@@ -1,0 +1,104 @@
+"""Parameter sets as node parameters: what is declared, what is read, what is refused."""
+
+from typing import Annotated, NamedTuple
+
+import pytest
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from mount_models.quantity import ParameterError, Quantity
+from mount_ros.parameters import declare, read
+
+
+class Spring(NamedTuple):
+    stiffness: Annotated[float, Quantity('N/m', 'how stiff it is', 1.0, 1e6, 'chosen')] = 1e3
+
+
+class Settings(NamedTuple):
+    level: Annotated[float, Quantity('m', 'when to act', 0.001, 0.01, 'section 6')] = 0.002
+    count: Annotated[int, Quantity('1', 'how often', 1, 9)] = 3
+    open_ended: Annotated[float, Quantity('s', 'any time', 0.0)] = 5.0
+    name: str = 'first'
+    spring: Spring = Spring()
+
+
+@pytest.fixture
+def make_node(context):
+    made = []
+
+    def make(*prefix, **overrides):
+        values = [Parameter(name.replace('__', '.'), value=value) for name, value in overrides.items()]
+        node = Node('subject', context=context, parameter_overrides=values)
+        made.append(node)
+        declare(node, Settings(), *prefix)
+        return node
+
+    yield make
+    for node in made:
+        node.destroy_node()
+
+
+def test_defaults_are_read_back_as_they_were_declared(make_node):
+    assert read(make_node(), Settings()) == Settings()
+
+
+def test_given_values_are_read_in_nested_sets_too(make_node):
+    node = make_node(level=0.003, count=5, name='second', spring__stiffness=20.0)
+    assert read(node, Settings()) == Settings(0.003, 5, 5.0, 'second', Spring(20.0))
+
+
+def test_a_prefix_stands_before_every_name(make_node):
+    node = make_node('plant', plant__spring__stiffness=7.0)
+    assert node.has_parameter('plant.level')
+    assert not node.has_parameter('level')
+    assert read(node, Settings(), 'plant').spring.stiffness == 7.0
+
+
+def test_unit_sentence_source_and_range_travel_with_the_parameter(make_node):
+    node = make_node()
+    level = node.describe_parameter('level')
+    assert level.description == 'when to act [m]; section 6'
+    bounds = level.floating_point_range[0]
+    assert (bounds.from_value, bounds.to_value) == (0.001, 0.01)
+    bounds = node.describe_parameter('count').integer_range[0]
+    assert (bounds.from_value, bounds.to_value) == (1, 9)
+    nested = node.describe_parameter('spring.stiffness').floating_point_range[0]
+    assert (nested.from_value, nested.to_value) == (1.0, 1e6)
+
+
+def test_parameters_without_both_limits_have_no_range(make_node):
+    node = make_node()
+    assert not node.describe_parameter('open_ended').floating_point_range
+    assert not node.describe_parameter('name').floating_point_range
+
+
+@pytest.mark.parametrize('value', [0.0005, 0.02])
+def test_a_value_outside_its_range_is_refused_when_it_is_declared(make_node, value):
+    with pytest.raises(InvalidParameterValueException, match='level'):
+        make_node(level=value)
+
+
+def test_a_value_outside_its_range_is_refused_when_it_is_set(make_node):
+    node = make_node()
+    assert not node.set_parameters([Parameter('level', value=0.02)])[0].successful
+    assert not node.set_parameters([Parameter('count', value=0)])[0].successful
+    assert read(node, Settings()) == Settings()
+
+
+@pytest.mark.parametrize(('name', 'value'), [('level', 'low'), ('count', 2.5), ('name', 3)])
+def test_a_value_of_another_type_is_refused(make_node, name, value):
+    with pytest.raises(InvalidParameterTypeException, match=name):
+        make_node(**{name: value})
+
+
+def test_not_a_number_is_refused(make_node):
+    with pytest.raises(InvalidParameterValueException, match='level'):
+        make_node(level=float('nan'))
+
+
+@pytest.mark.parametrize('value', [-1.0, float('nan')])
+def test_what_ros_lets_through_is_refused_when_it_is_read_and_the_node_is_named(make_node, value):
+    node = make_node(open_ended=value)
+    with pytest.raises(ParameterError, match=r'^subject: open_ended \(.* s\) must lie within 0 \.\. inf s'):
+        read(node, Settings())

@@ -1,0 +1,54 @@
+"""The latency histogram against exact quantiles."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mount_ros.timing import LatencyHistogram
+
+BIN = 10 ** (1 / 50)  # width of a bin, as a ratio
+
+
+def histogram_of(durations):
+    histogram = LatencyHistogram()
+    for seconds in durations:
+        histogram.add(seconds)
+    return histogram
+
+
+def test_nothing_counted_is_unknown_and_not_zero():
+    histogram = LatencyHistogram()
+    assert histogram.count == 0
+    assert math.isnan(histogram.quantile(0.5))
+    assert math.isnan(histogram.highest)
+
+
+@given(
+    durations=st.lists(st.floats(1e-6, 9.9), min_size=1, max_size=60),
+    share=st.sampled_from([0.01, 0.5, 0.9, 0.99, 1.0]),
+)
+def test_quantiles_are_exact_to_one_bin(durations, share):
+    exact = np.sort(durations)[max(0, math.ceil(share * len(durations) - 1e-9) - 1)]
+    assert histogram_of(durations).quantile(share) == pytest.approx(exact, rel=BIN - 1)
+
+
+@given(durations=st.lists(st.floats(0.0, 100.0), min_size=1, max_size=60))
+def test_count_and_highest_are_exact_and_no_quantile_lies_above(durations):
+    histogram = histogram_of(durations)
+    assert histogram.count == len(durations)
+    assert histogram.highest == max(durations)
+    assert histogram.quantile(0.5) <= histogram.quantile(0.99) <= max(durations)
+
+
+@pytest.mark.parametrize('seconds', [-1e-3, 0.0, 1e-9, 1e-6])
+def test_shorter_than_a_microsecond_counts_in_the_first_bin(seconds):
+    assert histogram_of([seconds, 1.0]).quantile(0.5) == pytest.approx(1e-6, rel=BIN - 1)
+
+
+def test_longer_than_ten_seconds_is_counted_and_shown_by_the_maximum():
+    histogram = histogram_of([1e-3, 500.0])
+    assert histogram.quantile(1.0) == pytest.approx(10.0, rel=BIN - 1)
+    assert histogram.highest == 500.0
