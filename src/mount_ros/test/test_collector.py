@@ -108,9 +108,10 @@ def test_latched_messages_reach_a_collector_that_comes_later(owner, sender, wait
 
 
 def test_stopping_takes_what_is_there_and_ends_the_thread(owner, collector, sender, wait_until):
-    received, witnessed, released = [], [], threading.Event()
+    received, witnessed, entered, released = [], [], threading.Event(), threading.Event()
 
     def wait_and_receive(raw, *_):
+        entered.set()
         assert released.wait(LIMIT)
         received.append(stamp_of(raw))
 
@@ -121,13 +122,15 @@ def test_stopping_takes_what_is_there_and_ends_the_thread(owner, collector, send
     wait_until(lambda: end.get_subscription_count() == 2 and not collector.unmatched(), 'connection')
     collector.start()
     witness.start()
-    for stamp in range(20):
+    sender.send(DISPLACEMENT, 0)
+    assert entered.wait(LIMIT)
+    for stamp in range(1, 20):
         sender.send(DISPLACEMENT, stamp)
     wait_until(lambda: len(witnessed) == 20, 'arrival')
     stopping = threading.Thread(target=collector.stop)
     stopping.start()
     wait_until(collector._ending.is_set, 'the order to stop')
-    released.set()  # only now the thread goes on: all but its first batch wait in the queue
+    released.set()  # only now the thread goes on: all but the first message wait in the queue
     stopping.join(LIMIT)
     collector.stop()
     witness.stop()
