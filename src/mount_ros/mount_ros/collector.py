@@ -19,7 +19,7 @@ from mount_ros.topics import Topic
 Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns), both of the system clock."""
 
-_PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold a second
+_PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold five seconds
 
 
 class Collector:
