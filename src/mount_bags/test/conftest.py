@@ -1,13 +1,12 @@
 """What the tests share: a domain of their own, small recordings, the genuine bags beside the repository."""
 
-import fcntl
-import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from mount_ros.testing import free_domain
 
 # The tests are imported one by one (importmode importlib); what they share is found by this path.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -18,21 +17,8 @@ from recorded_drive import write_drive
 @pytest.fixture
 def domain() -> Iterator[int]:
     """Return a domain id that no other test of this machine uses at the same time."""
-    folder = Path(tempfile.gettempdir()) / 'engine_mount_domains'
-    folder.mkdir(exist_ok=True)
-    for number in range(1, 102):
-        handle = os.open(folder / str(number), os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(handle)
-            continue
-        try:
-            yield number
-        finally:
-            os.close(handle)
-        return
-    pytest.fail('all 101 domains are in use')
+    with free_domain() as number:
+        yield number
 
 
 @pytest.fixture

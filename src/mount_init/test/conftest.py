@@ -1,11 +1,7 @@
 """A simulated actuator with coil, springs and pads, behind the same samples and setpoints as the real one."""
 
-import fcntl
 import math
-import os
-import tempfile
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numba
 import numpy as np
@@ -17,6 +13,7 @@ from mount_models.actuator.reluctance import ReluctanceActuator, mean_incrementa
 from mount_models.closing import ClosingMechanics, closed_state
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
 from mount_models.specimen import Specimen, default_specimen
+from mount_ros.testing import free_domain
 
 SAMPLE_TIME_NS = 1_000_000
 STEPS_PER_SAMPLE = 10
@@ -137,18 +134,5 @@ def run_initialisation():
 @pytest.fixture
 def domain() -> Iterator[int]:
     """Return a domain id that no other test of this machine uses at the same time."""
-    folder = Path(tempfile.gettempdir()) / 'engine_mount_domains'
-    folder.mkdir(exist_ok=True)
-    for number in range(1, 102):
-        handle = os.open(folder / str(number), os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(handle)
-            continue
-        try:
-            yield number
-        finally:
-            os.close(handle)
-        return
-    pytest.fail('all 101 domains are in use')
+    with free_domain() as number:
+        yield number
