@@ -63,9 +63,7 @@ def drive(
         list[str] | None,
         typer.Option('--set', metavar='NODE.NAME=VALUE', help='any parameter of any node; may be repeated'),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help='folder of the run; default: a new one in bags')
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help='folder of the run; default: a new one in bags')] = None,
     json_file: Annotated[
         Path | None, typer.Option('--json', metavar='FILE', help='write the printed figures to this file')
     ] = None,

@@ -4,6 +4,7 @@ import math
 import platform
 import signal
 import time
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -21,7 +22,7 @@ from mount_bags.reading import Recording, open_recording
 from mount_bags.writer import BagWriter
 from mount_bringup.core_chain import Parameters, control_parameters
 from mount_bringup.core_run import run_core
-from mount_bringup.domain import domain_lock
+from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.evaluation import load_drive
 from mount_bringup.figure import draw_drive
 from mount_bringup.graph import LOCKSTEP_TOGETHER, RECORDER, SIM, SIMULATED, URGENT, GraphSettings
@@ -34,7 +35,8 @@ from mount_ros.topics import SESSION, TOPICS, Topic
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
 
-_FIRST_PORT = 43113  # UDP port of domain 0
+_FIRST_PORT = 43113  # UDP port of domain 0 without a namespace
+_PLACES = 200  # namespaces told apart by their ports, up to 63614
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
 
 
@@ -192,8 +194,8 @@ def _progress(console: Console) -> Progress:
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
     lockstep = order.mode == 'lock-step'
-    # One CAN bus for each domain; in lock-step both ends live in one process.
-    can = {'interface': 'virtual' if lockstep else 'udp_multicast', 'port': _FIRST_PORT + order.domain}
+    # In lock-step both ends of the bus live in one process.
+    can = {'interface': 'virtual' if lockstep else 'udp_multicast', 'port': _port(order)}
     added: dict[str, dict[str, Any]] = {
         'mount_recorder': {'uri': str(folder.recording), 'on_full': order.on_full},
         'mount_driver': can,
@@ -206,6 +208,13 @@ def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str
         name: {'lockstep': lockstep, **values, **order.parameters.get(name, {})}
         for name, values in added.items()
     }
+
+
+def _port(order: DriveOrder) -> int:
+    """Return the UDP port of the CAN bus: one for each domain and namespace."""
+    name = order.namespace.strip('/')
+    place = 1 + zlib.crc32(name.encode()) % _PLACES if name else 0
+    return _FIRST_PORT + order.domain + (HIGHEST_DOMAIN + 1) * place
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:

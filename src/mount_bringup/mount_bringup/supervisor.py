@@ -244,7 +244,10 @@ class Supervisor:
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            name = status.name.rsplit('/', 1)[-1]
+            # /diagnostics belongs to all mounts of the car
+            space, _, name = status.name.rpartition('/')
+            if space != self._settings.namespace.strip('/'):
+                continue
             self._verdicts[name] = {
                 **{value.key: value.value for value in status.values},
                 'level': str(status.level[0]),
