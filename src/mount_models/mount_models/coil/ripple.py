@@ -72,8 +72,8 @@ def skin_factor(coil, diffusion_time, duty):
     """
     if not (0.0 < duty < 1.0 and coil.sample_delay < duty * coil.pwm_period):
         return math.nan
-    # to a fast ripple a thick plate is a half space; from 10 periods on the two forms agree to 1e-5
-    if diffusion_time > 10.0 * coil.pwm_period:
+    # to a fast ripple a thick plate is a half space; from 12 periods on the two forms agree within 1e-4
+    if diffusion_time > 12.0 * coil.pwm_period:
         return _half_space_skin_factor(coil, diffusion_time, duty)
     return skin_factor_series(coil, diffusion_time, duty, _MOST_TERMS)
 
