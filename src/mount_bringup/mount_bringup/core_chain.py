@@ -54,7 +54,6 @@ class CoreChain:
         self._contact = with_flattened(FrictionContact(), control, 'contact')
         self._watch = SampleWatch(SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range)
         self.result: InitialisationResult | None = None
-        self.activation = 0
         self.controller: Controller | None = None
 
     @property
@@ -71,7 +70,6 @@ class CoreChain:
         )
         if self._initialisation.finished:
             self.result = self._initialisation.result()
-            self.activation = stamp
             self.controller = self._make_controller(self.result)
         return setpoint
 
