@@ -8,7 +8,7 @@ of the file ends with a whole record.
 
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -34,6 +34,7 @@ from mount_bags.record_file import RecordFile
 CHUNK_SIZE = 64 * 1024  # bytes before compression, chosen: what a crash may cost
 _COMPRESSION_LEVEL = 1  # chosen: level 3 makes these messages no smaller (7.85 for 7.87 MB measured)
 _MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
+_MESSAGE_OPCODE = int(Opcode.MESSAGE)  # packed faster than the member of the enumeration
 _MESSAGE_HEAD = _MESSAGE.size - 9  # what the length counts besides the payload
 _INDEX = struct.Struct('<BQHI')  # opcode, length, channel, length of the entries
 _ROOM_PER_CHUNK = 96  # bytes of a chunk index without its channels, rounded up
@@ -48,11 +49,13 @@ class ChunkedMcap:
         self.message_counts: dict[int, int] = {}  # of the chunks that are in the file
         self.start_time: int | None = None  # ns, earliest log time in the file
         self.end_time: int | None = None
+        self.after_chunk: Callable[[], None] = _nothing  # called when a chunk has reached the file
         self._chunk_size = chunk_size
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunk_indexes: list[ChunkIndex] = []
+        self._chunk_indexes = bytearray()  # packed: a long recording has very many of them
+        self._chunk_count = 0
         self._metadata_indexes: list[MetadataIndex] = []
         self._written_schemas: set[int] = set()
         self._written_channels: set[int] = set()
@@ -64,6 +67,11 @@ class ChunkedMcap:
     def pending(self) -> int:
         """How many messages wait in the chunk that is being filled."""
         return sum(len(entries) for entries in self._entries.values()) // 2
+
+    @property
+    def room_needed(self) -> int:
+        """How many bytes one more chunk and the end of the file need, estimated from above."""
+        return self._chunk_size + self._room
 
     def start(self, profile: str, library: str) -> None:
         """Write the head of the file and hold back room for its end."""
@@ -95,7 +103,7 @@ class ChunkedMcap:
         length = len(raw)
         entries += (log_time, self._size)
         self._parts += (
-            _MESSAGE.pack(Opcode.MESSAGE, length + _MESSAGE_HEAD, channel, 0, log_time, publish_time),
+            _MESSAGE.pack(_MESSAGE_OPCODE, length + _MESSAGE_HEAD, channel, 0, log_time, publish_time),
             raw,
         )
         self._size += length + _MESSAGE.size
@@ -170,7 +178,7 @@ class ChunkedMcap:
             packed.append(_packed_index(channel, numbers))
             end += len(packed[-1])
         self._append(b''.join(packed))
-        self._chunk_indexes.append(
+        self._chunk_indexes += _packed(
             ChunkIndex(
                 message_start_time=chunk.message_start_time,
                 message_end_time=chunk.message_end_time,
@@ -183,7 +191,9 @@ class ChunkedMcap:
                 uncompressed_size=chunk.uncompressed_size,
             )
         )
+        self._chunk_count += 1
         self._count(chunk, entries)
+        self.after_chunk()
 
     def _count(self, chunk: Chunk, entries: Mapping[int, Sequence[int]]) -> None:
         for channel, numbers in entries.items():
@@ -193,17 +203,16 @@ class ChunkedMcap:
         self.end_time = last if self.end_time is None else max(self.end_time, last)
 
     def _summary(self, start: int) -> bytes:
-        groups: dict[Opcode, Sequence[McapRecord]] = {
-            Opcode.SCHEMA: self._schemas,
-            Opcode.CHANNEL: self._channels,
-            Opcode.STATISTICS: [self._statistics()],
+        groups = {
+            Opcode.SCHEMA: _all_packed(self._schemas),
+            Opcode.CHANNEL: _all_packed(self._channels),
+            Opcode.STATISTICS: _packed(self._statistics()),
             Opcode.CHUNK_INDEX: self._chunk_indexes,
-            Opcode.METADATA_INDEX: self._metadata_indexes,
+            Opcode.METADATA_INDEX: _all_packed(self._metadata_indexes),
         }
         data = bytearray()
         offsets = bytearray()
-        for opcode, records in groups.items():
-            group = b''.join(map(_packed, records))
+        for opcode, group in groups.items():
             if group:
                 offsets += _packed(SummaryOffset(opcode, start + len(data), len(group)))
                 data += group
@@ -219,7 +228,7 @@ class ChunkedMcap:
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=self.message_counts,
-            chunk_count=len(self._chunk_indexes),
+            chunk_count=self._chunk_count,
             message_count=sum(self.message_counts.values()),
             message_end_time=self.end_time or 0,
             message_start_time=self.start_time or 0,
@@ -228,10 +237,18 @@ class ChunkedMcap:
         )
 
 
+def _nothing() -> None:
+    """Nobody wants to know."""
+
+
 def _packed(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()
+
+
+def _all_packed(records: Sequence[McapRecord]) -> bytes:
+    return b''.join(map(_packed, records))
 
 
 def _packed_index(channel: int, numbers: Sequence[int]) -> bytes:

@@ -9,20 +9,48 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
 
+from mount_bags.space import SpaceGuard
 from mount_bags.stamps import StampWatch
-from mount_bags.writer import BagWriter, RecordingError
+from mount_bags.statement import Reception
+from mount_bags.writer import RecordingError
 
 MEMORY_LIMIT = 64 * 1024 * 1024  # bytes, chosen: half a minute of a full drive with the simulator's truth
 _DRAIN_PERIOD = 0.02  # s, chosen: what a crash may cost besides the chunk being filled
-_FLUSH_PERIOD = 1.0  # s, chosen: the same where messages are rare
+_FLUSH_PERIOD = 0.08  # s, chosen: longest time that a chunk is filled; with the above a crash costs 0.12 s
+_SPACE_PERIOD = 0.2  # s, chosen: a tenth of the reserve at 100 MB/s
+_BATCH = 500  # messages, chosen: after so many the queue's room is given back to the receiving thread
 _QUIET_PERIOD = 0.15  # s, chosen: several heartbeats of a writer, in which a missing message is repaired
 _SETTLE_LIMIT = 5.0  # s, chosen
 
 Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns)."""
 
+Observe = Callable[[bytes, int], None]
+"""Looks at (serialised message, time of arrival ns)."""
+
 _Item = tuple[str, bytes, int, int]  # topic, message, times of arrival and of sending
+
+
+class Sink(Protocol):
+    """Where the messages go: a `BagWriter` for all of them, a `Snapshot` for those around events."""
+
+    folder: Path
+
+    @property
+    def kept(self) -> int: ...
+    @property
+    def pending(self) -> int: ...
+    @property
+    def size(self) -> int: ...
+    def attach(self, receptions: dict[str, Reception]) -> None: ...
+    def unwritten(self, handed: int) -> int: ...
+    def write(self, topic: str, raw: bytes, receive_time: int, publish_time: int) -> None: ...
+    def flush(self) -> None: ...
+    def stop(self, why: str) -> None: ...
+    def close(self) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -42,59 +70,71 @@ class Recorder:
     """Takes serialised messages of announced topics and writes them from `begin` to `end`.
 
     The functions that `receiver` and `latched_receiver` return are all called by one thread, `begin`
-    and `end` by any other.
+    and `end` by any other. What `watch` and `observe` take is called by the writing thread, and so is
+    `on_loss`, with the number of messages for which the queue had no room since it was called last.
     """
 
     def __init__(
         self,
-        writer: BagWriter,
+        writer: Sink,
         *,
         memory_limit: int = MEMORY_LIMIT,
+        space: SpaceGuard | None = None,
+        on_loss: Callable[[int], None] = lambda _: None,
     ):
         self.watches: dict[str, StampWatch] = {}
         self.begun = False
         self._writer = writer
         self._memory_limit = memory_limit
-        self._stamp_of: dict[str, Callable[[bytes], int]] = {}
+        self._space = space
+        self._on_loss = on_loss
+        self._observers: dict[str, Observe] = {}
+        self._receptions: dict[str, Reception] = {}
         self._queue: deque[_Item] = deque()
         self._open = False
         self._gate = threading.Lock()
         self._latched: dict[str, _Item] = {}
-        self._received = 0
         self._received_bytes = 0  # changed by the receiving thread alone
         self._drained_bytes = 0  # changed by the writing thread alone
-        self._overflowed = 0
         self._handed = 0  # to the writer, or thrown away after it failed
         self._failure = ''
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._work, name='recorder', daemon=True)
+        writer.attach(self._receptions)
 
     def receiver(self, topic: str) -> Receive:
         """Return the function that takes the messages of `topic`; before `begin` it drops them."""
+        take = self._taker(topic)
 
         def receive(raw: bytes, received: int, sent: int) -> None:
             if self._open:
-                self._take((topic, raw, received, sent))
+                take((topic, raw, received, sent))
 
         return receive
 
     def latched_receiver(self, topic: str) -> Receive:
         """Return the same for a latched topic: the last message before `begin` is kept for it."""
+        take = self._taker(topic)
 
         def receive(raw: bytes, received: int, sent: int) -> None:
             item = (topic, raw, received, sent)
             with self._gate:
                 if self._open:
-                    self._take(item)
+                    take(item)
                 else:
                     self._latched[topic] = item
 
         return receive
 
-    def watch(self, topic: str, rate: float, stamp_of: Callable[[bytes], int]) -> None:
+    def watch(self, topic: str, rate: float, stamp_of: Callable[[bytes], int]) -> StampWatch:
         """Count missing samples of `topic`, which has `rate` in Hz; `stamp_of` returns ns."""
-        self.watches[topic] = StampWatch(rate)
-        self._stamp_of[topic] = stamp_of
+        watch = self.watches[topic] = StampWatch(rate)
+        self.observe(topic, lambda raw, _: watch.add(stamp_of(raw)))
+        return watch
+
+    def observe(self, topic: str, observe: Observe) -> None:
+        """Show each message of `topic` to `observe`, instead of to the one before."""
+        self._observers[topic] = observe
 
     def begin(self) -> None:
         """Record from now on, the kept latched messages first; raises `RecordingError` a second time."""
@@ -103,7 +143,7 @@ class Recorder:
         with self._gate:
             self.begun = True
             for item in sorted(self._latched.values(), key=lambda item: item[2]):
-                self._take(item)
+                self._taker(item[0])(item)
             self._open = True
         self._thread.start()
 
@@ -117,6 +157,7 @@ class Recorder:
             self._open = False
             self._ending.set()
             self._thread.join()
+        self._note_missing()
         try:
             self._writer.close()
         except RecordingError as error:
@@ -125,58 +166,112 @@ class Recorder:
 
     def figures(self) -> RecorderFigures:
         """Return what was done so far."""
-        kept = self._writer.kept
-        unwritten = self._handed - kept if self._failure else 0
         return RecorderFigures(
-            received=self._received,
-            kept=kept,
+            received=self._received(),
+            kept=self._writer.kept,
             file_size=self._writer.size,
             queued=len(self._queue),
             queued_bytes=self._received_bytes - self._drained_bytes,
-            lost=self._overflowed + unwritten,
+            lost=self._overflowed() + (self._writer.unwritten(self._handed) if self._failure else 0),
             failure=self._failure,
         )
 
-    def _take(self, item: _Item) -> None:
-        self._received += 1
-        size = len(item[1])
-        if self._received_bytes - self._drained_bytes + size > self._memory_limit:
-            self._overflowed += 1
-            return
-        self._received_bytes += size
-        self._queue.append(item)
+    def overflowed(self) -> dict[str, int]:
+        """Return how many messages of each topic did not fit into the queue, where there are any."""
+        return {name: entry.overflowed for name, entry in self._receptions.items() if entry.overflowed}
+
+    def _taker(self, topic: str) -> Callable[[_Item], None]:
+        reception = self._receptions.setdefault(topic, Reception())
+        append = self._queue.append
+
+        def take(item: _Item) -> None:
+            reception.received += 1
+            received_bytes = self._received_bytes + len(item[1])
+            if received_bytes - self._drained_bytes > self._memory_limit:
+                reception.overflowed += 1
+                return
+            self._received_bytes = received_bytes
+            append(item)
+
+        return take
+
+    def _received(self) -> int:
+        return sum(entry.received for entry in self._receptions.values())
+
+    def _overflowed(self) -> int:
+        return sum(entry.overflowed for entry in self._receptions.values())
 
     def _settle(self) -> None:
+        """Wait until messages cease, or until those come that arrived well after this call."""
         limit = time.monotonic() + _SETTLE_LIMIT
+        latest = time.time_ns() + int(2e9 * _QUIET_PERIOD)
         before = -1
-        while self._received != before and time.monotonic() < limit:
-            before = self._received
+        while self._received() != before and time.monotonic() < limit:
+            before = self._received()
             self._ending.wait(_QUIET_PERIOD)
+            if self._newest_arrival() > latest:
+                return
+
+    def _newest_arrival(self) -> int:
+        try:
+            return self._queue[-1][2]
+        except IndexError:  # the writing thread was faster
+            return 0
+
+    # The writing thread.
 
     def _work(self) -> None:
         kept, changed = 0, time.monotonic()
+        looked, lost = changed, 0
         while not self._ending.wait(_DRAIN_PERIOD):
             self._guarded(self._write_queued)
+            now = time.monotonic()
             if self._writer.kept != kept or not self._writer.pending:
-                kept, changed = self._writer.kept, time.monotonic()
-            elif time.monotonic() - changed > _FLUSH_PERIOD:
+                kept, changed = self._writer.kept, now
+            elif now - changed > _FLUSH_PERIOD:
                 self._guarded(self._writer.flush)
+            if now - looked > _SPACE_PERIOD:
+                looked = now
+                self._guarded(self._look_at_space)
+            if (overflowed := self._overflowed()) > lost:
+                self._on_loss(overflowed - lost)
+                lost = overflowed
         self._guarded(self._write_queued)
 
     def _write_queued(self) -> None:
-        queue, write, watches, stamp_of = self._queue, self._writer.write, self.watches, self._stamp_of
-        for _ in range(len(queue)):
-            topic, raw, received, sent = queue.popleft()
-            self._drained_bytes += len(raw)
-            self._handed += 1
-            write(topic, raw, received, sent)
-            if topic in watches:
-                watches[topic].add(stamp_of[topic](raw))
+        rest = len(self._queue)
+        while rest > 0:
+            self._write_batch(min(rest, _BATCH))
+            rest -= _BATCH
+
+    def _write_batch(self, count: int) -> None:
+        take, write, observers = self._queue.popleft, self._writer.write, self._observers
+        taken = taken_bytes = 0
+        try:
+            for taken in range(1, count + 1):  # noqa: B007 - also read after an exception
+                topic, raw, received, sent = take()
+                taken_bytes += len(raw)
+                write(topic, raw, received, sent)
+                if topic in observers:
+                    observers[topic](raw, received)
+        finally:
+            self._handed += taken
+            self._drained_bytes += taken_bytes
 
     def _discard_queued(self) -> None:
         for _ in range(len(self._queue)):
             self._drained_bytes += len(self._queue.popleft()[1])
             self._handed += 1
+
+    def _look_at_space(self) -> None:
+        shortage = self._space.shortage() if self._space is not None else ''
+        if shortage:
+            self._note_missing()
+            self._writer.stop(shortage)
+
+    def _note_missing(self) -> None:
+        for name, watch in self.watches.items():
+            self._receptions.setdefault(name, Reception()).missing = watch.lost
 
     def _guarded(self, step: Callable[[], None]) -> None:
         try:

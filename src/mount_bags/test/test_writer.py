@@ -351,7 +351,7 @@ def test_broken_disk_leaves_whole_chunks(tmp_path):
     for index in range(1000):
         writer.write('/displacement', sample(DISPLACEMENT, index), START + index)
     kept = writer.kept
-    writer._file.broken = True
+    writer._piece.file.broken = True
     with pytest.raises(RecordingError, match='ends without its summary but with whole chunks'):
         writer.close()
     with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
