@@ -72,21 +72,21 @@ class SwitchOnWatch:
 
 
 class FaultWatch:
-    """Marks where a node of `namespace` begins to report an error, or reports another one."""
+    """Marks where a node of `namespace` begins to report an error."""
 
     def __init__(self, marks: AutomaticMarks, namespace: str):
         self._marks = marks
         self._prefix = f'{namespace.strip("/")}/'.lstrip('/')
-        self._errors: dict[str, str] = {}
+        self._failing: set[str] = set()
 
     def add(self, stamp: int, status: Any) -> None:
         """Take one `DiagnosticStatus`, seen at `stamp` (ns)."""
         if not status.name.startswith(self._prefix):
             return
         if status.level != _ERROR:
-            self._errors.pop(status.name, None)
-        elif self._errors.get(status.name) != status.message:
-            self._errors[status.name] = status.message
+            self._failing.discard(status.name)
+        elif status.name not in self._failing:
+            self._failing.add(status.name)
             self._marks.mark(MarkKind.FAULT, stamp, f'{status.name}: {status.message}')
 
 
@@ -106,9 +106,7 @@ class LostSampleWatch:
         if watch.lost > before:
             count = watch.lost - before
             noun = 'sample' if count == 1 else 'samples'
-            self._marks.mark(
-                MarkKind.LOST_SAMPLE, stamp, f'{self._topic}: {count} {noun} missing before this'
-            )
+            self._marks.mark(MarkKind.LOST_SAMPLE, stamp, f'{self._topic}: {count} {noun} missing')
 
 
 def mark_kinds(words: str) -> tuple[MarkKind, ...]:

@@ -203,7 +203,7 @@ class ChunkedMcap:
         self.end_time = last if self.end_time is None else max(self.end_time, last)
 
     def _summary(self, start: int) -> bytes:
-        groups = {
+        groups: dict[Opcode, bytes | bytearray] = {
             Opcode.SCHEMA: _all_packed(self._schemas),
             Opcode.CHANNEL: _all_packed(self._channels),
             Opcode.STATISTICS: _packed(self._statistics()),

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from mount_bags.recording import RecorderFigures
+from mount_bags.snapshot import SnapshotFigures
 from mount_bags.stamps import StampWatch
 from mount_ros.diagnostics import Level, Verdict
 
@@ -29,6 +30,9 @@ class RecorderState:
     watches: Mapping[str, StampWatch] = field(default_factory=dict)
     free: int = LEAST_FREE
     rate: float = 0.0
+    overflowed: Mapping[str, int] = field(default_factory=dict)
+    marks: int = 0
+    snapshot: SnapshotFigures | None = None
 
 
 def judge(state: RecorderState, on_full: OnFull) -> Verdict:
@@ -59,8 +63,20 @@ def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:
             f'{state.free / 1e9:.1f} GB left on the disk of {state.folder} at {state.rate / 1e6:.1f} MB/s; '
             'free some space'
         )
+    if state.snapshot is not None and state.snapshot.short_of_memory:
+        return Level.WARN, (
+            'the memory does not hold the wished time before an event; '
+            'raise snapshot_memory or record fewer topics'
+        )
     found = sum(count > 0 for count in state.publishers.values())
-    return Level.OK, f'recording; {found} of {len(state.publishers)} topics have a publisher'
+    return (
+        Level.OK,
+        f'{_activity(state.snapshot)}; {found} of {len(state.publishers)} topics have a publisher',
+    )
+
+
+def _activity(snapshot: SnapshotFigures | None) -> str:
+    return 'recording' if snapshot is None or snapshot.running else 'waiting for an event'
 
 
 def _is_short_of_space(state: RecorderState) -> bool:
@@ -80,6 +96,19 @@ def _figures(state: RecorderState) -> dict[str, object]:
         'free_bytes': state.free,
         'bytes_per_second': round(state.rate),
         'last_stamp': max((watch.last_stamp for watch in state.watches.values()), default=0),
+        'marks': state.marks,
+        **_snapshot_figures(state.snapshot),
+        **{f'lost.{topic}': count for topic, count in state.overflowed.items()},
         **{f'publishers.{topic}': count for topic, count in state.publishers.items()},
         **{f'missing.{topic}': watch.lost for topic, watch in state.watches.items()},
+    }
+
+
+def _snapshot_figures(snapshot: SnapshotFigures | None) -> dict[str, object]:
+    if snapshot is None:
+        return {}
+    return {
+        'snapshots': snapshot.recordings,
+        'held_s': round(snapshot.held, 3),
+        'held_bytes': snapshot.held_bytes,
     }

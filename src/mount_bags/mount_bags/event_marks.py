@@ -34,9 +34,9 @@ def read_mark(text: str, received: int) -> Mark:
         content = None
     if not isinstance(content, dict):
         return Mark(received, BY_HAND, text.strip())
-    time = content.get('time')
-    known = isinstance(time, int) and not isinstance(time, bool)
-    return Mark(time if known else received, str(content.get('kind', BY_HAND)), str(content.get('text', '')))
+    told = content.get('time')
+    time = told if isinstance(told, int) and not isinstance(told, bool) else received
+    return Mark(time, str(content.get('kind', BY_HAND)), str(content.get('text', '')))
 
 
 def read_marks(events: Series) -> list[Mark]:

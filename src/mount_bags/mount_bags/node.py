@@ -1,6 +1,5 @@
-"""The node `mount_recorder`: records the topics of the graph into one rosbag2 MCAP bag."""
+"""The node `mount_recorder`: records the topics of the graph into rosbag2 MCAP bags."""
 
-import shutil
 import time
 from functools import partial
 from pathlib import Path
@@ -8,106 +7,174 @@ from pathlib import Path
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
+from mount_bags.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
 from mount_bags.diagnosis import OnFull, RecorderState, judge
+from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time
 from mount_bags.offered_qos import OfferedQos
+from mount_bags.recorder_parameters import RecorderParameters
 from mount_bags.recording import Recorder
+from mount_bags.snapshot import Snapshot, SnapshotRule
+from mount_bags.space import SpaceGuard
+from mount_bags.split import SplitRule, checked_rule
+from mount_bags.watching import watch_topic
 from mount_bags.writer import BagWriter, RecordingError
+from mount_ros.cdr import serialised
 from mount_ros.collector import Collector
 from mount_ros.diagnostics import Verdict
 from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.parameters import declare, read
 from mount_ros.process import run_node
-from mount_ros.scalars import stamp_of
-from mount_ros.topics import CURRENT_SETPOINT, TOPICS, Delivery, Topic, topic
+from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
-_PARAMETERS = {
+NAME = 'mount_recorder'
+_FAMILY = 'mount_record'  # all recorders are called so or something longer
+_PLACES = {
     'uri': ('', 'folder that the recording creates; it must not exist'),
     'topics': ([entry.name for entry in TOPICS], 'names of registered topics to record'),
-    'on_full': (OnFull.STOP.value, 'what a full disk means for the run: stop (an error) or continue'),
 }
 
 
 class MountRecorder(SafeLifecycleNode):
     """Receives from `configure` on, records from `activate` to `deactivate`."""
 
-    def __init__(self, **arguments):
-        super().__init__('mount_recorder', **arguments)
-        for name, (default, meaning) in _PARAMETERS.items():
-            self.declare_parameter(name, default, ParameterDescriptor(description=meaning))
-        self._writer: BagWriter | None = None
+    def __init__(self, name: str = NAME, **arguments):
+        super().__init__(name, **arguments)
+        for parameter, (default, meaning) in _PLACES.items():
+            self.declare_parameter(parameter, default, ParameterDescriptor(description=meaning))
+        declare(self, RecorderParameters())
+        self._sink: BagWriter | Snapshot | None = None
         self._recorder: Recorder | None = None
+        self._space: SpaceGuard | None = None
+        self._marks: AutomaticMarks | None = None
         self._subscriptions_by_topic: dict[str, Subscription] = {}
         self._on_full = OnFull.STOP
         self._announced_failure = ''
         self._begun_at = 0.0
+        self._mark_service = self.create_service(Trigger, '~/mark', self._on_mark)
 
     def configure(self) -> None:
-        self._on_full = _on_full(self.get_parameter('on_full').value)
+        parameters = read(self, RecorderParameters())
+        self._on_full = _on_full(parameters.on_full)
         topics = [_registered(name) for name in self.get_parameter('topics').value]
         uri = self.get_parameter('uri').value
         if not uri:
             raise RecordingError('parameter uri is empty; name the folder that the recording shall create')
-        self._writer = BagWriter(Path(uri).expanduser().absolute())
-        self._recorder = Recorder(self._writer)
+        kinds = mark_kinds(parameters.automatic_marks)
+        folder = Path(uri).expanduser().absolute()
+        self._space = SpaceGuard(folder, parameters.free_reserve)
+        if shortage := self._space.shortage():
+            raise RecordingError(f'recording {folder} cannot be started: {shortage}')
+        data_path = self.open_collector()
+        self._sink = _sink(folder, parameters, data_path.node.resolve_topic_name(EVENT.name), topics)
+        self._send_event = data_path.sender(EVENT)
+        self._marks = AutomaticMarks(partial(self._publish_automatic, data_path), kinds)
+        self._recorder = Recorder(self._sink, space=self._space, on_loss=self._mark_loss)
         self._announced_failure = ''
-        collector = self.open_collector()
         for entry in topics:
-            self._record(collector, entry)
-        collector.start()
+            self._record(data_path, entry)
+        data_path.start()
 
     def activate(self) -> None:
         self._present_recorder().begin()
         self._begun_at = time.monotonic()
-        self.get_logger().info(f'recording to {self._present_writer().folder}')
+        self.get_logger().info(f'recording to {self._present_sink().folder}')
 
     def deactivate(self) -> None:
         recorder = self._present_recorder()
         if not recorder.begun:
             return
         recorder.end()
-        figures, folder = recorder.figures(), self._present_writer().folder
+        figures, sink = recorder.figures(), self._present_sink()
+        places = sink.folders if isinstance(sink, Snapshot) else [sink.folder]
+        where = ', '.join(map(str, places)) or 'nowhere, for lack of an event'
         self.get_logger().info(
-            f'recorded {figures.kept} messages, {figures.file_size} bytes, to {folder}; {figures.lost} lost'
+            f'recorded {figures.kept} messages, {figures.file_size} bytes, to {where}; {figures.lost} lost'
         )
 
     def cleanup(self) -> None:
         self._subscriptions_by_topic = {}
         if self._recorder is not None and self._recorder.begun:
             self._recorder.end()
-        elif self._writer is not None:
-            self._writer.discard()
-        self._writer = self._recorder = None
+        elif self._sink is not None:
+            self._sink.discard()
+        self._sink = self._recorder = self._marks = self._space = None
 
     def judge(self) -> Verdict:
-        recorder, folder = self._present_recorder(), self._present_writer().folder
+        recorder, sink = self._present_recorder(), self._present_sink()
         figures = recorder.figures()
         if figures.failure and not self._announced_failure:
             self._announced_failure = figures.failure
             self.get_logger().error(figures.failure)
         elapsed = time.monotonic() - self._begun_at
-        publishers = {
-            name: entry.get_publisher_count() for name, entry in self._subscriptions_by_topic.items()
-        }
-        free = shutil.disk_usage(folder).free
-        rate = figures.file_size / elapsed if elapsed > 1.0 else 0.0
-        state = RecorderState(str(folder), figures, publishers, recorder.watches, free, rate)
+        state = RecorderState(
+            str(sink.folder),
+            figures,
+            {name: entry.get_publisher_count() for name, entry in self._subscriptions_by_topic.items()},
+            recorder.watches,
+            self._space.free() if self._space is not None else 0,
+            figures.file_size / elapsed if elapsed > 1.0 else 0.0,
+            recorder.overflowed(),
+            self._marks.sent if self._marks is not None else 0,
+            sink.figures() if isinstance(sink, Snapshot) else None,
+        )
         return judge(state, self._on_full)
 
-    def _record(self, collector: Collector, entry: Topic) -> None:
-        writer, recorder = self._present_writer(), self._present_recorder()
-        name = collector.node.resolve_topic_name(entry.name)
-        writer.add_topic(name, entry.type, partial(_offers, collector, name))
-        # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
-        if entry.delivery is Delivery.STREAM and entry is not CURRENT_SETPOINT:
-            recorder.watch(name, entry.rate, stamp_of)
-        latched = entry.delivery is Delivery.LATCHED
-        receive = recorder.latched_receiver(name) if latched else recorder.receiver(name)
-        self._subscriptions_by_topic[name] = collector.collect(entry, receive)
+    def mark(self, text: str = '', kind: str = BY_HAND) -> Mark:
+        """Publish a mark of this moment on `event` and return it; raises `RecordingError` unless active."""
+        if not self.active:
+            raise RecordingError(f'{self.get_name()} is not active; nothing would be marked')
+        mark = Mark(self._present_time(), kind, text)
+        self._publish(mark)
+        return mark
 
-    def _present_writer(self) -> BagWriter:
-        if self._writer is None:
+    def _on_mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            mark = self.mark(self.get_parameter('mark_text').value)
+            response.success, response.message = True, f'marked at {mark.time / 1e9:.3f} s'
+        except RecordingError as error:
+            response.message = str(error)
+        return response
+
+    def _record(self, data_path: Collector, entry: Topic) -> None:
+        sink, recorder, marks = self._present_sink(), self._present_recorder(), self._marks
+        assert marks is not None
+        name = data_path.node.resolve_topic_name(entry.name)
+        latched = entry.delivery is Delivery.LATCHED
+        sink.add_topic(name, entry.type, partial(_offers, data_path, name), latched=latched)
+        watch_topic(recorder, entry, name, marks, self.get_namespace(), self._present_time)
+        receive = recorder.latched_receiver(name) if latched else recorder.receiver(name)
+        self._subscriptions_by_topic[name] = data_path.collect(entry, receive)
+
+    # Marks.
+
+    def _present_time(self) -> int:
+        return present_time(self.get_clock().now().nanoseconds, self._present_recorder().last_stamp)
+
+    def _mark_loss(self, count: int) -> None:
+        if self._marks is not None:
+            text = f'{count} messages not recorded: the disk was slower than the data'
+            self._marks.mark(MarkKind.RECORDING_LOSS, self._present_time(), text)
+
+    def _publish(self, mark: Mark) -> None:
+        self._send_event(serialised(String(data=mark_text(mark))))
+
+    def _publish_automatic(self, data_path: Collector, mark: Mark) -> None:
+        """Publish a mark unless another recorder of this namespace does: of several the first by name."""
+        try:
+            infos = data_path.node.get_publishers_info_by_topic(EVENT.name)
+            names = [info.node_name for info in infos if info.node_name.startswith(_FAMILY)]
+            if min(names, default=data_path.node.get_name()) >= data_path.node.get_name():
+                self._publish(mark)
+        except RuntimeError:  # rclpy's errors of a context that is already shut down
+            return
+
+    def _present_sink(self) -> BagWriter | Snapshot:
+        if self._sink is None:
             raise RecordingError('the recorder is not configured')
-        return self._writer
+        return self._sink
 
     def _present_recorder(self) -> Recorder:
         if self._recorder is None:
@@ -118,6 +185,19 @@ class MountRecorder(SafeLifecycleNode):
 def main() -> None:
     """Run the recorder until SIGINT or SIGTERM."""
     run_node(MountRecorder)
+
+
+def _sink(
+    folder: Path, parameters: RecorderParameters, event: str, topics: list[Topic]
+) -> BagWriter | Snapshot:
+    split = checked_rule(SplitRule(parameters.split_size, round(1e9 * parameters.split_duration)))
+    open_writer = partial(BagWriter, split=split)
+    if not parameters.snapshot:
+        return open_writer(folder)
+    if EVENT not in topics:
+        raise RecordingError(f'a snapshot is set off by the topic {EVENT.name}; name it among the topics')
+    before, after = round(1e9 * parameters.snapshot), round(1e9 * parameters.snapshot_after)
+    return Snapshot(folder, event, SnapshotRule(before, after, parameters.snapshot_memory), open_writer)
 
 
 def _registered(name: str) -> Topic:

@@ -118,7 +118,7 @@ class Piece:
         return FileInformation(self.path.name, start, end - start, count)
 
     def finish(self, records: Mapping[str, Mapping[str, str]]) -> None:
-        """Write the metadata records and the summary, and close the file; the last chunk is written already."""
+        """Write the metadata records and the summary behind the last chunk, and close the file."""
         try:
             self.file.release_room()
             for name, values in records.items():

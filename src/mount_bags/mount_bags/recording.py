@@ -180,6 +180,11 @@ class Recorder:
         """Return how many messages of each topic did not fit into the queue, where there are any."""
         return {name: entry.overflowed for name, entry in self._receptions.items() if entry.overflowed}
 
+    @property
+    def last_stamp(self) -> int:
+        """The latest stamp of all watched topics, ns."""
+        return max((watch.last_stamp for watch in self.watches.values()), default=0)
+
     def _taker(self, topic: str) -> Callable[[_Item], None]:
         reception = self._receptions.setdefault(topic, Reception())
         append = self._queue.append

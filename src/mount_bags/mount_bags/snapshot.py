@@ -31,6 +31,17 @@ class SnapshotRule(NamedTuple):
 
 
 @dataclass(frozen=True)
+class SnapshotFigures:
+    """What a snapshot has at present."""
+
+    recordings: int  # so far, the running one included
+    running: bool
+    held: float  # s that lie in memory
+    held_bytes: int  # what they take, estimated from above; never more than the rule's
+    short_of_memory: bool  # whether the memory is too small for the wished time
+
+
+@dataclass(frozen=True)
 class _Announced:
     type: str
     offers: Sequence[OfferedQos] | Offers
@@ -87,20 +98,12 @@ class Snapshot:
         """How many bytes the files have."""
         return self._size_before + (self._writer.size if self._writer else 0)
 
-    @property
-    def held(self) -> float:
-        """How much time lies in memory, in s."""
-        return (self._ring[-1][2] - self._ring[0][2]) * 1e-9 if self._ring else 0.0
-
-    @property
-    def held_bytes(self) -> int:
-        """How much memory it takes, estimated from above; never more than the rule's."""
-        return self._ring_bytes
-
-    @property
-    def short_of_memory(self) -> bool:
-        """Whether the memory is too small for the wished time."""
-        return self._cut_by_memory
+    def figures(self) -> SnapshotFigures:
+        """Return what lies in memory and what was made of it."""
+        ring = self._ring
+        held = (ring[-1][2] - ring[0][2]) * 1e-9 if ring else 0.0
+        running = self._writer is not None
+        return SnapshotFigures(len(self.folders), running, held, self._ring_bytes, self._cut_by_memory)
 
     def unwritten(self, handed: int) -> int:
         """Return how many messages should stand on the disk and do not, once writing has failed."""

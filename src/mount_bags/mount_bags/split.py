@@ -17,7 +17,7 @@ class SplitError(ValueError):
 
 
 class SplitRule(NamedTuple):
-    """The largest file in bytes and the longest in ns of log time, 0 for no limit; what comes first counts."""
+    """The limits of a file: bytes of `size`, ns of log time in `duration`; 0 is no limit."""
 
     size: int = 0
     duration: int = 0

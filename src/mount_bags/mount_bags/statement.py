@@ -1,4 +1,4 @@
-"""What the recorder says of itself in the recording: how many messages came, and how many of them are there."""
+"""What the recorder says of itself in the recording: how many messages came, how many are there."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ def excerpt_statement(receptions: Mapping[str, Reception], kept: Mapping[str, in
 
 
 def read_statement(record: Mapping[str, str]) -> dict[str, dict[str, int]]:
-    """Return {topic: {`received`, `kept`, `lost`, `missing`}} of a recorder's record; {} if not understood."""
+    """Return {topic: {`received`, `kept`, `lost`, `missing`}} of the record; {} if it is not understood."""
     try:
         topics = yaml.safe_load(record['topics'])
         return {str(name): {key: int(count) for key, count in row.items()} for name, row in topics.items()}

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from mount_ros.message_types import message_class
-from mount_ros.qos import recording_qos
+from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import Topic
 
 Receive = Callable[[bytes, int, int], None]
@@ -45,6 +45,11 @@ class Collector:
         )
         self._receivers.append((subscription, receive))
         return subscription
+
+    def sender(self, topic: Topic) -> Callable[[bytes], None]:
+        """Create a publisher of `topic` and return the function that publishes its bytes, from any thread."""
+        publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
+        return publisher.handle.publish_raw
 
     def unmatched(self) -> list[str]:
         """Return the names of the topics that no publisher has been found for yet."""
