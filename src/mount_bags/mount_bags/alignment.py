@@ -1,0 +1,201 @@
+"""Which sample of one recording belongs to which of another, and what time it is said to have."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_bags.reading import Recording
+from mount_bags.series import Series, SeriesError, Times, registered_topic
+from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
+
+Places = NDArray[np.int64]
+
+_ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, CONTROL_TRACE)
+_SAME_CLOCK = 0.5  # chosen: this share of the stamps in the common span must be equal
+
+
+class ComparisonError(ValueError):
+    """Two recordings have nothing that could be compared; the text says what they have."""
+
+
+class Counter:
+    """Counts the samples of one recording by those of its anchoring topic.
+
+    Steps are rounded one by one, so that a clock that runs fast or slow does not add up.
+    """
+
+    def __init__(self, anchor: Series):
+        self.first_place = int(np.argmin(anchor.stamps))
+        self.stamps = np.unique(anchor.stamps)
+        self.period = _period(anchor, self.stamps)
+        self._numbers = _steps(self.stamps, self.period)
+
+    @property
+    def first(self) -> int:
+        """Its first stamp, ns."""
+        return int(self.stamps[0])
+
+    def numbers(self, stamps: Times, period: float) -> Times:
+        """Return the numbers of rising `stamps` (ns) in `period` (s) from the first sample of the anchor."""
+        nearest = np.clip(np.searchsorted(self.stamps, stamps), 0, len(self.stamps) - 1)
+        passed = self._numbers[nearest] + (stamps - self.stamps[nearest]) / (1e9 * self.period)
+        numbers = np.rint(passed * (self.period / period)).astype(np.int64)
+        if np.isin(stamps, self.stamps).mean() >= _SAME_CLOCK:
+            return numbers
+        # Stamps of another clock may stand at any place between those of the anchor: they count themselves.
+        return numbers[0] + _steps(stamps, period)
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How samples of A and B become one time axis.
+
+    With `same_stamps` samples of equal stamp belong together, else samples of equal number, counted from the
+    first sample of the topic `anchor`. Times are in s from the first message of A, which was logged at
+    `begin` (ns).
+    """
+
+    same_stamps: bool
+    anchor: str
+    a: Counter
+    b: Counter
+    begin: int
+    anchor_time: float
+
+    @property
+    def shift(self) -> int:
+        """What is added to the stamps of B, ns."""
+        return 0 if self.same_stamps else self.a.first - self.b.first
+
+    @property
+    def sentence(self) -> str:
+        """What was chosen, for people."""
+        if self.same_stamps:
+            return 'samples are matched by their stamps, which both recordings share'
+        return (
+            f'stamps differ: B is shifted by {self.shift / 1e9:+.6f} s, so that the first samples of '
+            f'{self.anchor} coincide, and samples are counted from there'
+        )
+
+    def time(self, stamps: Times) -> NDArray[np.float64]:
+        """Return the times (s) of stamps of A."""
+        return (stamps - self.a.first) / 1e9 + self.anchor_time
+
+    def received(self, log_times: Times) -> NDArray[np.float64]:
+        """Return the times (s) of messages of A by when they were received."""
+        return (log_times - self.begin) / 1e9
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of one topic in the order of their keys; equal keys belong together."""
+
+    keys: Times  # ns, or numbers of periods
+    order: Places  # where each stands in its series
+    period: float  # s between neighbouring keys that differ by `step`
+    step: int
+
+
+def paired_topics(a: Recording, b: Recording) -> dict[str, str]:
+    """Return {topic of A: topic of B}: of one name, or the same registered topic below two namespaces."""
+    pairs = {name: name for name in a if name in b.topics}
+    for name in a:
+        registered = registered_topic(name)
+        if name in pairs or registered is None:
+            continue
+        fitting = [other for other in b if registered_topic(other) is registered and other not in a.topics]
+        if len(fitting) == 1 and fitting[0] not in pairs.values():
+            pairs[name] = fitting[0]
+    return pairs
+
+
+def align(a: Recording, b: Recording) -> Alignment:
+    """Return how to match the samples of `a` and `b`; raises `ComparisonError`."""
+    first, second = _anchor(a, b)
+    of_a, of_b = Counter(first), Counter(second)
+    begin = a.time_range[0] if a.time_range else 0
+    return Alignment(
+        same_stamps=_share(of_a.stamps, of_b.stamps) >= _SAME_CLOCK,
+        anchor=first.topic.lstrip('/'),
+        a=of_a,
+        b=of_b,
+        begin=begin,
+        anchor_time=(int(first.receive_times[of_a.first_place]) - begin) / 1e9,
+    )
+
+
+def samples_of(series: Series, alignment: Alignment, counter: Counter) -> Samples:
+    """Return the samples of a stamped topic; `counter` is that of its recording."""
+    order = np.argsort(series.stamps, kind='stable')
+    stamps = series.stamps[order]
+    period = _period(series, stamps)
+    if alignment.same_stamps:
+        return Samples(stamps, order, period, max(1, round(1e9 * period)))
+    return Samples(counter.numbers(stamps, period), order, period, 1)
+
+
+def common_samples(a: Samples, b: Samples) -> tuple[Places, Places]:
+    """Return where the samples that both have stand in `a` and `b`, in the order of their keys."""
+    keys_a, keys_b = a.keys, b.keys
+    if _repeats(keys_a).any() or _repeats(keys_b).any():
+        keys_a, keys_b = _numbered(keys_a), _numbered(keys_b)
+    _, places_a, places_b = np.intersect1d(keys_a, keys_b, assume_unique=True, return_indices=True)
+    return places_a, places_b
+
+
+def _anchor(a: Recording, b: Recording) -> tuple[Series, Series]:
+    pairs = paired_topics(a, b)
+    if not pairs:
+        raise ComparisonError(
+            f'no topic is in both recordings: A has {", ".join(a) or "none"}; B has {", ".join(b) or "none"}'
+        )
+    ranks = {topic: rank for rank, topic in enumerate(_ANCHORS)}
+    by_rank = sorted(pairs, key=lambda name: ranks.get(registered_topic(name), len(ranks)))
+    for name in by_rank:
+        first, second = a[name], b[pairs[name]]
+        if len(first) and len(second) and is_stamped(first) and is_stamped(second):
+            return first, second
+    raise ComparisonError('no topic with stamps has messages in both recordings; nothing can be matched')
+
+
+def is_stamped(series: Series) -> bool:
+    """Return whether the messages carry stamps."""
+    try:
+        return len(series.stamps) > 0
+    except SeriesError:
+        return False
+
+
+def _share(a: Times, b: Times) -> float:
+    """Return the share of stamps that are equal where both recordings have some."""
+    low, high = max(a[0], b[0]), min(a[-1], b[-1])
+    inside_a, inside_b = a[(a >= low) & (a <= high)], b[(b >= low) & (b <= high)]
+    fewer = min(len(inside_a), len(inside_b))
+    return len(np.intersect1d(inside_a, inside_b)) / fewer if fewer else 0.0
+
+
+def _steps(stamps: Times, period: float) -> Times:
+    """Return the numbers of rising stamps (ns) in periods (s) from the first."""
+    return np.cumsum(np.rint(np.diff(stamps, prepend=stamps[0]) / (1e9 * period)).astype(np.int64))
+
+
+def _period(series: Series, stamps: Times) -> float:
+    if series.registered is not None and series.registered.rate:
+        return 1.0 / series.registered.rate
+    steps = np.diff(stamps)
+    steps = steps[steps > 0]
+    return float(np.median(steps)) / 1e9 if len(steps) else 1.0
+
+
+def _repeats(keys: Times) -> NDArray[np.bool_]:
+    return np.concatenate([np.zeros(min(1, len(keys)), bool), np.diff(keys) == 0])
+
+
+def _numbered(keys: Times) -> NDArray[np.void]:
+    """Return keys that are unique: the second sample of a key is another than the first."""
+    places = np.arange(len(keys))
+    begins = np.maximum.accumulate(np.where(_repeats(keys), 0, places))
+    numbered = np.empty(len(keys), [('key', np.int64), ('repeat', np.int64)])
+    numbered['key'], numbered['repeat'] = keys, places - begins
+    return numbered

@@ -1,0 +1,134 @@
+"""A piece of a recording as a recording of its own, with what it needs to be understood."""
+
+import math
+import os
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_bags.messages import Messages, read_messages, write_messages
+from mount_bags.metadata import TopicInformation
+from mount_bags.origin import short_name, with_step
+from mount_bags.reading import Recording
+from mount_bags.series import registered_topic
+from mount_bags.writer import BagWriter
+from mount_ros.topics import EVENT, Delivery
+
+_ALL = slice(None)
+_LAST = slice(-1, None)
+_NONE = slice(0)
+
+
+class CutError(ValueError):
+    """A recording has nothing in the asked range, or the range is none; the text says what there is."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """What was cut; `begin` and `end` in s from the first message of the original."""
+
+    folder: Path
+    begin: float
+    end: float
+    messages: int  # of the range
+    carried: int  # latched ones from before it
+    notes: tuple[str, ...]
+
+
+def cut(
+    recording: Recording,
+    out: str | os.PathLike[str],
+    begin: float | None = None,
+    end: float | None = None,
+    reason: str = '',
+) -> Cut:
+    """Write what was logged from `begin` on and before `end` to the new recording `out`.
+
+    Times are in s from the first message of `recording`; None is its beginning, or its end with the last
+    message. Messages keep their bytes, log and publish times. Of latched topics and of `event` the last
+    message before `begin` comes with it; `reason` goes into the note of origin. Raises `CutError`.
+    """
+    span = _checked_span(recording, begin, end)
+    parts, notes, carried = [], [], 0
+    for name in recording:
+        messages, damages = read_messages(recording, name)
+        before, inside = _places(messages, span)
+        parts.append(messages.chosen(np.concatenate([before, inside])))
+        carried += len(before)
+        notes += damages
+    count = sum(len(part) for part in parts) - carried
+    if not count:
+        raise CutError(f'{recording.path} has no message {span}; it lasts {span.whole / 1e9:.3f} s')
+    writer = BagWriter(out, custom_data=with_step([recording], _step(recording, span, reason)))
+    try:
+        notes += write_messages(writer, parts)
+    finally:
+        writer.close()
+    return Cut(Path(out), span.begin / 1e9, span.end / 1e9, count, carried, tuple(notes))
+
+
+@dataclass(frozen=True)
+class _Span:
+    """From `begin` on and before `end`, in ns from the log time `zero`; `closed`: with the last message."""
+
+    zero: int
+    begin: int
+    end: int
+    closed: bool
+    whole: int
+
+    def __str__(self) -> str:
+        return f'from {self.begin / 1e9:.3f} s to {self.end / 1e9:.3f} s'
+
+
+def _checked_span(recording: Recording, begin: float | None, end: float | None) -> _Span:
+    found = recording.time_range
+    if found is None:
+        raise CutError(f'{recording.path} has no message; there is nothing to cut')
+    zero, whole = found[0], found[1] - found[0]
+    for name, value in (('begin', begin), ('end', end)):
+        if value is not None and not math.isfinite(value):
+            raise CutError(f'the {name} of a cut must be a number of seconds; instead received {value}')
+    first = max(0, round(1e9 * begin)) if begin is not None else 0
+    last = round(1e9 * end) if end is not None else whole
+    if last < first or (end is not None and last == first):
+        raise CutError(f'the end of a cut ({last / 1e9:g} s) must lie behind its begin ({first / 1e9:g} s)')
+    if first > whole:
+        raise CutError(
+            f'the cut begins at {first / 1e9:g} s, but {recording.path} lasts only {whole / 1e9:.3f} s'
+        )
+    return _Span(zero, first, min(last, whole), end is None or last > whole, whole)
+
+
+def _places(messages: Messages, span: _Span) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the carried messages from before the span stand, and those of the span."""
+    times = messages.log_times - span.zero
+    first = int(np.searchsorted(times, span.begin, side='left'))
+    behind = int(np.searchsorted(times, span.end, side='right' if span.closed else 'left'))
+    return np.arange(first)[_carried(messages.topic)], np.arange(first, behind)
+
+
+def _carried(topic: TopicInformation) -> slice:
+    """Return which of the messages before a cut come with it."""
+    registered = registered_topic(topic.name)
+    if registered is not None and (registered is EVENT or registered.delivery is Delivery.LATCHED):
+        return _LAST
+    if any(offer.durability == 'transient_local' for offer in topic.offered_qos):
+        # Foreign ones may have several publishers that each say their part, as /tf_static does.
+        return _ALL
+    return _NONE
+
+
+def _step(recording: Recording, span: _Span, reason: str) -> dict[str, Any]:
+    return {
+        'did': 'cut',
+        'recording': short_name(recording),
+        'from_s': span.begin / 1e9,
+        'to_s': span.end / 1e9,
+        'made': datetime.now().astimezone().isoformat(timespec='seconds'),
+        **({'reason': reason} if reason else {}),
+    }

@@ -1,0 +1,110 @@
+"""What happened in a recording: its marked events, and the switching of damping where none tell of it."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from mount_bags.event_marks import read_marks
+from mount_bags.reading import ReadingError, Recording
+from mount_bags.series import Series, SeriesError
+from mount_ros.topics import CONTROL_TRACE, EVENT
+
+SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
+_NUMBERED = re.compile(r'(.+?):(\d+)')
+
+
+class EventError(ValueError):
+    """An event that was asked for is not in the recording; the text lists those that are."""
+
+
+@dataclass(frozen=True)
+class RecordedEvent:
+    """Something worth finding again; `log_time` in ns."""
+
+    log_time: int
+    kind: str
+    text: str = ''
+
+
+def recorded_events(recording: Recording) -> list[RecordedEvent]:
+    """Return the events in `recording` in the order of their log times.
+
+    They are the marks of the topic `event`, and where these tell of no `switch_on` or no `switch_off`, the
+    changes of `damping_active` in the control trace.
+    """
+    marked = marked_events(recording)
+    kinds = {event.kind for event in marked}
+    derived = [event for event in _switching(recording) if event.kind not in kinds]
+    return sorted([*marked, *derived], key=lambda event: event.log_time)
+
+
+def marked_events(recording: Recording) -> list[RecordedEvent]:
+    """Return the marks of the topic `event`."""
+    if EVENT.name not in recording:
+        return []
+    series = recording[EVENT.name]
+    times = series.receive_times.tolist()
+    return [
+        RecordedEvent(time, mark.kind, mark.text)
+        for time, mark in zip(times, read_marks(series), strict=True)
+    ]
+
+
+def find_event(recording: Recording, wanted: str) -> RecordedEvent:
+    """Return the event meant by `wanted`: its number from 1, its kind (the first one), or `kind:number`.
+
+    In a kind `-` is as good as `_`. Raises `EventError` with the events that there are.
+    """
+    events = recorded_events(recording)
+    if wanted.isdigit():
+        fitting, number = events, int(wanted)
+    else:
+        match = _NUMBERED.fullmatch(wanted)
+        kind, number = (match[1], int(match[2])) if match else (wanted, 1)
+        fitting = [event for event in events if _plain(event.kind) == _plain(kind)]
+    if not 1 <= number <= len(fitting):
+        raise EventError(f'{recording.path} has no event {wanted!r}; {_listed(recording, events)}')
+    return fitting[number - 1]
+
+
+def seconds_into(recording: Recording, log_time: int) -> float:
+    """Return `log_time` (ns) in s from the first message of `recording`."""
+    found = recording.time_range
+    if found is None:
+        raise ReadingError(f'{recording.path} has no message')
+    return (log_time - found[0]) / 1e9
+
+
+def _plain(kind: str) -> str:
+    return kind.replace('-', '_')
+
+
+def _switching(recording: Recording) -> list[RecordedEvent]:
+    if CONTROL_TRACE.name not in recording:
+        return []
+    try:
+        trace = recording[CONTROL_TRACE.name]
+        return _changes(trace)
+    except SeriesError:
+        return []  # no control trace of ours
+
+
+def _changes(trace: Series) -> list[RecordedEvent]:
+    order = np.argsort(trace.receive_times, kind='stable')
+    change = np.diff((trace['damping_active'][order] > 0.5).astype(int), prepend=0)
+    return [
+        RecordedEvent(int(trace.receive_times[order[place]]), SWITCH_ON if change[place] > 0 else SWITCH_OFF)
+        for place in np.flatnonzero(change).tolist()
+    ]
+
+
+def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
+    if not events:
+        return 'it has none, and damping was never switched; cut by --from and --to'
+    shown = [
+        f'{number} {event.kind} at {seconds_into(recording, event.log_time):.3f} s'
+        for number, event in enumerate(events[:12], 1)
+    ]
+    more = f' and {len(events) - 12} more' if len(events) > 12 else ''
+    return f'it has {", ".join(shown)}{more}'

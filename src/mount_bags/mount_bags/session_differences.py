@@ -1,0 +1,62 @@
+"""How two sessions differ, in words: parameters, versions, scenario. Usually the reason of all else."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+from mount_bags.reading import Recording
+from mount_ros.topics import SESSION
+
+_OF_THE_MOMENT = re.compile(r'started|.*\.(uri|port)')  # differs from run to run and explains nothing
+_LISTED = 3  # parameters that only one names
+
+
+def session_text(recording: Recording) -> str:
+    """Return the last session message of a recording, empty where it has none."""
+    if SESSION.name not in recording or not len(recording[SESSION.name]):
+        return ''
+    return recording.latched(SESSION.name).data
+
+
+def session_differences(a: str, b: str) -> list[str]:
+    """Return a sentence for each difference of two sessions (YAML texts), changed values first."""
+    one, other = _flat(_content(a)), _flat(_content(b))
+    changed = [
+        f'{name} is {_shown(one[name])} in A, {_shown(other[name])} in B'
+        for name in one
+        if name in other and one[name] != other[name] and not _OF_THE_MOMENT.fullmatch(name)
+    ]
+    return [*changed, *_only('A', one, other), *_only('B', other, one)]
+
+
+def _content(text: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        return {'text': text}
+
+
+def _flat(content: Any, prefix: str = '') -> dict[str, Any]:
+    """Return {path: value}; parameters are named as `--set` names them, without their common root."""
+    if not isinstance(content, Mapping):
+        return {prefix or 'text': content} if content is not None else {}
+    flat: dict[str, Any] = {}
+    for key, value in content.items():
+        root = '' if not prefix and key == 'parameters' else f'{prefix}.{key}' if prefix else str(key)
+        flat.update(_flat(value, root) if isinstance(value, Mapping) else {root: value})
+    return flat
+
+
+def _only(where: str, present: Mapping[str, Any], absent: Mapping[str, Any]) -> list[str]:
+    names = [name for name in present if name not in absent and not _OF_THE_MOMENT.fullmatch(name)]
+    if not names:
+        return []
+    shown = ', '.join(f'{name} ({_shown(present[name])})' for name in names[:_LISTED])
+    more = f' and {len(names) - _LISTED} more' if len(names) > _LISTED else ''
+    return [f'only {where} tells {shown}{more}']
+
+
+def _shown(value: Any) -> str:
+    return f'{value:g}' if isinstance(value, float) else str(value)

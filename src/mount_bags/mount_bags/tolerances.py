@@ -1,0 +1,79 @@
+"""What may differ without being a difference: nothing, unless it is said."""
+
+import re
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+SWITCHING = 'switching'
+_ALL = ''
+_FORM = re.compile(r'(?:(?P<name>[^=\s]+)=)?(?P<value>[0-9.]+(?:[eE][-+]?\d+)?)(?P<percent>%?)')
+
+
+class ToleranceError(ValueError):
+    """A tolerance is not understood or names no signal; the text says how to write it."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A bound on the difference: in the signal's unit, or as a share of its largest value in A."""
+
+    value: float = 0.0
+    relative: bool = False
+
+    def bound(self, largest: float) -> float:
+        """Return the bound in the unit of the signal, whose largest absolute value is `largest`."""
+        return self.value * largest if self.relative else self.value
+
+
+EXACT = Tolerance()
+
+
+class Tolerances:
+    """The tolerances of a comparison by signal, topic, or for all signals."""
+
+    def __init__(self, texts: Iterable[str] = ()):
+        """Read `NAME=0.01`, `NAME=1%` or, for all signals, `1%`; raises `ToleranceError`.
+
+        NAME is a signal (`current`), a topic (`current_setpoint`), both (`control_trace.current`), or
+        `switching` for the times of switching in s.
+        """
+        self._by_name = dict(map(_read, texts))
+
+    def of(self, topic: str, signal: str) -> Tolerance:
+        """Return the tolerance of a signal; the name that says most counts."""
+        for name in (f'{topic}.{signal}', signal, topic, _ALL):
+            if name in self._by_name:
+                return self._by_name[name]
+        return EXACT
+
+    @property
+    def switching(self) -> float:
+        """By how much a switching may move, s."""
+        return self._by_name.get(SWITCHING, EXACT).value
+
+    def check(self, known: Collection[tuple[str, str]]) -> None:
+        """Raise `ToleranceError` for a name that is none of `known` (topic, signal)."""
+        topics, signals = {topic for topic, _ in known}, {signal for _, signal in known}
+        names = topics | signals | {f'{topic}.{signal}' for topic, signal in known} | {SWITCHING, _ALL}
+        for name in self._by_name:
+            if name not in names:
+                listed = ', '.join(sorted(f'{topic}.{signal}' for topic, signal in known))
+                raise ToleranceError(f'tolerance for {name!r}: no such signal in both; there are {listed}')
+
+
+def _read(text: str) -> tuple[str, Tolerance]:
+    match = _FORM.fullmatch(text.strip())
+    try:
+        value = float(match['value']) if match else 0.0
+    except ValueError:
+        match = None
+    if match is None:
+        raise ToleranceError(f'tolerance {text!r}: write NAME=VALUE as current=0.01, or NAME=1%, or 1%')
+    name, relative = match['name'] or _ALL, bool(match['percent'])
+    if name == _ALL and not relative:
+        raise ToleranceError(
+            f'tolerance {text!r} would mean another thing in each unit; name a signal or write a share: 1%'
+        )
+    if name == SWITCHING and relative:
+        raise ToleranceError('the tolerance of switching is a time in s, such as switching=0.002')
+    return name, Tolerance(value / 100.0 if relative else value, relative)

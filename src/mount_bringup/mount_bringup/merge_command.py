@@ -1,0 +1,36 @@
+"""`engine-mount merge`: several pieces of one drive as one recording."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+EPILOG = 'Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`'
+
+
+def merge(
+    recordings: Annotated[list[Path], typer.Argument(help='folders of recordings or runs, or MCAP files')],
+    out: Annotated[Path, typer.Option(help='folder to create')],
+    different_sessions: Annotated[
+        bool, typer.Option('--different-sessions', help='merge recordings of different drives, too')
+    ] = False,
+) -> None:
+    """Join recordings by log time; what stands in more than one of them is written once."""
+    from mount_bags.merge import merge as merge_recordings
+    from mount_bringup.recording_path import open_run
+
+    opened = [open_run(path) for path in recordings]
+    done = merge_recordings(opened, out, different_sessions=different_sessions)
+    console = Console()
+    console.print(
+        f'{done.messages} messages; {done.repeated} stood in more than one part and were written once\n'
+        f'recording  {done.folder}',
+        soft_wrap=True,
+        highlight=False,
+    )
+    warnings = [warning for recording in opened for warning in recording.warnings]
+    for note in (*warnings, *done.notes):
+        console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True)
+    if done.notes:
+        raise typer.Exit(1)
