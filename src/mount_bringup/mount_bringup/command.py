@@ -8,6 +8,13 @@ import typer
 import yaml
 from rich.console import Console
 
+from mount_bringup import (
+    accept_command,
+    compare_command,
+    cut_command,
+    merge_command,
+    replay_command,
+)
 from mount_ros.environment import prepare_environment
 
 app = typer.Typer(
@@ -157,6 +164,13 @@ def prepare() -> None:
         for scenario in ('bench', 'motorway'):
             sim = {'scenario': scenario, 'timeline.duration': 0.5}
             run_core({'mount_sim': sim}, lambda *_: None)
+
+
+app.command(name='replay', epilog=replay_command.EPILOG)(replay_command.replay)
+app.command(name='compare', epilog=compare_command.EPILOG)(compare_command.compare)
+app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)
+app.command(name='merge', epilog=merge_command.EPILOG)(merge_command.merge)
+app.command(name='accept', epilog=accept_command.EPILOG)(accept_command.accept)
 
 
 def _parameters(settings: list[str]) -> dict[str, dict[str, Any]]:
