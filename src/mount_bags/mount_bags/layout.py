@@ -1,22 +1,20 @@
 """Where the numbers of a serialised message stand, so that thousands of equal messages are read at once.
 
-The walk follows the CDR encoding of the middleware: little-endian, each number aligned to its own
+The walk follows the CDR encoding of the middleware: each number aligned to its own
 size counted from behind the 4-byte head, strings and sequences with a length of 4 bytes in front.
 Bytes between aligned numbers are undefined and never looked at.
 """
 
-import re
 import struct
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from mount_ros.message_types import message_class
+from mount_bags.definitions import Definition, element_of
 
 HEAD = 4  # bytes: kind of encoding and options
-_LITTLE_ENDIAN = b'\x00\x01'
-_LENGTH = struct.Struct('<I')
-_NUMBERS = {
+NUMBERS = {
     'boolean': '<u1',
     'octet': '<u1',
     'char': '<u1',
@@ -24,10 +22,7 @@ _NUMBERS = {
     'double': '<f8',
     **{f'{sign}int{bits}': f'<{sign or "i"}{bits // 8}' for sign in ('', 'u') for bits in (8, 16, 32, 64)},
 }
-_TYPE_NAME = re.compile(r'[A-Za-z]\w*/msg/[A-Za-z]\w*')
-_SEQUENCE = re.compile(r'sequence<(.+?)(?:, \d+)?>')
-_ARRAY = re.compile(r'(.+)\[(\d+)\]')
-_STRING = re.compile(r'string(?:<\d+>)?')
+_ORDERS: dict[bytes, Literal['<', '>']] = {b'\x00\x00': '>', b'\x00\x01': '<'}
 
 
 class LayoutError(ValueError):
@@ -61,56 +56,57 @@ class Layout:
         return bool((messages[:, self.shape] == messages[0, self.shape]).all())
 
 
-def layout_of(raw: bytes, type_name: str) -> Layout:
-    """Return the layout of one serialised message; raises `LayoutError`, `ValueError` for unknown types."""
-    if raw[:2] != _LITTLE_ENDIAN:
-        raise LayoutError(f'encoding {raw[:2].hex()} is not little-endian CDR')
-    walk = _Walk(raw)
+def layout_of(raw: bytes, definition: Definition) -> Layout:
+    """Return the layout of one serialised message; raises `LayoutError`."""
+    walk = _Walk(raw, definition)
     try:
-        walk.message('', installed_class(type_name))
-    except (struct.error, UnicodeDecodeError):
-        raise LayoutError(f'a message of {len(raw)} bytes is no {type_name}') from None
+        walk.message('', definition.name)
+    except (struct.error, UnicodeDecodeError, RecursionError):
+        raise LayoutError(f'a message of {len(raw)} bytes is no {definition.name}') from None
     if walk.position > len(raw):
-        raise LayoutError(f'a message of {len(raw)} bytes is too short for {type_name}')
+        raise LayoutError(f'a message of {len(raw)} bytes is too short for {definition.name}')
     walk.layout.shape = np.array(walk.shape, np.int64)
     return walk.layout
 
 
-def installed_class(type_name: str) -> type:
-    """Return the message class of a type name that a file gives; raises `ValueError`."""
-    if not _TYPE_NAME.fullmatch(type_name):
-        raise ValueError(f'{type_name!r} is no message type')
-    return message_class(type_name)
+def byte_order(raw: bytes) -> Literal['<', '>']:
+    """Return `<` or `>` of a plain CDR message; raises `LayoutError` for every other encoding."""
+    order = _ORDERS.get(raw[:2])
+    if order is None or len(raw) < HEAD:
+        raise LayoutError(f'a message that begins with {raw[:HEAD].hex() or "nothing"} is no plain CDR')
+    return order
 
 
 class _Walk:
-    def __init__(self, raw: bytes):
+    def __init__(self, raw: bytes, definition: Definition):
         self.layout = Layout()
         self.shape: list[int] = list(range(HEAD - 2))
         self.position = HEAD
         self._raw = raw
+        self._definition = definition
+        self._order = byte_order(raw)
 
-    def message(self, path: str, kind: type) -> None:
-        for name, field_type in kind.get_fields_and_field_types().items():  # type: ignore[attr-defined]
-            self.field(f'{path}.{name}' if path else name, field_type)
+    def message(self, path: str, name: str) -> None:
+        for field_name, field_type in self._definition.types[name].items():
+            self.field(f'{path}.{field_name}' if path else field_name, field_type)
 
     def field(self, path: str, field_type: str) -> None:
-        if field_type in _NUMBERS:
+        element = element_of(field_type)
+        if field_type in NUMBERS:
             self._numbers(path, field_type, 1)
-        elif _STRING.fullmatch(field_type):
+        elif field_type.split('<')[0] == 'string':
             self.layout.strings[path] = self._string()
-        elif match := _ARRAY.fullmatch(field_type):
-            self._elements(path, match[1], int(match[2]))
-        elif match := _SEQUENCE.fullmatch(field_type):
-            self._elements(path, match[1], self._length())
+        elif element != field_type:
+            fixed = not field_type.startswith('sequence<')
+            count = int(field_type[field_type.rindex('[') + 1 : -1]) if fixed else self._length()
+            self._elements(path, element, count)
         elif '/' in field_type:
-            package, kind = field_type.split('/')
-            self.message(path, message_class(f'{package}/msg/{kind}'))
+            self.message(path, field_type)
         else:
             raise LayoutError(f'field {path} of type {field_type} cannot be read in place')
 
     def _elements(self, path: str, element: str, count: int) -> None:
-        if element in _NUMBERS:
+        if element in NUMBERS:
             self._numbers(path, element, count)
             return
         if count > len(self._raw):
@@ -119,7 +115,7 @@ class _Walk:
             self.field(f'{path}[{place}]', element)
 
     def _numbers(self, path: str, field_type: str, count: int) -> None:
-        dtype = np.dtype(_NUMBERS[field_type])
+        dtype = np.dtype(NUMBERS[field_type]).newbyteorder(self._order)
         if count:
             self._align(dtype.itemsize)
         self.layout.numbers[path] = Numbers(self.position, dtype, count)
@@ -136,7 +132,7 @@ class _Walk:
 
     def _length(self) -> int:
         self._align(4)
-        length = _LENGTH.unpack_from(self._raw, self.position)[0]
+        length = struct.unpack_from(f'{self._order}I', self._raw, self.position)[0]
         self.shape.extend(range(self.position, self.position + 4))
         self.position += 4
         return length

@@ -1,81 +1,51 @@
-"""Reads one MCAP file as far as it is whole: complete, cut off by a crash, or damaged in places.
+"""Reads one MCAP file as far as it is proven whole: complete, cut off by a crash, or damaged in places.
 
-The file is walked from its beginning, record by record, so one way of reading serves files with and
-without a summary. Chunks are unpacked when a topic is asked for.
+Where the summary at the end is sound, it says where the chunks stand, and these are unpacked when a topic
+is asked for. Where it is not, the file is walked record by record and searched for chunks, and whatever
+their checksums prove is taken. Declarations of topics count more where a checksum covers them.
 """
 
-import functools
 import mmap
-import struct
-import zlib
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
-from io import BytesIO
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
-import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema, Statistics
+from mcap.records import Channel, Schema
 from mcap.writer import MCAP0_MAGIC
-from numpy.typing import NDArray
 
-T = TypeVar('T')
-Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
-
-# The fixed part of a message record; the payload follows.
-MESSAGE_HEAD = np.dtype(
-    [
-        ('opcode', '<u1'),
-        ('length', '<u8'),
-        ('channel', '<u2'),
-        ('sequence', '<u4'),
-        ('log_time', '<u8'),
-        ('publish_time', '<u8'),
-    ]
+from mount_bags.chunks import (
+    MESSAGE_HEAD,
+    RECORD,
+    Chunk,
+    Contents,
+    chunk_at,
+    contents_of,
+    explore,
+    indexed_chunk,
+    messages_at,
+    partial_chunk,
+    scattered_chunks,
 )
-_HEAD_BYTES = np.arange(MESSAGE_HEAD.itemsize)
-PAYLOAD_LENGTH_OFFSET = MESSAGE_HEAD.itemsize - 9  # what the record's length counts besides the payload
-_RECORD = struct.Struct('<BQ')
-_CHUNK_HEAD = struct.Struct('<QQQII')  # start, end, unpacked size, CRC, length of the compression's name
-_LARGEST_CHUNK = 1 << 32  # bytes; more is a damaged length
+from mount_bags.summary import Proof, data_proof, parsed, parsed_metadata, read_summary
+from mount_bags.whole_files import FileError, mapped
+
+_LAST_OPCODE = Opcode.DATA_END
+_LENGTHS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
+_PRIVATE_OPCODE = 0x80  # and above: of other programs, to be skipped
 
 
 class McapFileError(ValueError):
     """A file is no MCAP file."""
 
 
-class Block:
-    """Unpacked bytes and where in them the wanted message records begin."""
+@dataclass(frozen=True)
+class Stretch:
+    """A part of the file in which something is lost: bytes from `begin` to `end`."""
 
-    def __init__(self, data: Bytes, offsets: Offsets):
-        self.data = data
-        self.offsets = offsets
-
-    @functools.cached_property
-    def heads(self) -> np.ndarray:
-        """The fixed parts of the records, a structured array of `MESSAGE_HEAD`."""
-        gathered = self.data[self.offsets[:, None] + _HEAD_BYTES]
-        return gathered.view(MESSAGE_HEAD)[:, 0]
-
-
-@dataclass
-class _Chunk:
-    position: int
     begin: int
     end: int
-    unpacked_size: int
-    crc: int
-    compression: str
-    start_time: int
-    end_time: int
-    indexes: dict[int, Offsets] = field(default_factory=dict)  # channel -> offsets in the unpacked bytes
-    walked: bool = False  # whether `indexes` come from the chunk itself
-    damaged: bool = False
 
 
 class McapFile:
@@ -85,15 +55,44 @@ class McapFile:
         self.path = path
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
-        self.metadata: dict[str, Mapping[str, str]] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
         self.warnings: list[str] = []
-        self.complete = False
-        self._statistics: Statistics | None = None
-        self._chunks: list[_Chunk] = []
+        self.chunks: list[Chunk] = []
+        self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
+        self.closed = False  # whether the writer came to the end of its messages
+        self.undeclared = 0  # messages whose topic is not known
+        self.tail: Chunk | None = None  # begun at the end of the file, cut off before its own
+        self._data_end = 0  # where the messages end, by the file's own account
+        self._footer_found = False
         self._loose: list[int] = []  # messages outside of chunks
-        self._bytes = _map(path)
-        self._walk_file()
-        self._find_hidden_channels()
+        self._counts: dict[int, int] = {}
+        self._times: tuple[int, int] | None = None
+        self._data = _opened(path)
+        self._summary = read_summary(self._data)
+        self._data_proof: Proof | None = None
+        if self._summary.proof is not Proof.SOUND or not self._take_summary():
+            self._search()
+        self._note_missing_checksums()
+
+    @property
+    def size(self) -> int:
+        """The size of the file in bytes."""
+        return len(self._data)
+
+    @property
+    def proven(self) -> bool:
+        """Whether a checksum vouches for what the file says of itself: topics, counts and chunks."""
+        return self._summary.proof is Proof.SOUND
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing of it is known to be missing; chunks count from when they were unpacked."""
+        return self.closed and not self.damaged and not self.unexplained
+
+    @property
+    def damaged(self) -> bool:
+        """Whether messages are known to be lost inside of it, not only at a cut-off end."""
+        return bool(self.undeclared) or any(chunk.damaged for chunk in self.chunks)
 
     def topic_type(self, channel: int) -> str:
         """Return the type name of a channel, empty where the file tells none."""
@@ -101,234 +100,298 @@ class McapFile:
         return '' if schema is None else schema.name
 
     def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by channel."""
-        if self._statistics is not None and self.complete:
-            return dict(self._statistics.channel_message_counts)
-        counts: dict[int, int] = {}
-        for block_counts in map(self._counts, self._chunks):
-            for channel, count in block_counts.items():
-                counts[channel] = counts.get(channel, 0) + count
-        for channel in (self._loose_channel(offset) for offset in self._loose):
-            counts[channel] = counts.get(channel, 0) + 1
-        return counts
+        """Return the number of messages by channel: as written where that is proven, else as readable."""
+        return dict(self._counts)
 
     def time_range(self) -> tuple[int, int] | None:
         """Return the earliest and the latest log time (ns), None for a file without messages."""
-        times = [(chunk.start_time, chunk.end_time) for chunk in self._chunks]
+        return self._times
+
+    def blocks(self, channels: Collection[int]) -> Iterator[Contents]:
+        """Yield the messages of `channels` in the order of the file."""
+        self.data_proof()
+        wanted = np.array(sorted(channels), np.int64)
+        for chunk in self.chunks:
+            if chunk.channels is None or not chunk.channels.isdisjoint(channels):
+                contents = self.contents(chunk)
+                if contents is not None and (found := contents.of(wanted)).offsets.size:
+                    yield found
         if self._loose:
-            logged = Block(self._all(), np.array(self._loose)).heads['log_time']
-            times.append((int(logged.min()), int(logged.max())))
-        if not times:
-            return None
-        return min(first for first, _ in times), max(last for _, last in times)
+            found = messages_at(self._data, np.array(self._loose)).of(wanted)
+            if found.offsets.size:
+                yield found
 
-    def blocks(self, channels: Collection[int]) -> Iterator[Block]:
-        """Yield the message records of `channels` in the order of the file."""
-        loose = [offset for offset in self._loose if self._loose_channel(offset) in channels]
-        for chunk in self._chunks:
-            # Files have their messages either in chunks or loose; a mixture keeps its order.
-            before = [offset for offset in loose if offset < chunk.position]
-            if before:
-                yield Block(self._all(), np.array(before))
-                loose = loose[len(before) :]
-            block = self._chunk_block(chunk, channels)
-            if block is not None:
-                yield block
-        if loose:
-            yield Block(self._all(), np.array(loose))
-
-    # Walking the file.
-
-    def _walk_file(self) -> None:
-        data = self._bytes
-        if data[: len(MCAP0_MAGIC)] != MCAP0_MAGIC:
-            raise McapFileError(f'{self.path} is no MCAP file: its first bytes are not those of one')
-        position = len(MCAP0_MAGIC)
-        while position + _RECORD.size <= len(data):
-            opcode, length = _RECORD.unpack_from(data, position)
-            begin = position + _RECORD.size
-            end = begin + length
-            if end > len(data) or opcode == 0:
-                break
-            self._take_record(opcode, position, begin, end)
-            position = end
-            if opcode == Opcode.FOOTER:
-                self.complete = data[position : position + len(MCAP0_MAGIC)] == MCAP0_MAGIC
-                break
-        if not self.complete:
-            self._note_cut(position)
-
-    def _take_record(self, opcode: int, position: int, begin: int, end: int) -> None:
-        if opcode == Opcode.CHUNK:
-            self._take_chunk(position, begin, end)
-        elif opcode == Opcode.MESSAGE_INDEX:
-            self._take_index(begin, end)
-        elif opcode == Opcode.MESSAGE and end - position >= MESSAGE_HEAD.itemsize:
-            self._loose.append(position)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            self._take_declaration(opcode, self._bytes[begin:end])
-        elif opcode == Opcode.STATISTICS:
-            self._statistics = self._parsed(Statistics.read, self._bytes[begin:end])
-        elif opcode == Opcode.METADATA:
-            metadata = self._parsed(Metadata.read, self._bytes[begin:end])
-            if metadata is not None:
-                self.metadata[metadata.name] = metadata.metadata
-
-    def _take_chunk(self, position: int, begin: int, end: int) -> None:
-        if end - begin < _CHUNK_HEAD.size + 8:
-            self._warn_of_chunk(position)
-            return
-        start, last, size, crc, name_length = _CHUNK_HEAD.unpack_from(self._bytes, begin)
-        name_begin = begin + _CHUNK_HEAD.size
-        data_begin = name_begin + name_length + 8
-        if data_begin > end or size > _LARGEST_CHUNK:
-            self._warn_of_chunk(position)
-            return
-        compression = self._bytes[name_begin : name_begin + name_length].decode(errors='replace')
-        self._chunks.append(_Chunk(position, data_begin, end, size, crc, compression, start, last))
-
-    def _take_index(self, begin: int, end: int) -> None:
-        count = (end - begin - 6) // 16
-        if not self._chunks or count <= 0:
-            return
-        channel = struct.unpack_from('<H', self._bytes, begin)[0]
-        entries = np.frombuffer(self._bytes, '<u8', 2 * count, begin + 6).astype(np.int64)
-        self._chunks[-1].indexes[channel] = np.sort(entries[1::2])
-
-    def _take_declaration(self, opcode: int, content: bytes) -> None:
-        if opcode == Opcode.SCHEMA:
-            schema = self._parsed(Schema.read, content)
-            if schema is not None:
-                self.schemas[schema.id] = schema
-            return
-        channel = self._parsed(Channel.read, content)
-        if channel is not None:
-            self.channels[channel.id] = channel
-
-    def _parsed(self, read: Callable[[ReadDataStream], T], content: bytes) -> T | None:
-        try:
-            return read(ReadDataStream(BytesIO(content)))
-        except (EndOfFile, struct.error, ValueError) as error:
-            self.warnings.append(f'{self.path.name}: a record is not readable ({error or "too short"})')
-            return None
-
-    def _note_cut(self, position: int) -> None:
-        self.warnings.append(
-            f'{self.path.name} ends without its footer, as after a crash: read up to byte {position}, '
-            f'{len(self._chunks)} whole chunks'
-        )
-
-    def _find_hidden_channels(self) -> None:
-        """Look into the chunks where the file has no summary that repeats its channels.
-
-        That also replaces the indexes of a last chunk, of which a crash may have left only some.
-        """
-        indexed = {channel for chunk in self._chunks for channel in chunk.indexes}
-        if self.complete and self.channels and indexed <= self.channels.keys():
-            return
-        for chunk in self._chunks:
-            self._walk_chunk(chunk)
-
-    # Chunks.
-
-    def _chunk_block(self, chunk: _Chunk, channels: Collection[int]) -> Block | None:
-        if chunk.damaged or (chunk.indexes and not chunk.indexes.keys() & set(channels)):
-            return None
-        data = self._unpacked(chunk)
-        if data is None:
-            return None
-        block = _block(chunk, data, channels)
-        if chunk.walked or (block is not None and _is_sound(block, channels)):
-            return block
-        # No index, or one that points astray: look for the messages themselves.
-        self._walk_chunk(chunk)
-        return _block(chunk, data, channels)
-
-    def _walk_chunk(self, chunk: _Chunk) -> None:
-        data = self._unpacked(chunk)
-        if data is None or chunk.walked:
-            return
-        content = data.tobytes()
-        found: dict[int, list[int]] = {}
-        position = 0
-        while position + _RECORD.size <= len(content):
-            opcode, length = _RECORD.unpack_from(content, position)
-            begin = position + _RECORD.size
-            if begin + length > len(content) or (opcode == Opcode.MESSAGE and length < PAYLOAD_LENGTH_OFFSET):
-                self._warn_of_chunk(chunk.position)
-                break
-            if opcode == Opcode.MESSAGE:
-                found.setdefault(struct.unpack_from('<H', content, begin)[0], []).append(position)
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._take_declaration(opcode, content[begin : begin + length])
-            position = begin + length
-        chunk.indexes = {channel: np.array(offsets) for channel, offsets in found.items()}
-        chunk.walked = True
-
-    def _unpacked(self, chunk: _Chunk) -> Bytes | None:
+    def contents(self, chunk: Chunk) -> Contents | None:
+        """Return what is in a chunk; None, with a warning, if it is damaged."""
         if chunk.damaged:
             return None
-        packed = self._bytes[chunk.begin : chunk.end]
-        try:
-            content = _unpack(packed, chunk.compression, chunk.unpacked_size)
-        except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError):
-            content = None
-        if content is None or (chunk.crc and zlib.crc32(content) != chunk.crc):
-            chunk.damaged = True
-            self._warn_of_chunk(chunk.position)
+        contents = contents_of(self._data, chunk)
+        if contents is None:
+            self._leave_out(chunk)
+        elif not contents.whole:
+            self._warn(f'the chunk at byte {chunk.position} ends with what is no record')
+        return contents
+
+    def data_proof(self) -> Proof:
+        """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
+        if self._data_proof is None:
+            self._data_proof = data_proof(self._data, self._summary)
+            if self._data_proof is Proof.WRONG:
+                self._warn('the checksum of its data section is wrong: some byte of the file is damaged')
+        return self._data_proof
+
+    def tail_bytes(self) -> bytes:
+        """Return what is there of the chunk that the end of the file cuts off."""
+        return b'' if self.tail is None else self._data[self.tail.begin : self.tail.end]
+
+    # A file with a sound summary.
+
+    def _take_summary(self) -> bool:
+        """Take what the summary tells; False if that is not enough."""
+        summary = self._summary
+        chunks = [indexed_chunk(self._data, index) for index in summary.chunks]
+        statistics = summary.statistics
+        if statistics is None or statistics.chunk_count != len(chunks) or None in chunks:
+            return False
+        if statistics.channel_count > len(summary.channels) or statistics.schema_count > len(summary.schemas):
+            return False  # not repeated in the summary
+        self.channels, self.schemas = dict(summary.channels), dict(summary.schemas)
+        if any(channel not in self.channels for channel in statistics.channel_message_counts):
+            return False
+        self.chunks = sorted((chunk for chunk in chunks if chunk), key=lambda chunk: chunk.position)
+        self._counts = dict(statistics.channel_message_counts)
+        if statistics.message_count:
+            self._times = statistics.message_start_time, statistics.message_end_time
+        self._walk_between_chunks()
+        self.closed = True
+        if self._data[-len(MCAP0_MAGIC) :] != MCAP0_MAGIC:
+            self._warn('its last bytes are damaged; all else is read')
+        return True
+
+    def _walk_between_chunks(self) -> None:
+        lengths = {index.chunk_start_offset: index.message_index_length for index in self._summary.chunks}
+        position = len(MCAP0_MAGIC)
+        for chunk in self.chunks:
+            self._walk(position, chunk.position)
+            position = chunk.end + lengths[chunk.position]
+        self._walk(position, self._summary.begin)
+        # A file with chunks has its messages there; a record that says otherwise needs a proof.
+        if self._loose and self.chunks and self.data_proof() is not Proof.SOUND:
+            self._drop_loose()
+
+    # A file without one.
+
+    def _search(self) -> None:
+        self.chunks, self._loose, self._counts, self._times = [], [], {}, None
+        loose_channels, loose_schemas = self._walk_all()
+        self.channels, self.schemas = {}, {}
+        for chunk in self.chunks:
+            self._take_explored(chunk)
+        if not self.chunks or (self.whole and self._summary.proof is not Proof.WRONG):
+            # Nothing better is known, or there is no reason to doubt.
+            self.channels = loose_channels | self.channels
+            self.schemas = loose_schemas | self.schemas
+        if self._loose and self.chunks and not self.whole:
+            self._drop_loose()
+        if self._loose:
+            self._count(messages_at(self._data, np.array(self._loose)))
+        self._forget_undeclared()
+
+    def _walk_all(self) -> tuple[dict[int, Channel], dict[int, Schema]]:
+        """Find the chunks; return the channels and schemas that are declared outside of them."""
+        self.channels, self.schemas = {}, {}
+        end = self._walk(len(MCAP0_MAGIC), len(self._data), into_chunks=True)
+        if not (self._footer_found and self._data[end:] == MCAP0_MAGIC):
+            self.tail = self._tail(end)
+            self._add_scattered_chunks()
+            self._note_unexplained()
+            self.closed = bool(self._data_end)
+            kept = f'read up to byte {end}, {len(self.chunks)} whole chunks'
+            messages = 'all messages are there' if self.whole else kept
+            self._warn(f'ends without its footer, as after a crash: {messages}')
+        self.closed = bool(self._data_end)
+        if self._summary.proof is Proof.WRONG:
+            self._warn('the summary at its end is damaged; its chunks are searched for')
+        return self.channels, self.schemas
+
+    def _add_scattered_chunks(self) -> None:
+        """Replace what the walk found by all chunks of the file that their checksums prove."""
+        found = {chunk.position: chunk for chunk in scattered_chunks(self._data)}
+        found |= {chunk.position: chunk for chunk in self.chunks}
+        kept: list[Chunk] = []
+        for _, chunk in sorted(found.items()):
+            inside = bool(kept) and chunk.position < kept[-1].end
+            if not inside and explore(self._data, chunk):
+                kept.append(chunk)
+        self.chunks = kept
+        self._loose = [place for place in self._loose if not any(_holds(chunk, place) for chunk in kept)]
+
+    def _note_unexplained(self) -> None:
+        position = len(MCAP0_MAGIC)
+        stretches = []
+        for chunk in self.chunks:
+            stretches.append((position, chunk.position))
+            position = chunk.end
+        stretches.append((position, len(self._data)))
+        for begin, limit in stretches:
+            understood = self._understood(begin, limit)
+            if understood < limit and not 0 < self._data_end <= understood:
+                self.unexplained.append(Stretch(understood, limit))
+        for stretch in self.unexplained:
+            if stretch.end < len(self._data):
+                self._warn(f'bytes {stretch.begin} to {stretch.end} are damaged and left out')
+
+    def _understood(self, position: int, limit: int) -> int:
+        """Return where from `position` on the last whole record before `limit` ends."""
+        while position < limit:
+            end = self._record_end(position, limit)
+            if end is None or self._data[position] == Opcode.CHUNK:
+                break
+            if self._data[position] == Opcode.DATA_END:
+                self._data_end = end
+            position = end
+        return position
+
+    def _tail(self, position: int) -> Chunk | None:
+        """Return the chunk that begins at `position` and ends, by its own account, behind the file's end."""
+        if position + RECORD.size > len(self._data):
             return None
-        return np.frombuffer(content, np.uint8)
+        opcode, length = RECORD.unpack_from(self._data, position)
+        if opcode != Opcode.CHUNK or position + RECORD.size + length <= len(self._data):
+            return None
+        return partial_chunk(self._data, position)
 
-    def _counts(self, chunk: _Chunk) -> dict[int, int]:
-        if not chunk.indexes:
-            self._walk_chunk(chunk)
-        return {channel: offsets.size for channel, offsets in chunk.indexes.items()}
+    def _take_explored(self, chunk: Chunk) -> None:
+        if not explore(self._data, chunk):
+            self._leave_out(chunk)
+            return
+        for opcode, content in chunk.declarations:
+            self._declare(opcode, content)
+        for channel, count in chunk.counts.items():
+            self._counts[channel] = self._counts.get(channel, 0) + count
+        if chunk.counts:
+            self._widen(chunk.start_time, chunk.end_time)
 
-    def _warn_of_chunk(self, position: int) -> None:
-        self.warnings.append(f'{self.path.name}: the chunk at byte {position} is damaged and left out')
+    def _count(self, contents: Contents) -> None:
+        for channel, count in contents.counts().items():
+            self._counts[channel] = self._counts.get(channel, 0) + count
+        times = contents.heads['log_time']
+        self._widen(int(times.min()), int(times.max()))
 
-    # Messages outside of chunks.
+    def _widen(self, first: int, last: int) -> None:
+        if self._times is not None:
+            first, last = min(first, self._times[0]), max(last, self._times[1])
+        self._times = first, last
 
-    def _all(self) -> Bytes:
-        return np.frombuffer(self._bytes, np.uint8)
+    def _forget_undeclared(self) -> None:
+        for channel in self._counts.keys() - self.channels.keys():
+            count = self._counts.pop(channel)
+            self._warn(f'{count} messages of channel {channel} are left out: their topic is not known')
+            self.undeclared += count
 
-    def _loose_channel(self, offset: int) -> int:
-        return struct.unpack_from('<H', self._bytes, offset + _RECORD.size)[0]
+    # Records outside of chunks.
+
+    def _walk(self, position: int, limit: int, into_chunks: bool = False) -> int:
+        """Take the records from `position` on; return where the last whole one before `limit` ends."""
+        while position < limit:
+            end = self._record_end(position, limit)
+            if end is None:
+                break
+            opcode = self._data[position]
+            chunk = chunk_at(self._data, position) if into_chunks and opcode == Opcode.CHUNK else None
+            if chunk is not None:
+                self.chunks.append(chunk)
+            else:
+                self._take_record(opcode, position, self._data[position + RECORD.size : end])
+            position = end
+            if opcode == Opcode.DATA_END:
+                self._data_end = position
+            if opcode == Opcode.FOOTER:
+                self._footer_found = True
+                break
+        return position
+
+    def _record_end(self, position: int, limit: int) -> int | None:
+        """Return the end of the record at `position`, None if there is no whole and sensible one."""
+        if position + RECORD.size > limit:
+            return None
+        opcode, length = RECORD.unpack_from(self._data, position)
+        end = position + RECORD.size + length
+        known = 0 < opcode <= _LAST_OPCODE or opcode >= _PRIVATE_OPCODE
+        if not known or end > limit or (opcode == Opcode.CHUNK and chunk_at(self._data, position) is None):
+            return None
+        if opcode == Opcode.MESSAGE and end - position < MESSAGE_HEAD.itemsize:
+            return None
+        if _LENGTHS.get(opcode, length) != length:
+            return None
+        if opcode not in (Opcode.CHUNK, Opcode.MESSAGE) and _is_chunk(self._data, position):
+            return None  # only its first byte is damaged
+        return end
+
+    def _take_record(self, opcode: int, position: int, content: bytes) -> None:
+        if opcode == Opcode.MESSAGE:
+            self._loose.append(position)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._declare(opcode, content)
+        elif opcode == Opcode.METADATA:
+            metadata = parsed_metadata(content)
+            if metadata is None:
+                self._warn(f'the metadata at byte {position} is not readable')
+            else:
+                self.metadata[metadata.name] = dict(metadata.metadata)
+
+    def _declare(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = parsed(Schema.read, content)
+            if schema is not None:
+                self.schemas.setdefault(schema.id, schema)
+        else:
+            channel = parsed(Channel.read, content)
+            if channel is not None:
+                self.channels.setdefault(channel.id, channel)
+
+    def _leave_out(self, chunk: Chunk) -> None:
+        chunk.damaged = True
+        self._warn(f'the chunk at byte {chunk.position} is damaged and left out')
+
+    def _drop_loose(self) -> None:
+        self._warn(f'{len(self._loose)} records outside of its chunks pass for messages; they are left out')
+        self._loose = []
+
+    def _note_missing_checksums(self) -> None:
+        without = sum(not chunk.crc for chunk in self.chunks if chunk.size)
+        if without:
+            what = f'{without} of its {len(self.chunks)} chunks carry'
+            self._warn(f'{what} no checksum, as their writer chose: a damaged number in them would go unseen')
+        elif self._loose and self.data_proof() is not Proof.SOUND:
+            self._warn('its messages are under no sound checksum: a damaged number in them would go unseen')
+
+    def _warn(self, sentence: str) -> None:
+        self.warnings.append(f'{self.path.name}: {sentence}')
 
 
-def _map(path: Path) -> mmap.mmap:
-    try:
-        with path.open('rb') as file:
-            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    except OSError as error:
-        raise McapFileError(f'{path} cannot be read: {error.strerror}') from None
-    except ValueError:
-        raise McapFileError(f'{path} is empty') from None
+def _holds(chunk: Chunk, position: int) -> bool:
+    return chunk.position <= position < chunk.end
 
 
-def _block(chunk: _Chunk, data: Bytes, channels: Collection[int]) -> Block | None:
-    found = [chunk.indexes[channel] for channel in channels if channel in chunk.indexes]
-    if not found:
-        return None
-    return Block(data, found[0] if len(found) == 1 else np.sort(np.concatenate(found)))
-
-
-def _is_sound(block: Block, channels: Collection[int]) -> bool:
-    if block.offsets[0] < 0 or block.offsets[-1] + MESSAGE_HEAD.itemsize > block.data.size:
+def _is_chunk(data: mmap.mmap, position: int) -> bool:
+    """Return whether the record at `position` has the head of a chunk, whatever its first byte says."""
+    chunk = partial_chunk(data, position)
+    if chunk is None:
         return False
-    heads = block.heads
-    ends = block.offsets + 9 + heads['length'].astype(np.int64)
-    sound = (heads['opcode'] == Opcode.MESSAGE) & (ends <= block.data.size)
-    return bool(sound.all() and set(heads['channel'].tolist()) <= set(channels))
+    whole = chunk_at(data, position)
+    plain = whole is not None and len(whole.ends) == 1 and whole.end - whole.begin == whole.size > 0
+    return chunk.compression in ('zstd', 'lz4') or (plain and not chunk.compression)
 
 
-def _unpack(packed: bytes, compression: str, size: int) -> bytes:
-    if compression == 'zstd':
-        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-    if compression == 'lz4':
-        import lz4.frame  # rosbag2 can write it, this project does not
-
-        return lz4.frame.decompress(packed)
-    if compression:
-        raise ValueError(f'unknown compression {compression!r}')
-    return packed
+def _opened(path: Path) -> mmap.mmap:
+    try:
+        data = mapped(path)
+    except FileError as error:
+        raise McapFileError(str(error)) from None
+    if data[: len(MCAP0_MAGIC)] == MCAP0_MAGIC:
+        return data
+    known = read_summary(data).proof is Proof.SOUND or next(scattered_chunks(data), None) is not None
+    if not known:
+        raise McapFileError(f'{path} is no MCAP file: its first bytes are not those of one')
+    return data

@@ -11,6 +11,17 @@ import yaml
 
 from mount_bags.offered_qos import OfferedQos, QosError, qos_documents, read_qos
 
+# The same rules in C, many times as fast.
+FAST_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_NOT_UNDERSTOOD = (
+    yaml.YAMLError,
+    KeyError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    RecursionError,
+    OverflowError,
+)
 METADATA_NAME = 'metadata.yaml'
 ROOT = 'rosbag2_bagfile_information'
 VERSION = 9
@@ -99,15 +110,15 @@ def metadata_text(bag: BagInformation) -> str:
 def read_metadata(text: str) -> BagInformation:
     """Return what `metadata.yaml` or a metadata record says; raises `MetadataError`."""
     try:
-        document = yaml.safe_load(text)
+        document = yaml.load(text, Loader=FAST_LOADER)
         document = document.get(ROOT, document)
         return _bag(document)
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except _NOT_UNDERSTOOD as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise MetadataError(f'description of the recording not understood: {reason}') from None
 
 
-class _PlainDumper(yaml.SafeDumper):
+class _PlainDumper(getattr(yaml, 'CSafeDumper', yaml.SafeDumper)):  # type: ignore[misc]
     """Repeats equal parts instead of referring to them: rosbag2's reader knows no aliases."""
 
     def ignore_aliases(self, data: Any) -> bool:

@@ -12,6 +12,7 @@ import yaml
 
 INFINITE = (1 << 63) - 1  # ns
 _NANOSECONDS = 1_000_000_000
+_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # the same rules in C, many times as fast
 
 # The position of a word is its number in rmw/types.h.
 _HISTORY = ('system_default', 'keep_last', 'keep_all', 'unknown')
@@ -72,7 +73,7 @@ def qos_text(offers: Sequence[OfferedQos]) -> str:
 def read_qos(source: Any) -> tuple[OfferedQos, ...]:
     """Return the offers in `source`: YAML text or the list that it holds; raises `QosError`."""
     try:
-        documents = yaml.safe_load(source) if isinstance(source, str) else source
+        documents = yaml.load(source, Loader=_LOADER) if isinstance(source, str) else source
         return tuple(_offer(document) for document in documents or ())
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -2,23 +2,28 @@
 
 import os
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mount_bags.mcap_file import MESSAGE_HEAD, PAYLOAD_LENGTH_OFFSET, Block, McapFile, McapFileError
-from mount_bags.metadata import (
-    METADATA_NAME,
-    BagInformation,
-    MetadataError,
-    TopicInformation,
-    read_metadata,
+from mount_bags.bag_folder import BagFolderError, find_pieces, open_piece
+from mount_bags.chunks import MESSAGE_HEAD, Contents
+from mount_bags.definitions import Definition
+from mount_bags.mcap_file import McapFileError
+from mount_bags.metadata import METADATA_NAME, BagInformation, MetadataError, TopicInformation, read_metadata
+from mount_bags.piece_topics import (
+    BagFile,
+    Declared,
+    declared_topics,
+    readable_definition,
+    repeated_topics,
 )
-from mount_bags.offered_qos import OfferedQos, QosError, read_qos
 from mount_bags.series import Payloads, Series
+from mount_bags.whole_files import unpacked_payload
+
+# Key of the custom data in which `engine-mount recover` says what it could not prove.
+RECOVERY_NOTE = 'recovered_unchecked'
 
 
 class ReadingError(ValueError):
@@ -26,9 +31,10 @@ class ReadingError(ValueError):
 
 
 def open_recording(path: str | os.PathLike[str]) -> 'Recording':
-    """Open a recording: its folder or a single MCAP file; raises `ReadingError` if nothing is readable.
+    """Open a recording: its folder or a single file; raises `ReadingError` if nothing is readable.
 
-    What is missing or damaged but does not prevent reading stands in `Recording.warnings`.
+    What is missing or damaged but does not prevent reading stands in `Recording.warnings`; more may come
+    there when topics are read.
     """
     return Recording(Path(path))
 
@@ -40,12 +46,15 @@ class Recording:
         self.path = path
         self.warnings: list[str] = []
         self.information: BagInformation | None = None
-        paths = self._read_folder() if path.is_dir() else [path]
-        self._files = self._open(paths)
-        if self.information is None:
-            self._read_embedded()
-        self.topics: dict[str, TopicInformation] = self._topics()
-        self._compare_counts(len(paths))
+        self.files: list[BagFile] = self._open()
+        self._declared: dict[str, Declared] = declared_topics(self.files, self.information)
+        self.topics: dict[str, TopicInformation] = {
+            name: declared.information for name, declared in self._declared.items()
+        }
+        self.missing: dict[str, int] = self._missing()
+        self._definitions: dict[str, tuple[Definition | None, str]] = {}
+        self._check_topics()
+        self._note_recovery()
         self._series: dict[str, Series] = {}
 
     @property
@@ -54,9 +63,32 @@ class Recording:
         return sum(topic.message_count for topic in self.topics.values())
 
     @property
+    def whole(self) -> bool:
+        """Whether nothing is known to be missing; damage inside of a topic is known once that was read."""
+        if self.missing or not self._complete or any(file.damaged for file in self.files):
+            return False
+        return all(file.whole for file in self.files) or self._counts_agree
+
+    @property
+    def all_pieces(self) -> bool:
+        """Whether no file of the recording is known to be missing."""
+        return self._complete
+
+    @property
+    def described(self) -> bool:
+        """Whether `metadata.yaml` tells of all files."""
+        information = self.information
+        return self._has_description and information is not None and len(information.files) >= len(self.files)
+
+    @property
+    def proven(self) -> bool:
+        """Whether no file is missing and checksums vouch for what all of them say of themselves."""
+        return self._complete and all(file.proven for file in self.files)
+
+    @property
     def time_range(self) -> tuple[int, int] | None:
         """The first and the last receive time in ns, None without messages."""
-        ranges = [found for found in (file.time_range() for file in self._files) if found is not None]
+        ranges = [found for found in (file.time_range() for file in self.files) if found is not None]
         return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
 
     def __contains__(self, name: str) -> bool:
@@ -98,127 +130,123 @@ class Recording:
 
     # Opening.
 
-    def _read_folder(self) -> list[Path]:
-        description = self.path / METADATA_NAME
-        present = sorted(self.path.glob('*.mcap'), key=_piece_order)
+    def _open(self) -> list[BagFile]:
         try:
-            self.information = read_metadata(description.read_text(encoding='utf-8'))
-        except FileNotFoundError:
-            self.warnings.append(f'{METADATA_NAME} is missing; topics and counts are those of the files')
-        except (OSError, UnicodeDecodeError, MetadataError) as error:
-            self.warnings.append(f'{METADATA_NAME} is not readable ({error}); the files tell themselves')
-        if self.information is None:
-            return present
-        self._refuse_foreign_storage(self.information)
-        listed = [self.path / file.path for file in self.information.files]
-        return self._without_missing(listed) or present
-
-    def _refuse_foreign_storage(self, information: BagInformation) -> None:
-        if information.storage != 'mcap':
-            raise ReadingError(f'{self.path} is stored as {information.storage}; convert it to mcap')
-        if information.compression_mode.lower() == 'file':
-            raise ReadingError(
-                f'{self.path} is compressed file by file ({information.compression_format}); unpack it first'
-            )
-
-    def _without_missing(self, listed: list[Path]) -> list[Path]:
-        missing = [path.name for path in listed if not path.is_file()]
-        if missing:
-            self.warnings.append(
-                f'{len(missing)} of {len(listed)} pieces are missing: {", ".join(missing)}; '
-                'their messages are not here'
-            )
-        return [path for path in listed if path.is_file()]
-
-    def _open(self, paths: list[Path]) -> list[McapFile]:
+            found = find_pieces(self.path)
+        except BagFolderError as error:
+            raise ReadingError(str(error)) from None
+        self.information = found.information
+        self._has_description = found.information is not None
+        self.warnings += found.warnings
         files, reasons = [], []
-        for path in paths:
+        for path in found.paths:
             try:
-                files.append(McapFile(path))
+                files.append(open_piece(path))
             except McapFileError as error:
                 reasons.append(str(error))
         if not files:
             raise ReadingError('; '.join(reasons) or f'{self.path} holds no MCAP file')
+        self._complete = found.complete and not reasons
         self.warnings += reasons
         for file in files:
             self.warnings += file.warnings
             file.warnings = self.warnings  # what is found later, while a topic is read, comes here too
+        if self.information is None:
+            self._read_embedded(files)
         return files
 
-    def _read_embedded(self) -> None:
-        text = self._files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
+    def _read_embedded(self, files: list[BagFile]) -> None:
+        text = files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
         if text:
             try:
                 self.information = read_metadata(text)
             except MetadataError as error:
-                self.warnings.append(f'{self._files[0].path.name}: {error}')
+                self.warnings.append(f'{files[0].path.name}: {error}')
 
-    # Topics.
-
-    def _topics(self) -> dict[str, TopicInformation]:
-        described = {topic.name: topic for topic in self.information.topics} if self.information else {}
-        topics = {name: replace(topic, message_count=0) for name, topic in described.items()}
-        for file in self._files:
-            counts = file.message_counts()
-            for number, channel in file.channels.items():
-                known = topics.get(channel.topic) or self._from_channel(file, number)
-                total = known.message_count + counts.get(number, 0)
-                topics[channel.topic] = replace(known, message_count=total)
-        return topics
-
-    def _from_channel(self, file: McapFile, number: int) -> TopicInformation:
-        channel = file.channels[number]
-        return TopicInformation(
-            name=channel.topic,
-            type=file.topic_type(number),
-            message_count=0,
-            serialization_format=channel.message_encoding,
-            offered_qos=_offers(channel.metadata.get('offered_qos_profiles', '')),
-            type_hash=channel.metadata.get('topic_type_hash', ''),
-        )
-
-    def _compare_counts(self, file_count: int) -> None:
+    def _missing(self) -> dict[str, int]:
+        """Return how many messages of a topic the description tells of that the files do not hold."""
         information = self.information
-        if information is None or file_count != len(information.files) or file_count != len(self._files):
-            return  # a part of the recording, which was said already
-        if information.message_count != self.message_count:
+        self._counts_agree = False
+        if information is None or not self.described:
+            return {}
+        held = {name: declared.stored for name, declared in self._declared.items()}
+        total = sum(held.values())
+        self._counts_agree = information.message_count == total
+        if self._complete and not self._counts_agree:
             self.warnings.append(
-                f'{METADATA_NAME} tells of {information.message_count} messages, '
-                f'the files hold {self.message_count}'
+                f'{METADATA_NAME} tells of {information.message_count} messages, the files hold {total}'
             )
+        if self.proven:
+            return {}
+        return {
+            topic.name: topic.message_count - held.get(topic.name, 0)
+            for topic in information.topics
+            if topic.message_count > held.get(topic.name, 0)
+        }
+
+    def _check_topics(self) -> None:
+        for name, declared in self._declared.items():
+            definition, sentence = readable_definition(declared)
+            self._definitions[name] = (definition, sentence)
+            if declared.other_types:
+                others = ', '.join(declared.other_types)
+                kept = declared.information.type
+                self.warnings.append(f'{name}: messages of {others} are left out; read are those of {kept}')
+            if sentence and declared.information.message_count:
+                what = 'the installed one is used' if definition else 'only its raw bytes can be read'
+                self.warnings.append(f'{name}: {sentence}; {what}')
+
+    def _note_recovery(self) -> None:
+        custom = self.information.custom_data if self.information else {}
+        if custom.get(RECOVERY_NOTE):
+            self.warnings.append(custom[RECOVERY_NOTE])
+
+    # Reading.
 
     def _load(self, name: str) -> Series:
-        information = self.topics[name]
-        if information.serialization_format != 'cdr':
-            self.warnings.append(f'{name} is encoded as {information.serialization_format}, not as cdr')
-        heads, pieces = [], []
-        for file in self._files:
-            channels = {number for number, channel in file.channels.items() if channel.topic == name}
-            for block in file.blocks(channels):
-                heads.append(block.heads)
-                pieces.append(_payloads(block))
-        head = np.concatenate(heads) if heads else np.empty(0, MESSAGE_HEAD)
-        log_times, publish_times = head['log_time'].astype(np.int64), head['publish_time'].astype(np.int64)
-        return Series(name, information.type, Payloads(pieces), log_times, publish_times)
+        declared = self._declared[name]
+        definition, sentence = self._definitions[name]
+        blocks = list(self._blocks(declared))
+        head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, MESSAGE_HEAD)
+        present, expected = len(head), declared.information.message_count
+        if present < expected:
+            self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
+            self.missing[name] = max(self.missing.get(name, 0), expected - present)
+        return Series(
+            name,
+            declared.information.type,
+            Payloads([_plain(block.payloads()) for block in blocks]),
+            head['log_time'].astype(np.int64),
+            head['publish_time'].astype(np.int64),
+            definition=definition,
+            obstacle='' if definition else sentence,
+            zero=self.time_range[0] if self.time_range else 0,
+        )
+
+    def _blocks(self, declared: Declared) -> Iterator[Contents]:
+        """Yield the messages of a topic, without those that a piece repeats from the one before."""
+        repeats = repeated_topics(self.files)
+        last: tuple[bytes, int] | None = None
+        for file, repeated in zip(self.files, repeats, strict=True):
+            is_first = declared.information.name in repeated
+            for block in file.blocks(declared.channels_of(file)):
+                found = block
+                if is_first and last is not None and _first(block) == last:
+                    found = block.behind_first()
+                is_first = False
+                if found.offsets.size:
+                    last = found.message(-1)
+                    yield found
 
 
-def _payloads(block: Block) -> NDArray[np.uint8] | list[bytes]:
-    """Return the payloads of a block as rows if they have one length, else one by one."""
-    begins = block.offsets + MESSAGE_HEAD.itemsize
-    lengths = block.heads['length'].astype(np.int64) - PAYLOAD_LENGTH_OFFSET
-    if (lengths == lengths[0]).all():
-        return block.data[begins[:, None] + np.arange(lengths[0])]
-    ends = begins + lengths
-    return [block.data[begin:end].tobytes() for begin, end in zip(begins, ends, strict=True)]
+def _first(block: Contents) -> tuple[bytes, int]:
+    return block.message(0)
 
 
-def _piece_order(path: Path) -> tuple[int, str]:
-    number = path.stem.rpartition('_')[2]
-    return (int(number) if number.isdigit() else 0, path.name)
+def _plain(payloads: Any) -> Any:
+    """Return payloads as they were before rosbag2 compressed each of them."""
+    return [unpacked_payload(raw) for raw in map(bytes, payloads)] if _is_packed(payloads) else payloads
 
 
-def _offers(text: str) -> tuple[OfferedQos, ...]:
-    try:
-        return read_qos(text)
-    except QosError:
-        return ()  # not needed to read the messages
+def _is_packed(payloads: Any) -> bool:
+    return len(payloads) > 0 and bytes(payloads[0][:4]) == b'\x28\xb5\x2f\xfd'

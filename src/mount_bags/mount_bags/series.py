@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.layout import Layout, LayoutError, installed_class, layout_of
+from mount_bags.decoding import decode
+from mount_bags.definitions import Definition, installed_class, installed_definition
+from mount_bags.layout import Layout, LayoutError, layout_of
 from mount_ros.topics import JOINT_STATE, TOPICS, Scalar, Topic
 
 Column = NDArray[np.float64]
@@ -49,17 +51,34 @@ class Series:
     `receive_times` and `publish_times` are those of the recording, `stamps` those of the samples (from
     the messages' headers); all in ns. `series[name]` is a column: of a `JointState` the position of
     that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
+    `time` and `values` are the same for all columns at once, as arrays to plot.
     """
 
     def __init__(
-        self, topic: str, type_name: str, payloads: Payloads, receive_times: Times, publish_times: Times
+        self,
+        topic: str,
+        type_name: str,
+        payloads: Payloads,
+        receive_times: Times,
+        publish_times: Times,
+        *,
+        definition: Definition | None = None,
+        obstacle: str = '',
+        zero: int = 0,
     ):
+        """Take messages with their `definition`, or the sentence why there is none.
+
+        Without both the installed type tells the fields. `zero` (ns) is where `time` begins.
+        """
         self.topic = topic
         self.type = type_name
         self.receive_times = receive_times
         self.publish_times = publish_times
         self.payloads = payloads
         self.registered: Topic | None = registered_topic(topic)
+        self._known_definition = definition
+        self._obstacle = obstacle
+        self._zero = zero
 
     def __len__(self) -> int:
         return len(self.payloads)
@@ -74,6 +93,28 @@ class Series:
             raise self._without_stamp()
         seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
         return seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows)
+
+    @functools.cached_property
+    def time(self) -> Column:
+        """Time in s from the beginning of the recording: of the samples, or of reception without stamps."""
+        try:
+            times = self.stamps
+        except SeriesError:
+            times = self.receive_times
+        return np.asarray((times - self._zero) * 1e-9, np.float64)
+
+    @property
+    def values(self) -> Column:
+        """All columns side by side, messages x names, in the units `units`; raises `SeriesError`."""
+        values = np.empty((len(self), len(self.names)))
+        for place, name in enumerate(self.names):
+            values[:, place] = self[name]
+        return values
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The units of `values`, empty where the registry does not know one."""
+        return tuple(self.unit(name) for name in self.names)
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
@@ -110,7 +151,11 @@ class Series:
         return next((scalar.derivative_unit for scalar in self._scalars() if scalar.name == name), '')
 
     def message(self, index: int) -> Any:
-        """Return message `index`, deserialised; raises `SeriesError`."""
+        """Return message `index`, deserialised; raises `SeriesError`.
+
+        Of a type that is not installed, or that was another when it was recorded: a plain object with the
+        fields as attributes.
+        """
         return self._deserialised(index)
 
     def messages(self) -> Iterator[Any]:
@@ -135,12 +180,30 @@ class Series:
         if rows is None or not len(rows):
             return None
         try:
-            layout = layout_of(rows[0].tobytes(), self.type)
+            layout = layout_of(rows[0].tobytes(), self._definition)
         except LayoutError:
             return None
+        return layout if layout.fits(rows) else None
+
+    @functools.cached_property
+    def _definition(self) -> Definition:
+        if self._obstacle:
+            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {self._obstacle}')
+        if self._known_definition is not None:
+            return self._known_definition
+        try:
+            return installed_definition(self.type)
         except ValueError as error:
             raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
-        return layout if layout.fits(rows) else None
+
+    @functools.cached_property
+    def _class(self) -> type | None:
+        """The installed class of the messages, None where it is missing or has other fields."""
+        definition = self._definition
+        try:
+            return installed_class(self.type) if installed_definition(self.type) == definition else None
+        except ValueError:
+            return None
 
     def _joint_column(self, name: str, part: str) -> Column:
         if name not in self.names:
@@ -175,13 +238,17 @@ class Series:
         return list(self.messages())
 
     def _deserialised(self, index: int) -> Any:
+        kind, raw = self._class, self.payloads[index]
+        if kind is None:
+            try:
+                return decode(raw, self._definition)
+            except LayoutError as error:
+                raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
         # Only needed where messages differ in shape: the fast way does without the middleware.
         from rclpy.serialization import deserialize_message
 
         try:
-            return deserialize_message(self.payloads[index], installed_class(self.type))
-        except ValueError as error:
-            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
+            return deserialize_message(raw, kind)
         except Exception as error:  # the binding raises a type of its own that it does not export
             raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
 

@@ -1,0 +1,326 @@
+"""Chunks of an MCAP file: where one stands, what is in it, and whether that is proven.
+
+A chunk is believed when its checksum holds for the unpacked bytes and these are records from the first
+byte to the last. The message indexes behind a chunk carry no checksum: they are a hint where its records
+begin, and taken only if the records found there leave no byte unexplained.
+"""
+
+import mmap
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import zstandard
+from mcap.opcode import Opcode
+from mcap.records import ChunkIndex
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Offsets = NDArray[np.int64]
+
+# The fixed part of a message record; the payload follows.
+MESSAGE_HEAD = np.dtype(
+    [
+        ('opcode', '<u1'),
+        ('length', '<u8'),
+        ('channel', '<u2'),
+        ('sequence', '<u4'),
+        ('log_time', '<u8'),
+        ('publish_time', '<u8'),
+    ]
+)
+RECORD = struct.Struct('<BQ')  # opcode, length of what follows
+LENGTH_BESIDES_PAYLOAD = MESSAGE_HEAD.itemsize - RECORD.size  # of a message record
+_HEAD = struct.Struct('<QQQII')  # start, end, unpacked size, checksum, length of the compression's name
+_SIZE = struct.Struct('<Q')
+_INDEX = struct.Struct('<HI')  # channel, length of the entries
+_SHORTEST = RECORD.size + _HEAD.size + _SIZE.size  # bytes of a chunk record without compression and messages
+_TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
+_PLAIN = re.compile(rb'\x06(?=.{4}\x00{4})', re.DOTALL)
+_LARGEST = 1 << 32  # bytes; more is a damaged length
+_MAGICS = {b'\x28\xb5\x2f\xfd': 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
+
+
+@dataclass
+class Chunk:
+    """One chunk of a file; positions in bytes, times in ns."""
+
+    position: int
+    begin: int  # of the packed bytes
+    ends: tuple[int, ...]  # of the packed bytes; two where the lengths in the file contradict each other
+    size: int  # bytes when unpacked
+    crc: int  # 0 where the writer made none
+    compression: str
+    start_time: int
+    end_time: int
+    channels: frozenset[int] | None = None  # those with messages, None where nobody reliable says
+    counts: dict[int, int] = field(default_factory=dict)  # messages by channel, once explored
+    declarations: tuple[tuple[int, bytes], ...] = ()  # of schemas and channels, once explored
+    explored: bool = False
+    damaged: bool = False
+
+    @property
+    def end(self) -> int:
+        """The end of the record in the file."""
+        return self.ends[0]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Message records, where they begin, and the declarations of schemas and channels among them."""
+
+    data: Bytes
+    offsets: Offsets
+    heads: np.ndarray
+    declarations: tuple[tuple[int, bytes], ...] = ()
+    whole: bool = True  # whether the records explain every byte
+
+    def of(self, channels: Offsets) -> 'Contents':
+        """Return the messages of these channels alone."""
+        wanted = np.isin(self.heads['channel'], channels)
+        if wanted.all():
+            return self
+        return Contents(self.data, self.offsets[wanted], self.heads[wanted], self.declarations, self.whole)
+
+    def behind_first(self) -> 'Contents':
+        """Return all messages but the first."""
+        return Contents(self.data, self.offsets[1:], self.heads[1:], self.declarations, self.whole)
+
+    def message(self, place: int) -> tuple[bytes, int]:
+        """Return payload and publish time (ns) of one message."""
+        begin = int(self.offsets[place]) + MESSAGE_HEAD.itemsize
+        length = int(self.heads[place]['length']) - LENGTH_BESIDES_PAYLOAD
+        return self.data[begin : begin + length].tobytes(), int(self.heads[place]['publish_time'])
+
+    def counts(self) -> dict[int, int]:
+        """Return the number of messages by channel."""
+        channels, counts = np.unique(self.heads['channel'], return_counts=True)
+        return dict(zip(channels.tolist(), counts.tolist(), strict=True))
+
+    def payloads(self) -> NDArray[np.uint8] | list[bytes]:
+        """Return the payloads as rows if they have one length, else one by one."""
+        begins = self.offsets + MESSAGE_HEAD.itemsize
+        lengths = self.heads['length'].astype(np.int64) - LENGTH_BESIDES_PAYLOAD
+        if lengths.size and (lengths == lengths[0]).all():
+            return _rows(self.data, begins, int(lengths[0]))
+        buffer = self.data.data
+        pairs = zip(begins.tolist(), (begins + lengths).tolist(), strict=True)
+        return [bytes(buffer[begin:end]) for begin, end in pairs]
+
+
+def chunk_at(data: mmap.mmap, position: int) -> Chunk | None:
+    """Return the chunk whose record begins at `position`; None if there is none or its end is missing."""
+    if position < 0 or position + _SHORTEST > len(data):
+        return None
+    head = partial_chunk(data, position)
+    if head is None:
+        return None
+    length = RECORD.unpack_from(data, position)[1]
+    packed = _SIZE.unpack_from(data, head.begin - _SIZE.size)[0]
+    ends = (position + RECORD.size + length, head.begin + packed)
+    head.ends = tuple(dict.fromkeys(end for end in ends if head.begin <= end <= len(data)))
+    return head if head.ends else None
+
+
+def partial_chunk(data: mmap.mmap, position: int) -> Chunk | None:
+    """Return the chunk that begins at `position` as if the file's end were its own."""
+    if position + _SHORTEST > len(data):
+        return None
+    start, last, size, crc, name_length = _HEAD.unpack_from(data, position + RECORD.size)
+    begin = position + _SHORTEST + name_length
+    if name_length > 16 or size > _LARGEST or begin > len(data):
+        return None
+    name = data[begin - _SIZE.size - name_length : begin - _SIZE.size].decode(errors='replace')
+    return Chunk(position, begin, (len(data),), size, crc, name, start, last)
+
+
+def indexed_chunk(data: mmap.mmap, index: ChunkIndex) -> Chunk | None:
+    """Return the chunk that a summary with a sound checksum describes; its own head is not needed."""
+    position = index.chunk_start_offset
+    end = position + index.chunk_length
+    if end > len(data) or index.chunk_length < _SHORTEST or index.uncompressed_size > _LARGEST:
+        return None
+    return Chunk(
+        position=position,
+        begin=end - index.compressed_size,
+        ends=(end,),
+        size=index.uncompressed_size,
+        crc=_HEAD.unpack_from(data, position + RECORD.size)[3],
+        compression=index.compression,
+        start_time=index.message_start_time,
+        end_time=index.message_end_time,
+        channels=frozenset(index.message_index_offsets) if index.message_index_length else None,
+    )
+
+
+def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
+    """Yield whatever in a file looks like a chunk with a checksum, wherever it stands."""
+    places = {found.start() for found in _PLAIN.finditer(data)}
+    for tag in _TAGS:
+        place = data.find(tag)
+        while place >= 0:
+            places.add(place - RECORD.size - _HEAD.size + 4)
+            place = data.find(tag, place + 1)
+    for place in sorted(places):
+        chunk = chunk_at(data, place)
+        if chunk is not None and chunk.crc and (chunk.compression or chunk.size in _extents(chunk)):
+            yield chunk
+
+
+def contents_of(data: mmap.mmap, chunk: Chunk) -> Contents | None:
+    """Return what is in a chunk, None if it is damaged."""
+    for end in chunk.ends:
+        content = _unpacked(data[chunk.begin : end], chunk)
+        if content is not None:
+            chunk.ends = (end,)
+            contents = _indexed(data, chunk, content) or records_in(content)
+            # Without a checksum, bytes that are no records prove damage.
+            return contents if chunk.crc or contents.whole else None
+    return None
+
+
+def explore(data: mmap.mmap, chunk: Chunk) -> bool:
+    """Note in a chunk what its messages say of channels, counts and times; False if it is damaged."""
+    if chunk.explored:
+        return True
+    contents = contents_of(data, chunk)
+    if contents is None:
+        return False
+    chunk.explored = True
+    chunk.counts, chunk.declarations = contents.counts(), contents.declarations
+    chunk.channels = frozenset(chunk.counts)
+    if chunk.counts:
+        times = contents.heads['log_time']
+        chunk.start_time, chunk.end_time = int(times.min()), int(times.max())
+    return True
+
+
+def records_in(content: bytes) -> Contents:
+    """Return the messages and declarations in unpacked bytes as far as these are whole records."""
+    offsets, declarations, position = [], [], 0
+    while position + RECORD.size <= len(content):
+        opcode, length = RECORD.unpack_from(content, position)
+        end = position + RECORD.size + length
+        if end > len(content) or (opcode == Opcode.MESSAGE and length < LENGTH_BESIDES_PAYLOAD):
+            break
+        if opcode == Opcode.MESSAGE:
+            offsets.append(position)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            declarations.append((opcode, content[position + RECORD.size : end]))
+        position = end
+    return messages_at(content, np.array(offsets, np.int64), tuple(declarations), position == len(content))
+
+
+def messages_at(
+    content: bytes | mmap.mmap,
+    offsets: Offsets,
+    declarations: tuple[tuple[int, bytes], ...] = (),
+    whole: bool = True,
+) -> Contents:
+    """Return the message records that begin at `offsets`."""
+    data = np.frombuffer(content, np.uint8)
+    return Contents(data, offsets, _heads(data, offsets), declarations, whole)
+
+
+def stored_parts(data: bytes, compression: str) -> bytes:
+    """Return what the beginning of packed bytes holds; the rest may be missing, nothing is proven."""
+    try:
+        if compression == 'zstd':
+            return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        if compression == 'lz4':
+            import lz4.frame
+
+            return lz4.frame.LZ4FrameDecompressor().decompress(data)
+    except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError):
+        return b''
+    return b'' if compression else data
+
+
+def _extents(chunk: Chunk) -> set[int]:
+    return {end - chunk.begin for end in chunk.ends}
+
+
+def _unpacked(packed: bytes, chunk: Chunk) -> bytes | None:
+    """Return the unpacked bytes if they are the ones that were written, as far as the file can prove it."""
+    kind = chunk.compression
+    if chunk.crc and kind not in ('', 'zstd', 'lz4'):
+        kind = _MAGICS.get(packed[:4], '')  # a damaged name: the checksum decides
+    try:
+        content = _unpack(packed, kind, chunk.size)
+    except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError):
+        return None
+    sound = zlib.crc32(content) == chunk.crc if chunk.crc else len(content) == chunk.size
+    return content if sound else None
+
+
+def _unpack(packed: bytes, kind: str, size: int) -> bytes:
+    if kind == 'zstd':
+        told = zstandard.frame_content_size(packed)
+        if told > _LARGEST:
+            raise ValueError(f'{told} bytes in one chunk')
+        if told < 0:  # written as a stream
+            return zstandard.ZstdDecompressor().decompressobj().decompress(packed)
+        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+    if kind == 'lz4':
+        import lz4.frame  # other writers use it, this project does not
+
+        return lz4.frame.decompress(packed)
+    if kind:
+        raise ValueError(f'unknown compression {kind!r}')
+    return packed
+
+
+def _indexed(data: mmap.mmap, chunk: Chunk, content: bytes) -> Contents | None:
+    """Return the messages where the indexes behind the chunk say, None if they do not tell everything."""
+    offsets = _index_offsets(data, chunk.end)
+    size = len(content)
+    if not offsets.size or offsets[0] < 0 or offsets[-1] + MESSAGE_HEAD.itemsize > size:
+        return None
+    contents = messages_at(content, offsets)
+    lengths = contents.heads['length'].astype(np.int64)
+    ends = offsets + RECORD.size + lengths
+    begins = np.concatenate([offsets, [size]])
+    before = np.concatenate([[0], ends])
+    sound = (contents.heads['opcode'] == Opcode.MESSAGE).all() and (lengths >= LENGTH_BESIDES_PAYLOAD).all()
+    if not sound or (before > begins).any():
+        return None
+    declarations: list[tuple[int, bytes]] = []
+    for place in np.flatnonzero(before != begins):
+        between = records_in(content[before[place] : begins[place]])
+        if not between.whole or between.offsets.size:
+            return None
+        declarations += between.declarations
+    return Contents(contents.data, offsets, contents.heads, tuple(declarations))
+
+
+def _index_offsets(data: mmap.mmap, position: int) -> Offsets:
+    """Return the offsets in all message index records from `position` on, sorted."""
+    found = []
+    while position + RECORD.size + _INDEX.size <= len(data):
+        opcode, length = RECORD.unpack_from(data, position)
+        begin = position + RECORD.size
+        if opcode != Opcode.MESSAGE_INDEX or begin + length > len(data) or length < _INDEX.size:
+            break
+        size = _INDEX.unpack_from(data, begin)[1]
+        if size != length - _INDEX.size or size % 16:
+            break
+        found.append(np.frombuffer(data, '<i8', size // 8, begin + _INDEX.size)[1::2])
+        position = begin + length
+    return np.sort(np.concatenate(found)) if found else np.empty(0, np.int64)
+
+
+def _heads(data: Bytes, offsets: Offsets) -> np.ndarray:
+    if not offsets.size:
+        return np.empty(0, MESSAGE_HEAD)
+    return _rows(data, offsets, MESSAGE_HEAD.itemsize).view(MESSAGE_HEAD)[:, 0]
+
+
+def _rows(data: Bytes, begins: Offsets, width: int) -> NDArray[np.uint8]:
+    """Return `width` bytes from each of `begins` on, which the caller knows to be inside of `data`."""
+    if not width:
+        return np.empty((len(begins), 0), np.uint8)
+    windows = np.lib.stride_tricks.as_strided(data, (data.size - width + 1, width), (1, 1), writeable=False)
+    return windows[begins]

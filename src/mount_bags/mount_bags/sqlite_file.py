@@ -1,0 +1,119 @@
+"""Reads one file of a bag in sqlite3 storage, rosbag2's own before MCAP."""
+
+import sqlite3
+import struct
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+
+from mount_bags.chunks import LENGTH_BESIDES_PAYLOAD, MESSAGE_HEAD, Contents, messages_at
+from mount_bags.mcap_file import McapFileError
+
+_AT_ONCE = 1000  # rows
+_HEAD = struct.Struct('<BQHIQQ')
+
+
+class SqliteFile:
+    """Topics and messages of a `.db3` file; storage without checksums. The interface of `McapFile`."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.channels: dict[int, Channel] = {}
+        self.schemas: dict[int, Schema] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.warnings: list[str] = []
+        self.damaged = False
+        self._counts: dict[int, int] = {}
+        self._times: tuple[int, int] | None = None
+        if not path.is_file():
+            raise McapFileError(f'{path} cannot be read: no such file')
+        if path.suffix != '.db3':
+            raise McapFileError(f'{path} is compressed as a whole; unpack it first')
+        try:
+            self._base = sqlite3.connect(f'{path.absolute().as_uri()}?mode=ro&immutable=1', uri=True)
+            self._read_topics()
+        except sqlite3.Error as error:
+            raise McapFileError(f'{path} is no readable sqlite3 bag: {error}') from None
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing of it is known to be missing."""
+        return not self.damaged
+
+    @property
+    def proven(self) -> bool:
+        """Whether it can be relied upon in what it says of itself: the database has its own checks."""
+        return True
+
+    def topic_type(self, channel: int) -> str:
+        """Return the type name of a channel."""
+        return self.schemas[self.channels[channel].schema_id].name
+
+    def message_counts(self) -> dict[int, int]:
+        """Return the number of messages by channel."""
+        return dict(self._counts)
+
+    def time_range(self) -> tuple[int, int] | None:
+        """Return the earliest and the latest receive time (ns), None for a file without messages."""
+        return self._times
+
+    def blocks(self, channels: Collection[int]) -> Iterator[Contents]:
+        """Yield the messages of `channels` in the order of their times."""
+        marks = ','.join(map(str, sorted(channels)))
+        wanted = f'topic_id IN ({marks}) ORDER BY timestamp, id'
+        query = f'SELECT topic_id, timestamp, data FROM messages WHERE {wanted}'
+        try:
+            cursor = self._base.execute(query)
+            while rows := cursor.fetchmany(_AT_ONCE):
+                yield _as_records(rows)
+        except sqlite3.Error as error:
+            self.damaged = True
+            self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
+
+    def _read_topics(self) -> None:
+        cursor = self._base.execute('SELECT * FROM topics')
+        columns = [column[0] for column in cursor.description]
+        definitions = self._definitions()
+        for row in cursor.fetchall():
+            topic = dict(zip(columns, row, strict=True))
+            number, type_name = int(topic['id']), str(topic['type'])
+            encoding, text = definitions.get(type_name, ('', ''))
+            self.schemas[number] = Schema(id=number, data=text.encode(), encoding=encoding, name=type_name)
+            details = {
+                'offered_qos_profiles': str(topic.get('offered_qos_profiles') or ''),
+                'topic_type_hash': str(topic.get('type_description_hash') or ''),
+            }
+            self.channels[number] = Channel(
+                id=number,
+                topic=str(topic['name']),
+                message_encoding=str(topic['serialization_format']),
+                metadata=details,
+                schema_id=number,
+            )
+        counts = self._base.execute('SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id')
+        self._counts = dict(counts.fetchall())
+        first, last = self._base.execute('SELECT MIN(timestamp), MAX(timestamp) FROM messages').fetchone()
+        self._times = None if first is None else (first, last)
+
+    def _definitions(self) -> dict[str, tuple[str, str]]:
+        """Return {type: (encoding, text)}; older bags have none."""
+        query = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
+        try:
+            return {row[0]: (row[1], row[2]) for row in self._base.execute(query).fetchall()}
+        except sqlite3.Error:
+            return {}
+
+
+def _as_records(rows: list[tuple[int, int, bytes]]) -> Contents:
+    """Return rows of the database as the records of an MCAP file, which the reading goes by."""
+    parts: list[bytes] = []
+    offsets, position = [], 0
+    for channel, time, data in rows:
+        length = len(data) + LENGTH_BESIDES_PAYLOAD
+        parts += (_HEAD.pack(Opcode.MESSAGE, length, channel, 0, time, time), data)
+        offsets.append(position)
+        position += MESSAGE_HEAD.itemsize + len(data)
+    return messages_at(b''.join(parts), np.array(offsets, np.int64))

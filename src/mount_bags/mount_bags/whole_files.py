@@ -1,0 +1,53 @@
+"""Files as bytes in memory, those compressed as a whole included."""
+
+import mmap
+import shutil
+import tempfile
+from pathlib import Path
+from typing import IO
+
+import zstandard
+
+COMPRESSED_SUFFIXES = ('.zstd', '.zst', '.lz4')
+
+
+class FileError(ValueError):
+    """A file cannot be read at all; the text says why."""
+
+
+def mapped(path: Path) -> mmap.mmap:
+    """Return the bytes of a file, unpacked if its name ends in `.zstd`, `.zst` or `.lz4`."""
+    try:
+        with path.open('rb') as file:
+            if path.suffix in COMPRESSED_SUFFIXES:
+                with tempfile.TemporaryFile() as unpacked:
+                    _unpack(file, unpacked, path.suffix)
+                    unpacked.flush()
+                    return mmap.mmap(unpacked.fileno(), 0, access=mmap.ACCESS_READ)
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except OSError as error:
+        raise FileError(f'{path} cannot be read: {error.strerror or error}') from None
+    except ValueError:
+        raise FileError(f'{path} is empty') from None
+
+
+def unpacked_payload(raw: bytes) -> bytes:
+    """Return a message that rosbag2 compressed by itself; one that cannot be unpacked stays as it is."""
+    try:
+        return zstandard.ZstdDecompressor().decompressobj().decompress(raw)
+    except (zstandard.ZstdError, MemoryError):
+        return raw
+
+
+def _unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:
+    """Unpack as far as the packed bytes go; what is cut off there is missing here."""
+    try:
+        if suffix == '.lz4':
+            import lz4.frame
+
+            with lz4.frame.open(source) as stream:
+                shutil.copyfileobj(stream, target)
+        else:
+            zstandard.ZstdDecompressor().copy_stream(source, target)
+    except (zstandard.ZstdError, RuntimeError, EOFError):
+        pass  # the file within tells where it ends
