@@ -120,8 +120,8 @@ def compare(
         name_b=short_name(b),
         alignment=alignment,
         topics=tuple(_compared(topic, tolerances, switching is not None) for topic in matched),
-        only_a=_lonely_topics(a, pairs),
-        only_b=_lonely_topics(b, pairs.values()),
+        only_a=_lonely_topics(a, pairs, topics),
+        only_b=_lonely_topics(b, pairs.values(), topics),
         sessions=tuple(session_differences(text_a, text_b)) if text_a and text_b else (),
         both_have_session=bool(text_a and text_b),
         marks_a=_lonely_marks(a, b),
@@ -193,9 +193,13 @@ def _switching(matched: Collection[MatchedTopic]) -> list[SwitchingChange] | Non
     return None
 
 
-def _lonely_topics(recording: Recording, paired: Collection[str]) -> tuple[str, ...]:
+def _lonely_topics(
+    recording: Recording, paired: Collection[str], topics: Collection[Topic] | None
+) -> tuple[str, ...]:
     return tuple(
-        name for name, topic in recording.topics.items() if name not in paired and topic.message_count
+        name
+        for name, topic in recording.topics.items()
+        if name not in paired and topic.message_count and (topics is None or registered_topic(name) in topics)
     )
 
 

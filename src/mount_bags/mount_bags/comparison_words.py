@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from rich.box import SIMPLE
 from rich.table import Table
 
 from mount_bags.compare import Comparison, TopicComparison
@@ -13,7 +14,7 @@ from mount_bags.signal_difference import Moment, SignalDifference
 from mount_bags.switching_changes import SwitchingChange
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
-_ROWS = 15  # of the table
+_ROWS = 10  # of the table
 _TOLD = 6  # signals, switchings, session entries told one by one
 _LEAST_LAG = 0.05e-3  # s, chosen: below, the estimate says nothing
 _OUTPUTS = (f'{CURRENT_SETPOINT.name}.coil_current', f'{CONTROL_TRACE.name}.current')
@@ -52,21 +53,21 @@ def by_importance(comparison: Comparison) -> list[SignalDifference]:
 
 def as_table(comparison: Comparison) -> Table:
     """Return the most important of the differing signals as a table."""
-    table = Table(title=f'A {comparison.name_a}, B {comparison.name_b}', title_justify='left')
-    table.add_column('signal', no_wrap=True)
-    for title in ('differing samples', 'first at', 'largest', 'at', 'rms', 'B later by'):
-        table.add_column(title, justify='right')
+    table = Table(title='The largest differences', title_justify='left', box=SIMPLE, padding=(0, 1, 0, 0))
+    table.add_column('signal', overflow='fold')  # of two lines, so that all fits into 80 characters
+    for title in ('samples', 'first (s)', 'largest', 'at (s)', 'rms', 'B later'):
+        table.add_column(title, justify='right', no_wrap=True)
     ordered = by_importance(comparison)
     if len(ordered) > _ROWS:
         table.caption, table.caption_justify = f'{len(ordered) - _ROWS} more differ; see --json', 'left'
     for signal in ordered[:_ROWS]:
         largest = signal.largest
         table.add_row(
-            signal.name,
-            f'{signal.differing} of {signal.samples}',
-            '' if signal.first is None else time_text(signal.first.time),
-            'unknown in one' if largest is None else quantity_text(abs(largest.difference), signal.unit),
-            '' if largest is None else time_text(largest.time),
+            f'{signal.topic}\n{signal.signal}',
+            str(signal.differing),
+            '' if signal.first is None else f'{signal.first.time:.3f}',
+            'unknown' if largest is None else quantity_text(abs(largest.difference), signal.unit),
+            '' if largest is None else f'{largest.time:.3f}',
             quantity_text(signal.rms, signal.unit),
             _lag_text(signal.lag),
         )

@@ -36,7 +36,7 @@ class Cut:
     end: float
     messages: int  # of the range
     carried: int  # latched ones from before it
-    notes: tuple[str, ...]
+    losses: tuple[str, ...]  # what of the original could not be read or written, in sentences
 
 
 def cut(
@@ -53,22 +53,22 @@ def cut(
     message before `begin` comes with it; `reason` goes into the note of origin. Raises `CutError`.
     """
     span = _checked_span(recording, begin, end)
-    parts, notes, carried = [], [], 0
+    parts, losses, carried = [], [], 0
     for name in recording:
         messages, damages = read_messages(recording, name)
         before, inside = _places(messages, span)
         parts.append(messages.chosen(np.concatenate([before, inside])))
         carried += len(before)
-        notes += damages
+        losses += damages
     count = sum(len(part) for part in parts) - carried
     if not count:
         raise CutError(f'{recording.path} has no message {span}; it lasts {span.whole / 1e9:.3f} s')
     writer = BagWriter(out, custom_data=with_step([recording], _step(recording, span, reason)))
     try:
-        notes += write_messages(writer, parts)
+        losses += write_messages(writer, parts)
     finally:
         writer.close()
-    return Cut(Path(out), span.begin / 1e9, span.end / 1e9, count, carried, tuple(notes))
+    return Cut(Path(out), span.begin / 1e9, span.end / 1e9, count, carried, tuple(losses))
 
 
 @dataclass(frozen=True)
@@ -95,12 +95,12 @@ def _checked_span(recording: Recording, begin: float | None, end: float | None) 
             raise CutError(f'the {name} of a cut must be a number of seconds; instead received {value}')
     first = max(0, round(1e9 * begin)) if begin is not None else 0
     last = round(1e9 * end) if end is not None else whole
-    if last < first or (end is not None and last == first):
-        raise CutError(f'the end of a cut ({last / 1e9:g} s) must lie behind its begin ({first / 1e9:g} s)')
     if first > whole:
         raise CutError(
             f'the cut begins at {first / 1e9:g} s, but {recording.path} lasts only {whole / 1e9:.3f} s'
         )
+    if end is not None and last <= first:
+        raise CutError(f'the end of a cut ({last / 1e9:g} s) must lie behind its begin ({first / 1e9:g} s)')
     return _Span(zero, first, min(last, whole), end is None or last > whole, whole)
 
 

@@ -34,7 +34,8 @@ class Merge:
     folder: Path
     messages: int
     repeated: int
-    notes: tuple[str, ...]
+    holes: tuple[str, ...]  # times of which no part tells, in sentences
+    losses: tuple[str, ...]  # what of the parts could not be read or written, in sentences
 
 
 def merge(
@@ -51,14 +52,14 @@ def merge(
     topics = _topics(recordings)
     if not different_sessions:
         _refuse_different_sessions(recordings)
-    parts, notes, repeated = [], _holes(recordings), 0
+    parts, losses, repeated = [], [], 0
     for topic in topics.values():
         found = []
         for recording in recordings:
             if topic.name in recording.topics:
                 messages, damages = read_messages(recording, topic.name)
                 found.append(messages)
-                notes += damages
+                losses += damages
         parts.append(_united(topic, found))
         repeated += sum(map(len, found)) - len(parts[-1])
     step = {
@@ -68,10 +69,10 @@ def merge(
     }
     writer = BagWriter(out, custom_data=with_step(recordings, step))
     try:
-        notes += write_messages(writer, parts)
+        losses += write_messages(writer, parts)
     finally:
         writer.close()
-    return Merge(Path(out), writer.kept, repeated, tuple(notes))
+    return Merge(Path(out), writer.kept, repeated, tuple(_holes(recordings)), tuple(losses))
 
 
 def _topics(recordings: Sequence[Recording]) -> dict[str, TopicInformation]:

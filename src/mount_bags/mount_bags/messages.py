@@ -12,6 +12,8 @@ from mount_bags.schemas import SchemaError
 from mount_bags.series import Payloads, Series, Times
 from mount_bags.writer import BagWriter
 
+_LARGE = 500_000  # messages, chosen: about 100 MB
+
 
 @dataclass(frozen=True)
 class Messages:
@@ -35,11 +37,13 @@ class Messages:
 def read_messages(recording: Recording, name: str) -> tuple[Messages, list[str]]:
     """Return all messages of the topic `name` and what was found damaged on the way.
 
-    The file is opened anew, so that the memory holds one topic at a time, not all that were ever read.
+    A large recording is opened anew, so that the memory holds one topic at a time, not all that were ever
+    read.
     """
-    fresh = open_recording(recording.path)
-    messages = _in_order(recording.topics[name], fresh[name])
-    return messages, [warning for warning in fresh.warnings if warning not in recording.warnings]
+    known = list(recording.warnings)
+    source = open_recording(recording.path) if recording.message_count > _LARGE else recording
+    messages = _in_order(recording.topics[name], source[name])
+    return messages, [warning for warning in source.warnings if warning not in known]
 
 
 def write_messages(writer: BagWriter, parts: Sequence[Messages]) -> list[str]:

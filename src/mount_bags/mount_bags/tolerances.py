@@ -1,5 +1,6 @@
 """What may differ without being a difference: nothing, unless it is said."""
 
+import difflib
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -57,8 +58,9 @@ class Tolerances:
         names = topics | signals | {f'{topic}.{signal}' for topic, signal in known} | {SWITCHING, _ALL}
         for name in self._by_name:
             if name not in names:
-                listed = ', '.join(sorted(f'{topic}.{signal}' for topic, signal in known))
-                raise ToleranceError(f'tolerance for {name!r}: no such signal in both; there are {listed}')
+                near = difflib.get_close_matches(name, names - {_ALL}, n=3)
+                hint = f'did you mean {" or ".join(near)}?' if near else '--json lists all signals'
+                raise ToleranceError(f'tolerance for {name!r}: no such signal in both recordings; {hint}')
 
 
 def _read(text: str) -> tuple[str, Tolerance]:

@@ -18,7 +18,7 @@ from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 _SIGNALS = 3  # drawn
 _LEAST_SAMPLES = 10  # chosen: less is no curve
-_AROUND = 0.4  # s, chosen: shown before and behind the largest difference
+_AROUND = 0.2  # s, chosen: shown before and behind the largest difference
 _BLUE, _RED, _GREY = '#1f5fa8', '#b03030', '#666666'
 _HANDY = {'m': (1e3, 'mm')}
 _ALWAYS = (f'{CURRENT_SETPOINT.name}.coil_current', f'{DISPLACEMENT.name}.mount')
@@ -33,8 +33,13 @@ def draw_comparison(comparison: Comparison, a: Recording, b: Recording, file: Pa
     signals = _chosen(comparison)
     columns = _columns(comparison, a, b, signals)
     picture = Figure(figsize=(12.0, 1.0 + 3.2 * len(columns)), layout='constrained')
+    detailed = any(signal.first is not None for signal, _ in columns)
     rows = picture.subplots(
-        2 * len(columns), 2, height_ratios=(5, 2) * len(columns), width_ratios=(3, 2), squeeze=False
+        2 * len(columns),
+        1 + detailed,
+        height_ratios=(5, 2) * len(columns),
+        width_ratios=(3, 2)[: 1 + detailed],
+        squeeze=False,
     )
     for place, (signal, column) in enumerate(columns):
         _draw(rows[2 * place : 2 * place + 2], signal, column)

@@ -62,9 +62,9 @@ def cut(
         highlight=False,
         markup=False,
     )
-    for note in (*opened.warnings, *done.notes):
+    for note in (*opened.warnings, *done.losses):
         console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True)
-    if done.notes:
+    if done.losses:
         raise typer.Exit(1)
 
 

@@ -30,7 +30,7 @@ def merge(
         highlight=False,
     )
     warnings = [warning for recording in opened for warning in recording.warnings]
-    for note in (*warnings, *done.notes):
+    for note in (*warnings, *done.holes, *done.losses):
         console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True)
-    if done.notes:
+    if done.losses:
         raise typer.Exit(1)
