@@ -15,7 +15,6 @@ from mount_bags.metadata import TopicInformation
 from mount_bags.origin import short_name, with_step
 from mount_bags.reading import Recording
 from mount_bags.series import registered_topic
-from mount_bags.writer import BagWriter
 from mount_ros.topics import EVENT, Delivery
 
 _ALL = slice(None)
@@ -36,7 +35,7 @@ class Cut:
     end: float
     messages: int  # of the range
     carried: int  # latched ones from before it
-    losses: tuple[str, ...]  # what of the original could not be read or written, in sentences
+    losses: tuple[str, ...]  # what of the original could not be read, in sentences
 
 
 def cut(
@@ -63,11 +62,8 @@ def cut(
     count = sum(len(part) for part in parts) - carried
     if not count:
         raise CutError(f'{recording.path} has no message {span}; it lasts {span.whole / 1e9:.3f} s')
-    writer = BagWriter(out, custom_data=with_step([recording], _step(recording, span, reason)))
-    try:
-        losses += write_messages(writer, parts)
-    finally:
-        writer.close()
+    distro = recording.information.ros_distro if recording.information else ''
+    write_messages(out, parts, with_step([recording], _step(recording, span, reason)), distro)
     return Cut(Path(out), span.begin / 1e9, span.end / 1e9, count, carried, tuple(losses))
 
 

@@ -16,7 +16,6 @@ from mount_bags.origin import short_name, with_step
 from mount_bags.reading import Recording
 from mount_bags.series import Times, registered_topic
 from mount_bags.session_differences import session_differences
-from mount_bags.writer import BagWriter
 from mount_ros.topics import SESSION, Delivery
 
 _HOLE = 0.1  # s, chosen: a longer silence between two parts is told
@@ -35,7 +34,7 @@ class Merge:
     messages: int
     repeated: int
     holes: tuple[str, ...]  # times of which no part tells, in sentences
-    losses: tuple[str, ...]  # what of the parts could not be read or written, in sentences
+    losses: tuple[str, ...]  # what of the parts could not be read, in sentences
 
 
 def merge(
@@ -67,12 +66,9 @@ def merge(
         'recordings': [short_name(recording) for recording in recordings],
         'made': datetime.now().astimezone().isoformat(timespec='seconds'),
     }
-    writer = BagWriter(out, custom_data=with_step(recordings, step))
-    try:
-        losses += write_messages(writer, parts)
-    finally:
-        writer.close()
-    return Merge(Path(out), writer.kept, repeated, tuple(_holes(recordings)), tuple(losses))
+    distros = [recording.information.ros_distro for recording in recordings if recording.information]
+    kept = write_messages(out, parts, with_step(recordings, step), next(iter(distros), ''))
+    return Merge(Path(out), kept, repeated, tuple(_holes(recordings)), tuple(losses))
 
 
 def _topics(recordings: Sequence[Recording]) -> dict[str, TopicInformation]:
@@ -123,6 +119,7 @@ def _sessions(recording: Recording) -> dict[bytes, str]:
 def _united(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
     united = Messages(
         topic,
+        next((part.declared for part in parts if part.declared), None),
         np.concatenate([part.log_times for part in parts]),
         np.concatenate([part.publish_times for part in parts]),
         joined_payloads([part.payloads for part in parts]),

@@ -1,25 +1,30 @@
 """Messages as they were recorded, byte for byte, chosen by their log times and written to a new recording."""
 
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.metadata import TopicInformation
+from mount_bags.piece_topics import BagFile
 from mount_bags.reading import Recording, open_recording
-from mount_bags.schemas import SchemaError
 from mount_bags.series import Payloads, Series, Times
-from mount_bags.writer import BagWriter
+from mount_bags.verbatim import VerbatimBag
 
 _LARGE = 500_000  # messages, chosen: about 100 MB
 
 
 @dataclass(frozen=True)
 class Messages:
-    """Messages of one topic in the order of their log times (ns)."""
+    """Messages of one topic in the order of their log times (ns).
+
+    `declared` is the file with its channel that says what they are; None only where there are none.
+    """
 
     topic: TopicInformation
+    declared: tuple[BagFile, int] | None
     log_times: Times
     publish_times: Times
     payloads: Payloads
@@ -30,7 +35,11 @@ class Messages:
     def chosen(self, places: NDArray[np.int64]) -> 'Messages':
         """Return the messages at `places`."""
         return Messages(
-            self.topic, self.log_times[places], self.publish_times[places], _at(self.payloads, places)
+            self.topic,
+            self.declared,
+            self.log_times[places],
+            self.publish_times[places],
+            _at(self.payloads, places),
         )
 
 
@@ -42,28 +51,38 @@ def read_messages(recording: Recording, name: str) -> tuple[Messages, list[str]]
     """
     known = list(recording.warnings)
     source = open_recording(recording.path) if recording.message_count > _LARGE else recording
-    messages = _in_order(recording.topics[name], source[name])
+    messages = _in_order(recording.topics[name], _declaration(recording, name), source[name])
     return messages, [warning for warning in source.warnings if warning not in known]
 
 
-def write_messages(writer: BagWriter, parts: Sequence[Messages]) -> list[str]:
-    """Write `parts` in the order of their log times and return a sentence for each topic left out.
+def write_messages(
+    folder: str | os.PathLike[str],
+    parts: Sequence[Messages],
+    custom_data: Mapping[str, str],
+    ros_distro: str = '',
+) -> int:
+    """Write `parts` by their log times to the new recording `folder` and return how many messages these are.
 
-    Messages of one log time follow in the order of `parts`.
+    Schemas and channels are those of the files that the messages are from, so types need not be installed.
+    If that fails, nothing is left behind.
     """
-    left_out, writable = [], []
-    for part in parts:
-        try:
-            writer.add_topic(part.topic.name, part.topic.type, part.topic.offered_qos)
-        except SchemaError as error:
-            left_out.append(f'{part.topic.name} is left out with its {len(part)} messages: {error}')
-            continue
-        writable.append(part)
-    for number, place in _by_log_time([part.log_times for part in writable]):
-        part = writable[number]
-        log_time, publish_time = int(part.log_times[place]), int(part.publish_times[place])
-        writer.write(part.topic.name, part.payloads[place], log_time, publish_time)
-    return left_out
+    bag = VerbatimBag(folder)
+    try:
+        channels = [bag.channel(*part.declared) if part.declared else 0 for part in parts]
+        for number, raw, log_time, publish_time in in_log_order(parts):
+            bag.write(channels[number], raw, log_time, publish_time)
+        bag.close(custom_data, ros_distro)
+    except BaseException:
+        bag.discard()
+        raise
+    return bag.kept
+
+
+def in_log_order(parts: Sequence[Messages]) -> Iterator[tuple[int, bytes, int, int]]:
+    """Yield (number of the part, message, log time, publish time) sorted by log time (ns), then by part."""
+    for number, place in _by_log_time([part.log_times for part in parts]):
+        part = parts[number]
+        yield number, part.payloads[place], int(part.log_times[place]), int(part.publish_times[place])
 
 
 def joined_payloads(payloads: Iterable[Payloads]) -> Payloads:
@@ -71,8 +90,15 @@ def joined_payloads(payloads: Iterable[Payloads]) -> Payloads:
     return Payloads([_pieces(each) for each in payloads if len(each)])
 
 
-def _in_order(topic: TopicInformation, series: Series) -> Messages:
-    messages = Messages(topic, series.receive_times, series.publish_times, series.payloads)
+def _declaration(recording: Recording, name: str) -> tuple[BagFile, int] | None:
+    channels = (
+        (file, number, channel) for file in recording.files for number, channel in file.channels.items()
+    )
+    return next(((file, number) for file, number, channel in channels if channel.topic == name), None)
+
+
+def _in_order(topic: TopicInformation, declared: tuple[BagFile, int] | None, series: Series) -> Messages:
+    messages = Messages(topic, declared, series.receive_times, series.publish_times, series.payloads)
     if (np.diff(messages.log_times) >= 0).all():
         return messages
     return messages.chosen(np.argsort(messages.log_times, kind='stable'))

@@ -7,6 +7,7 @@ import pytest
 from compared_drives import START, answers, write_answers
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.writer import Writer
 
 import mount_bags
 from mount_bags.compare import compare
@@ -205,3 +206,41 @@ def test_marked_switchings_are_not_told_twice(place):
     marks = ((101, '{kind: switch_on}'),)
     recording = mount_bags.open(write_answers(place(), answers(200), marks=marks))
     assert [event.kind for event in recorded_events(recording)] == ['switch_on']
+
+
+# Bags of others.
+
+
+@pytest.mark.parametrize('name', ['cdr_test', 'talker', 'wbag'])
+def test_genuine_bags_cut_and_merged_are_the_original(genuine, place, name):
+    original = mount_bags.open(genuine / name)
+    middle = 0.5e-9 * (original.time_range[1] - original.time_range[0])
+    parts = [_cut(original, place(), None, middle), _cut(original, place(), middle, None)]
+    folder = place()
+    merge(parts, folder)
+    assert _present(mount_bags.open(folder)) == _present(original)
+
+
+def _present(recording) -> dict[str, list[tuple[int, int, bytes]]]:
+    return {name: rows for name, rows in _messages(recording).items() if rows}
+
+
+def test_types_that_nobody_installed_are_cut_with_their_definition(place):
+    folder = place()
+    file = folder / 'foreign_0.mcap'
+    folder.mkdir()
+    with file.open('wb') as stream:
+        writer = Writer(stream)
+        writer.start(profile='ros2')
+        schema = writer.register_schema('strange_msgs/msg/Thing', 'ros2msg', b'int32 number')
+        channel = writer.register_channel('/thing', 'cdr', schema, {'offered_qos_profiles': ''})
+        for second in range(10):
+            time = START + second * 1_000_000_000
+            payload = b'\x00\x01\x00\x00' + second.to_bytes(4, 'little')
+            writer.add_message(channel, time, payload, time + 7)
+        writer.finish()
+    piece = _cut(mount_bags.open(folder), place(), 2.0, 5.0)
+    original = _messages(mount_bags.open(folder))['/thing']
+    assert _messages(piece) == {'/thing': original[2:5]}
+    (schema,) = piece.files[0].schemas.values()
+    assert (schema.name, schema.data) == ('strange_msgs/msg/Thing', b'int32 number')
