@@ -2,38 +2,45 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
-from rich.table import Table
 
+from mount_bags.latency import Latency, setpoint_latency
 from mount_bags.reading import Recording
-from mount_bags.series import SeriesError, Times, registered_topic
-from mount_bags.stamps import stamp_statistics
-from mount_ros.topics import AIR_GAP, CURRENT_SETPOINT, DISPLACEMENT
+from mount_bags.series import Times, registered_topic
+from mount_bags.stamps import regular_rate, stamp_jitter, stamp_statistics
+from mount_bags.statement import RECORDER_RECORD, read_statement
+from mount_bags.topic_times import TopicTimes
+from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Delivery, Topic
+
+AllTimes = Mapping[str, TopicTimes]
 
 _NO_TIMES: Times = np.empty(0, np.int64)
-_TROUBLES = {'duplicated': 'twice', 'out_of_order': 'order', 'unanswered': 'unanswered'}
 _PAUSE = 0.5  # s, chosen: a control that says nothing for so long was not active
 
 
 @dataclass(frozen=True)
 class TopicAudit:
-    """What is there of a topic and what is not; None where the topic has no rate or no stamps.
+    """What is there of a topic and what is not; None and NaN where it cannot be told, as `remark` says.
 
     `present` counts messages, `duplicated` those of them that repeat a sample, so that
-    expected = present - duplicated + lost. `unanswered` is only told of `displacement`: samples
-    without a setpoint while control was active.
+    expected = present - duplicated + lost. `unanswered` of the `asked` samples of `displacement` have no
+    setpoint although control was active; `latency` is told of `current_setpoint`.
     """
 
     expected: int | None
     present: int
     lost: int | None
-    duplicated: int | None
-    out_of_order: int | None
-    longest_gap_s: float
+    duplicated: int | None = None
+    out_of_order: int | None = None
+    longest_gap_s: float = math.nan
+    rate_hz: float = math.nan
+    jitter_s: float = math.nan  # rms
+    worst_jitter_s: float = math.nan
+    asked: int | None = None
     unanswered: int | None = None
+    latency: Latency | None = None
     remark: str = ''
 
     @property
@@ -52,8 +59,16 @@ class SetpointCoverage:
 
 
 def audit(recording: Recording) -> dict[str, TopicAudit]:
-    """Return the audit of every topic in `recording` by its full name."""
-    return {name: _audit_topic(recording, name) for name in recording}
+    """Return the audit of every topic in `recording` by its full name.
+
+    Lost is what the stamps show, or what the recorder, the file's proven summary or `metadata.yaml` counted
+    and is not there, whichever is more.
+    """
+    times, told = recording.times(), _told_by_recorder(recording)
+    return {
+        name: _with_told(_audit_topic(times, name), recording.missing.get(name, 0), told.get(name))
+        for name in recording
+    }
 
 
 def setpoint_coverage(
@@ -79,56 +94,62 @@ def setpoint_coverage(
     return SetpointCoverage(int(asked.size), unanswered, int(begins.size))
 
 
-def as_json(audits: Mapping[str, TopicAudit]) -> dict[str, dict[str, Any]]:
-    """Return the figures as JSON knows them: unknown is null."""
-    return {
-        name: {
-            'expected': entry.expected,
-            'present': entry.present,
-            'lost': entry.lost,
-            'duplicated': entry.duplicated,
-            'longest_gap_s': None if math.isnan(entry.longest_gap_s) else entry.longest_gap_s,
-            'out_of_order': entry.out_of_order,
-            'unanswered': entry.unanswered,
-        }
-        for name, entry in audits.items()
-    }
+def _told_by_recorder(recording: Recording) -> dict[str, int]:
+    """Return how many messages of each topic the recorder says there ought to be."""
+    told: dict[str, int] = {}
+    for file in recording.files:
+        for name, row in read_statement(file.metadata.get(RECORDER_RECORD, {})).items():
+            told[name] = row.get('kept', 0) + max(0, row.get('lost', 0))
+    return told
 
 
-def as_table(audits: Mapping[str, TopicAudit]) -> Table:
-    """Return the figures as a table for people; columns of troubles that nobody has are left out."""
-    table = Table(title='Was anything lost?', title_justify='left')
-    table.add_column('topic', no_wrap=True)
-    for title in ('expected', 'present', 'lost', 'longest gap'):
-        table.add_column(title, justify='right', no_wrap=True)
-    troubles = [name for name in _TROUBLES if any(getattr(entry, name) for entry in audits.values())]
-    for name in troubles:
-        table.add_column(_TROUBLES[name], justify='right')
-    for name, entry in audits.items():
-        gap = '' if math.isnan(entry.longest_gap_s) else f'{1e3 * entry.longest_gap_s:.1f} ms'
-        table.add_row(
-            name,
-            *map(_cell, (entry.expected, entry.present, entry.lost)),
-            gap,
-            *(_cell(getattr(entry, trouble)) for trouble in troubles),
-            style=None if entry.sound else 'yellow',
-        )
-    return table
+def _with_told(entry: TopicAudit, missing: int, told: int | None) -> TopicAudit:
+    """Return the audit with what others counted taken into account."""
+    absent = max(missing, (told or 0) - entry.present)
+    if absent <= 0:
+        counted = told is not None and entry.expected is None
+        return replace(entry, expected=entry.present, lost=0) if counted else entry
+    lost = max(absent, entry.lost or 0)
+    return replace(entry, expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
 
 
-def _audit_topic(recording: Recording, name: str) -> TopicAudit:
-    series = recording[name]
-    topic = registered_topic(name)
-    if topic is None or topic.rate == 0.0 or not len(series):
-        remark = '' if len(series) else 'no message'
-        return TopicAudit(None, len(series), None, None, None, math.nan, remark=remark)
-    try:
-        stamps = series.stamps
-        if topic is CURRENT_SETPOINT:
-            stamps = _without_handovers(stamps, _handovers(recording, name), topic.rate)
-        statistics = stamp_statistics(stamps, topic.rate)
-    except SeriesError as error:
-        return TopicAudit(None, len(series), None, None, None, math.nan, remark=str(error))
+def _audit_topic(times: AllTimes, name: str) -> TopicAudit:
+    found = times[name]
+    present = len(found)
+    if not present:
+        return TopicAudit(None, 0, None, remark='no message')
+    topic = _own_topic(found)
+    if topic is not None and topic.rate == 0.0:
+        word = 'latched' if topic.delivery is Delivery.LATCHED else 'irregular'
+        return TopicAudit(None, present, None, remark=f'{word}: only counted')
+    if found.stamps is None:
+        return TopicAudit(None, present, None, remark=f'{found.obstacle}: only counted')
+    rate = topic.rate if topic is not None else regular_rate(found.stamps)
+    if rate is None:
+        return TopicAudit(None, present, None, remark='stamps without a regular rate: only counted')
+    entry = _from_stamps(times, found.stamps, topic, name, rate)
+    if topic is DISPLACEMENT:
+        return _with_coverage(entry, times, name)
+    if topic is CURRENT_SETPOINT:
+        return replace(entry, latency=setpoint_latency(found.stamps, found.receive_times))
+    return entry
+
+
+def _own_topic(found: TopicTimes) -> Topic | None:
+    """Return the registered topic of a series, None for a foreign one that only has the same name."""
+    topic = registered_topic(found.topic)
+    if topic is None or topic.type != found.type:
+        return None
+    return topic if not found.names or set(topic.names) <= set(found.names) else None
+
+
+def _from_stamps(times: AllTimes, stamps: Times, topic: Topic | None, name: str, rate: float) -> TopicAudit:
+    remark = '' if topic is not None else f'rate of {rate:.4g} Hz taken from the stamps'
+    closed = stamps
+    if topic is CURRENT_SETPOINT or topic is CONTROL_TRACE:
+        closed, pauses = _without_pauses(stamps, times, name.removesuffix(topic.name), rate)
+        remark = f'no loss: control was not active {pauses} times' if pauses else ''
+    statistics, jitter = stamp_statistics(closed, rate), stamp_jitter(closed, rate)
     return TopicAudit(
         expected=statistics.expected,
         present=statistics.present,
@@ -136,38 +157,43 @@ def _audit_topic(recording: Recording, name: str) -> TopicAudit:
         duplicated=statistics.duplicated,
         out_of_order=statistics.out_of_order,
         longest_gap_s=statistics.longest_gap,
-        unanswered=_unanswered(recording, name) if topic is DISPLACEMENT else None,
+        rate_hz=rate,
+        jitter_s=jitter.rms,
+        worst_jitter_s=jitter.worst,
+        remark=remark,
     )
 
 
-def _unanswered(recording: Recording, name: str) -> int | None:
+def _with_coverage(entry: TopicAudit, times: AllTimes, name: str) -> TopicAudit:
     namespace = name.removesuffix(DISPLACEMENT.name)
-    setpoints = f'{namespace}{CURRENT_SETPOINT.name}'
-    if setpoints not in recording or not len(recording[setpoints]):
-        return None
-    try:
-        handovers = _handovers(recording, setpoints)
-        return setpoint_coverage(recording[name].stamps, recording[setpoints].stamps, handovers).unanswered
-    except SeriesError:
-        return None
+    answers = _stamps_of(times, f'{namespace}{CURRENT_SETPOINT.name}')
+    if not answers.size:
+        return entry
+    handovers = _stamps_of(times, f'{namespace}{AIR_GAP.name}')
+    coverage = setpoint_coverage(_stamps_of(times, name), answers, handovers)
+    return replace(entry, asked=coverage.asked, unanswered=coverage.unanswered)
 
 
-def _handovers(recording: Recording, setpoints: str) -> Times:
-    """Return the stamps (ns) of the air gaps that belong to the topic `setpoints`."""
-    air_gaps = f'{setpoints.removesuffix(CURRENT_SETPOINT.name)}{AIR_GAP.name}'
-    return recording[air_gaps].stamps if air_gaps in recording else _NO_TIMES
+def _stamps_of(times: AllTimes, name: str) -> Times:
+    """Return the stamps (ns) of a topic by its full name, none if it is missing or has none."""
+    stamps = times[name].stamps if name in times else None
+    return _NO_TIMES if stamps is None else stamps
 
 
-def _without_handovers(stamps: Times, handovers: Times, rate: float) -> Times:
-    """Return the stamps with the pause after each handover taken out."""
+def _without_pauses(stamps: Times, times: AllTimes, namespace: str, rate: float) -> tuple[Times, int]:
+    """Return the stamps with the times taken out in which control was not active, and how many there were.
+
+    That is after each handover from the initialisation, and where it is silent for long while the
+    displacement goes on.
+    """
+    handovers = _stamps_of(times, f'{namespace}{AIR_GAP.name}')
+    displacements = np.sort(_stamps_of(times, f'{namespace}{DISPLACEMENT.name}'))
+    ordered = np.unique(stamps)
+    steps = np.diff(ordered)
     period = round(1e9 / rate)
-    shifted = stamps.copy()
-    for handover in handovers:
-        after = stamps[stamps > handover]
-        if after.size and handover in stamps:
-            shifted[stamps > handover] -= after.min() - handover - period
-    return shifted
-
-
-def _cell(count: int | None) -> str:
-    return '' if count is None else str(count)
+    between = np.diff(np.searchsorted(displacements, ordered))
+    silent = (steps > _PAUSE * 1e9) & (between > 0.5 * steps / period)
+    pauses = (silent | np.isin(ordered[:-1], handovers)) & (steps > period)
+    shift = np.concatenate([[0], np.cumsum(np.where(pauses, steps - period, 0))])
+    counted = int(np.count_nonzero(pauses & (np.rint(steps / period) > 1)))
+    return stamps - shift[np.searchsorted(ordered, stamps)], counted

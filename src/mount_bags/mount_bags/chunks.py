@@ -80,7 +80,8 @@ class Contents:
 
     def of(self, channels: Offsets) -> 'Contents':
         """Return the messages of these channels alone."""
-        wanted = np.isin(self.heads['channel'], channels)
+        channel = self.heads['channel']
+        wanted = channel == channels[0] if len(channels) == 1 else np.isin(channel, channels)
         if wanted.all():
             return self
         return Contents(self.data, self.offsets[wanted], self.heads[wanted], self.declarations, self.whole)
@@ -99,6 +100,12 @@ class Contents:
         """Return the number of messages by channel."""
         channels, counts = np.unique(self.heads['channel'], return_counts=True)
         return dict(zip(channels.tolist(), counts.tolist(), strict=True))
+
+    def beginnings(self, size: int) -> NDArray[np.uint8] | None:
+        """Return the first `size` bytes of each payload as rows, None if one of them is shorter."""
+        if (self.heads['length'] < LENGTH_BESIDES_PAYLOAD + size).any():
+            return None
+        return _rows(self.data, self.offsets + MESSAGE_HEAD.itemsize, size)
 
     def payloads(self) -> NDArray[np.uint8] | list[bytes]:
         """Return the payloads as rows if they have one length, else one by one."""

@@ -51,9 +51,9 @@ class Declared:
     other_types: tuple[str, ...] = ()
     channels: list[tuple[BagFile, int]] = field(default_factory=list)
 
-    def channels_of(self, file: BagFile) -> set[int]:
+    def channels_of(self, file: BagFile) -> list[int]:
         """Return the topic's channels in one of the files."""
-        return {number for owner, number in self.channels if owner is file}
+        return [number for owner, number in self.channels if owner is file]
 
 
 def declared_topics(files: Sequence[BagFile], information: BagInformation | None) -> dict[str, Declared]:

@@ -1,7 +1,7 @@
 """Opens recordings: those of this project and genuine rosbag2 bags, whole or in part."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from mount_bags.piece_topics import (
     repeated_topics,
 )
 from mount_bags.series import Payloads, Series
+from mount_bags.topic_times import TimesCollector, TopicTimes
 from mount_bags.whole_files import unpacked_payload
 
 # Key of the custom data in which `engine-mount recover` says what it could not prove.
@@ -203,18 +204,27 @@ class Recording:
 
     # Reading.
 
+    def times(self) -> dict[str, TopicTimes]:
+        """Return the times of all topics: one pass through the files, no message is kept."""
+        collectors = {
+            name: TimesCollector(name, declared.information.type, *self._definitions[name])
+            for name, declared in self._declared.items()
+        }
+        for name, block in self._blocks(list(self.topics)):
+            collectors[name].add(block)
+        found = {name: collector.times() for name, collector in collectors.items()}
+        for name, times in found.items():
+            self._note_damage(name, len(times))
+        return found
+
     def _load(self, name: str) -> Series:
-        declared = self._declared[name]
         definition, sentence = self._definitions[name]
-        blocks = list(self._blocks(declared))
+        blocks = [block for _, block in self._blocks([name])]
         head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, MESSAGE_HEAD)
-        present, expected = len(head), declared.information.message_count
-        if present < expected:
-            self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
-            self.missing[name] = max(self.missing.get(name, 0), expected - present)
+        self._note_damage(name, len(head))
         return Series(
             name,
-            declared.information.type,
+            self.topics[name].type,
             Payloads([_plain(block.payloads()) for block in blocks]),
             head['log_time'].astype(np.int64),
             head['publish_time'].astype(np.int64),
@@ -223,20 +233,32 @@ class Recording:
             zero=self.time_range[0] if self.time_range else 0,
         )
 
-    def _blocks(self, declared: Declared) -> Iterator[Contents]:
-        """Yield the messages of a topic, without those that a piece repeats from the one before."""
-        repeats = repeated_topics(self.files)
-        last: tuple[bytes, int] | None = None
-        for file, repeated in zip(self.files, repeats, strict=True):
-            is_first = declared.information.name in repeated
-            for block in file.blocks(declared.channels_of(file)):
-                found = block
-                if is_first and last is not None and _first(block) == last:
-                    found = block.behind_first()
-                is_first = False
-                if found.offsets.size:
-                    last = found.message(-1)
-                    yield found
+    def _note_damage(self, name: str, present: int) -> None:
+        expected = self.topics[name].message_count
+        if present < expected and self.missing.get(name, 0) < expected - present:
+            self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
+            self.missing[name] = expected - present
+
+    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, Contents]]:
+        """Yield the messages of topics, without those that a piece repeats from the one before."""
+        last: dict[str, tuple[bytes, int]] = {}
+        watched = frozenset().union(*repeated_topics(self.files))
+        for file, repeated in zip(self.files, repeated_topics(self.files), strict=True):
+            channels = {name: np.array(self._declared[name].channels_of(file), np.int64) for name in names}
+            channels = {name: numbers for name, numbers in channels.items() if numbers.size}
+            heads = set(repeated)
+            for block in file.blocks([int(number) for numbers in channels.values() for number in numbers]):
+                for name, numbers in channels.items():
+                    found = block.of(numbers) if len(channels) > 1 else block
+                    if not found.offsets.size:
+                        continue
+                    if name in heads and _first(found) == last.get(name):
+                        found = found.behind_first()
+                    heads.discard(name)
+                    if found.offsets.size:
+                        if name in watched:
+                            last[name] = found.message(-1)
+                        yield name, found
 
 
 def _first(block: Contents) -> tuple[bytes, int]:

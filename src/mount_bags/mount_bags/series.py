@@ -18,6 +18,7 @@ Column = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 _SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
+_OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
 _STEP = re.compile(r'([^.\[\]]+)|\[(\d+)\]')
 
 
@@ -96,11 +97,16 @@ class Series:
 
     @functools.cached_property
     def time(self) -> Column:
-        """Time in s from the beginning of the recording: of the samples, or of reception without stamps."""
+        """Time in s from the beginning of the recording: of the samples, or of reception without stamps.
+
+        Stamps of another clock, as in lock-step, count from that clock's own zero.
+        """
         try:
             times = self.stamps
         except SeriesError:
             times = self.receive_times
+        if times.size and abs(int(times[0]) - self._zero) > _OTHER_CLOCK:
+            return np.asarray(times * 1e-9, np.float64)
         return np.asarray((times - self._zero) * 1e-9, np.float64)
 
     @property

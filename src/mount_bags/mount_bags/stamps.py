@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 _NANOSECONDS = 1_000_000_000
+_LEAST_SAMPLES = 10
+_MOSTLY = 0.9  # share, chosen
+_MOST = 0.7  # share, chosen: a topic that lost more than that has no rate to speak of
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,41 @@ def stamp_statistics(stamps: NDArray[np.int64], rate: float) -> StampStatistics:
         out_of_order=int(np.count_nonzero(stamps[1:] < latest[:-1])),
         longest_gap=float(differences.max()) / _NANOSECONDS if differences.size else math.nan,
     )
+
+
+@dataclass(frozen=True)
+class StampJitter:
+    """How far the steps between neighbouring samples are from their median, in s; NaN without steps."""
+
+    rms: float
+    worst: float
+
+
+def stamp_jitter(stamps: NDArray[np.int64], rate: float) -> StampJitter:
+    """Return the jitter of `stamps` (ns) at `rate` in Hz; gaps are no jitter."""
+    steps = np.diff(np.sort(stamps))
+    single = steps[np.rint(steps * (rate / _NANOSECONDS)) == 1]
+    if not single.size:
+        return StampJitter(math.nan, math.nan)
+    deviation = (single - np.median(single)) / _NANOSECONDS
+    return StampJitter(float(np.sqrt(np.mean(deviation**2))), float(np.abs(deviation).max()))
+
+
+def regular_rate(stamps: NDArray[np.int64]) -> float | None:
+    """Return the rate (Hz) of samples that nobody declared, None where their stamps (ns) show none.
+
+    Regular are at least 10 samples of which nearly none is repeated, where most steps are one period and
+    nearly all are within a quarter of a period of whole ones.
+    """
+    distinct = np.unique(stamps)
+    if distinct.size < _LEAST_SAMPLES or distinct.size < _MOSTLY * stamps.size:
+        return None
+    steps = np.diff(distinct)
+    period = float(np.median(steps))
+    periods = np.rint(steps / period)
+    fitting = np.abs(steps - periods * period) <= 0.25 * period
+    single = np.mean(periods == 1)
+    return _NANOSECONDS / period if np.mean(fitting) >= _MOSTLY and single >= _MOST else None
 
 
 class StampWatch:

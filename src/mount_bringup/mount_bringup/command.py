@@ -10,9 +10,11 @@ from rich.console import Console
 
 from mount_bringup import (
     accept_command,
+    audit_command,
     compare_command,
     cut_command,
     merge_command,
+    recover_command,
     replay_command,
 )
 from mount_ros.environment import prepare_environment
@@ -121,31 +123,6 @@ def drive(
         raise typer.Exit(1)
 
 
-@app.command(name='audit', epilog='Example: `engine-mount audit bags/2026-11-20_18-03-11_motorway/recording`')
-def audit_recording(
-    recording: Annotated[Path, typer.Argument(help='folder of a recording, or an MCAP file')],
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='write the figures to this file')
-    ] = None,
-) -> None:
-    """Tell whether anything was lost in a recording; exit code 1 if so."""
-    import json
-
-    from mount_bags.audit import as_json, as_table, audit
-    from mount_bags.reading import open_recording
-
-    console = Console()
-    opened = open_recording(recording)
-    audits = audit(opened)
-    console.print(as_table(audits))
-    for warning in opened.warnings:
-        console.print(f'[yellow]note[/yellow] {warning}')
-    if json_file is not None:
-        json_file.write_text(json.dumps(as_json(audits), indent=2) + '\n')
-    if any(entry.lost for entry in audits.values()):
-        raise typer.Exit(1)
-
-
 @app.command()
 def bench() -> None:
     """Measure what matters for speed, each figure beside its alternative in the same run."""
@@ -166,6 +143,8 @@ def prepare() -> None:
             run_core({'mount_sim': sim}, lambda *_: None)
 
 
+app.command(name='audit', epilog=audit_command.EPILOG)(audit_command.audit)
+app.command(name='recover', epilog=recover_command.EPILOG)(recover_command.recover)
 app.command(name='replay', epilog=replay_command.EPILOG)(replay_command.replay)
 app.command(name='compare', epilog=compare_command.EPILOG)(compare_command.compare)
 app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)

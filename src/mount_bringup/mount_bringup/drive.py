@@ -17,7 +17,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from std_msgs.msg import String
 
-from mount_bags.audit import as_table, audit
+from mount_bags.audit import audit
+from mount_bags.audit_report import as_table
 from mount_bags.reading import Recording, open_recording
 from mount_bags.writer import BagWriter
 from mount_bringup.core_chain import Parameters, control_parameters
