@@ -16,13 +16,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from recorded_drive import PERIOD, START, sample
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
+import mount_bags
+from mount_bags.event_marks import read_marks
 from mount_bags.metadata import read_metadata
 from mount_bags.node import MountRecorder
 from mount_ros.data_path import DataPath
 from mount_ros.environment import prepare_environment
 from mount_ros.qos import publisher_qos
-from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, SESSION
+from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 STREAMS = (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT)
 LIMIT = 20.0  # s
@@ -54,10 +57,10 @@ def make_recorder(context, tmp_path):
     """Return a function that creates a recorder with parameters."""
     made = []
 
-    def make(**parameters):
+    def make(name='mount_recorder', **parameters):
         values = {'uri': str(tmp_path / 'bag'), 'topics': [topic.name for topic in STREAMS], **parameters}
         overrides = [Parameter(name, value=value) for name, value in values.items()]
-        made.append(MountRecorder(context=context, parameter_overrides=overrides))
+        made.append(MountRecorder(name, context=context, parameter_overrides=overrides))
         return made[-1]
 
     yield make
@@ -146,6 +149,10 @@ def test_latched_topic_received_before_activation_is_recorded(make_recorder, sou
         ({'uri': '/'}, 'names no folder'),
         ({'topics': ['no_such_topic']}, 'no_such_topic'),
         ({'on_full': 'explode'}, 'stop or continue'),
+        ({'split_size': 1000}, 'at least 1000000'),
+        ({'automatic_marks': 'earthquake'}, 'earthquake'),
+        ({'snapshot': 5.0}, 'topic event'),
+        ({'free_reserve': 10**15}, 'cannot be started'),
     ],
 )
 def test_wrong_parameter_is_refused_with_a_sentence(make_recorder, parameters, word):
@@ -221,6 +228,90 @@ def test_executor_of_the_node_publishes_the_matches(make_recorder, source, conte
         executor.spin_once(0.1)
     assert seen[-1].figures['publishers./displacement'] == 1
     executor.shutdown()
+
+
+def marks_of(folder):
+    return read_marks(mount_bags.open(folder)['event'])
+
+
+def test_marks_by_service_by_others_and_by_itself_are_recorded(make_recorder, source, context, tmp_path):
+    publisher = source.publisher(DISPLACEMENT)
+    others = source.node.create_publisher(String, EVENT.name, publisher_qos(EVENT))
+    recorder = make_recorder(topics=['displacement', 'event'], mark_text='a bump')
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    wait_until(lambda: publisher.get_subscription_count() and others.get_subscription_count(), 'matched')
+    wait_until(lambda: recorder.judge().figures['publishers./event'] == 2, 'matched by recorder')
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(recorder)
+    executor.add_node(source.node)
+    client = source.node.create_client(Trigger, 'mount_recorder/mark')
+    wait_until(client.service_is_ready, 'service')
+    answer = client.call_async(Trigger.Request())
+    executor.spin_until_future_complete(answer, timeout_sec=LIMIT)
+    assert answer.result().success
+    assert 'marked at' in answer.result().message
+    others.publish(String(data='a sentence'))
+    for index in (0, 1, 4):
+        publisher.publish(sample(DISPLACEMENT, index))
+    wait_until(lambda: recorder.judge().figures['received'] == 6, 'all received')
+    assert recorder.judge().figures['marks'] == 1
+    executor.shutdown()
+    recorder.trigger_deactivate()
+    marks = marks_of(tmp_path / 'bag')
+    assert sorted((mark.kind, mark.text) for mark in marks) == [
+        ('lost_sample', '/displacement: 2 samples missing'),
+        ('mark', 'a bump'),
+        ('mark', 'a sentence'),
+    ]
+    assert START + 4 * PERIOD in [mark.time for mark in marks]
+
+
+def test_mark_of_an_inactive_recorder_is_refused(make_recorder):
+    recorder = make_recorder()
+    recorder.trigger_configure()
+    response = recorder._on_mark(Trigger.Request(), Trigger.Response())
+    assert not response.success
+    assert 'not active' in response.message
+
+
+def test_of_two_recorders_one_marks(make_recorder, source, tmp_path):
+    publisher = source.publisher(DISPLACEMENT)
+    names = ('mount_recorder', 'mount_recorder_2')
+    recorders = [
+        make_recorder(name, topics=['displacement', 'event'], uri=str(tmp_path / name)) for name in names
+    ]
+    for recorder in recorders:
+        recorder.trigger_configure()
+        recorder.trigger_activate()
+    wait_until(lambda: publisher.get_subscription_count() == 2, 'matched')
+    for recorder in recorders:
+        wait_until(lambda end=recorder: end.judge().figures['publishers./event'] == 2, 'matched by recorder')
+    for index in (0, 4):
+        publisher.publish(sample(DISPLACEMENT, index))
+    for recorder in recorders:
+        wait_until(lambda end=recorder: end.judge().figures['received'] == 3, 'the mark')
+        recorder.trigger_deactivate()
+        assert [mark.kind for mark in marks_of(tmp_path / recorder.get_name())] == ['lost_sample']
+
+
+def test_snapshot_holds_what_came_before_the_mark(make_recorder, source, tmp_path):
+    publisher = source.publisher(DISPLACEMENT)
+    recorder = make_recorder(topics=['displacement', 'event'], snapshot=60.0, snapshot_after=0.0)
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    wait_until(publisher.get_subscription_count, 'matched')
+    wait_until(lambda: 'waiting for an event; 2 of 2' in recorder.judge().sentence, 'matched by recorder')
+    for index in range(50):
+        publisher.publish(sample(DISPLACEMENT, index))
+    wait_until(lambda: recorder.judge().figures['received'] == 50, 'all received')
+    assert not (tmp_path / 'bag').exists()
+    recorder.mark('now')
+    wait_until(lambda: recorder.judge().figures['snapshots'] == 1, 'snapshot')
+    recorder.trigger_deactivate()
+    recording = mount_bags.open(tmp_path / 'bag')
+    assert len(recording['displacement']) == 50
+    assert [mark.text for mark in marks_of(tmp_path / 'bag')] == ['now']
 
 
 # The process of the node, which takes itself through its transitions as a supervisor would.

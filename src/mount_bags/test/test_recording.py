@@ -2,14 +2,18 @@
 
 import itertools
 import threading
+import time
 
 import pytest
 from mcap.reader import make_reader
 from recorded_drive import PERIOD, START, sample
 from small_disk import small_disk
 
+from mount_bags import recording
 from mount_bags.diagnosis import OnFull, RecorderState, judge
 from mount_bags.recording import Recorder
+from mount_bags.space import SpaceGuard
+from mount_bags.statement import RECORDER_RECORD, read_statement
 from mount_bags.writer import BagWriter, RecordingError
 from mount_ros.diagnostics import Level
 from mount_ros.scalars import stamp_of
@@ -18,11 +22,11 @@ from mount_ros.topics import DISPLACEMENT
 STRING = 'std_msgs/msg/String'
 
 
-def recorder_of(folder, memory_limit=1 << 20, **options):
+def recorder_of(folder, memory_limit=1 << 20, space=None, on_loss=lambda _: None, **options):
     writer = BagWriter(folder, **options)
     writer.add_topic('/displacement', DISPLACEMENT.type)
     writer.add_topic('/latched', STRING)
-    return Recorder(writer, memory_limit=memory_limit)
+    return Recorder(writer, memory_limit=memory_limit, space=space, on_loss=on_loss)
 
 
 @pytest.fixture
@@ -48,6 +52,19 @@ def messages_of(folder):
                 log_time_order=False
             )
         ]
+
+
+def statement_of(folder):
+    with (folder / f'{folder.name}_0.mcap').open('rb') as file:
+        records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    return read_statement(records[RECORDER_RECORD])
+
+
+def wait_until(condition, what):
+    limit = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < limit, f'{what} did not happen'
+        time.sleep(1e-3)
 
 
 def verdict_of(recorder, on_full=OnFull.STOP, **state):
@@ -205,3 +222,101 @@ def test_sound_recorder_says_how_many_topics_have_a_publisher(tmp_path):
     assert '1 of 2 topics have a publisher' in verdict.sentence
     assert verdict.figures['publishers./latched'] == 0
     recorder.end()
+
+
+def test_losses_of_the_recorder_stand_in_the_file_by_topic(tmp_path, clocked):
+    size = len(sample(DISPLACEMENT, 0))
+    told = []
+    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, on_loss=told.append)
+    recorder.watch('/displacement', DISPLACEMENT.rate, stamp_of)
+    stuck, write = threading.Event(), recorder._writer.write
+    recorder._writer.write = lambda *item: stuck.wait() and write(*item)
+    receive, receive_other = (
+        clocked(recorder.receiver('/displacement')),
+        clocked(recorder.receiver('/latched')),
+    )
+    recorder.begin()
+    for index in range(100):
+        receive(sample(DISPLACEMENT, index))
+    lost = recorder.overflowed()['/displacement']
+    stuck.set()
+    wait_until(lambda: told, 'the announcement of the loss')
+    receive_other(b'text')
+    recorder.end()
+    assert (told, lost >= 80) == ([lost], True)
+    rows = statement_of(tmp_path / 'bag')
+    assert rows['/displacement'] == {'received': 100, 'kept': 100 - lost, 'lost': lost, 'missing': 0}
+    assert rows['/latched'] == {'received': 1, 'kept': 1, 'lost': 0, 'missing': 0}
+
+
+def test_sound_recording_says_so_in_the_file(tmp_path, clocked):
+    recorder = recorder_of(tmp_path / 'bag')
+    recorder.watch('/displacement', DISPLACEMENT.rate, stamp_of)
+    receive = clocked(recorder.receiver('/displacement'))
+    recorder.receiver('/latched')
+    recorder.begin()
+    for index in (0, 1, 4):
+        receive(sample(DISPLACEMENT, index))
+    recorder.end()
+    assert statement_of(tmp_path / 'bag') == {
+        '/displacement': {'received': 3, 'kept': 3, 'lost': 0, 'missing': 2},
+        '/latched': {'received': 0, 'kept': 0, 'lost': 0, 'missing': 0},
+    }
+
+
+@pytest.mark.parametrize('text', ['', 'topics: [', '{topics: 3}'])
+def test_statement_that_is_not_understood_is_empty(text):
+    assert read_statement({'topics': text}) == {}
+    assert read_statement({}) == {}
+
+
+@pytest.mark.parametrize(('on_full', 'level'), [(OnFull.STOP, Level.ERROR), (OnFull.CONTINUE, Level.WARN)])
+def test_recording_is_closed_before_the_disk_is_full(tmp_path, clocked, monkeypatch, on_full, level):
+    monkeypatch.setattr('mount_bags.recording._SPACE_PERIOD', 0.0)
+    free = [250_000_000]
+    guard = SpaceGuard(tmp_path / 'bag', 200_000_000, lambda _: free[0])
+    recorder = recorder_of(tmp_path / 'bag', space=guard)
+    receive = clocked(recorder.receiver('/displacement'))
+    recorder.begin()
+    for index in range(10):
+        receive(sample(DISPLACEMENT, index))
+    wait_until(lambda: recorder.figures().kept, 'the first chunk')
+    free[0] = 199_000_000
+    wait_until(lambda: recorder.figures().failure, 'the end')
+    receive(sample(DISPLACEMENT, 10))
+    verdict = verdict_of(recorder, on_full)
+    assert verdict.level is level
+    assert '199 MB left' in verdict.sentence
+    assert 'closed and readable' in verdict.sentence
+    assert len(messages_of(tmp_path / 'bag')) == 10
+    recorder.end()
+    assert recorder.figures().lost == 1
+
+
+def test_space_is_that_of_the_disk_on_which_the_folder_will_be(tmp_path):
+    asked = []
+    guard = SpaceGuard(tmp_path / 'not' / 'yet' / 'made', 1, lambda place: asked.append(place) or 5)
+    assert guard.free() == 5
+    assert asked == [tmp_path]
+    assert SpaceGuard(tmp_path, 1 << 62).shortage()
+    assert not SpaceGuard(tmp_path, 0).shortage()
+
+
+def test_end_beside_a_running_graph_does_not_wait_for_silence(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    receive = recorder.receiver('/displacement')
+    recorder.begin()
+    ended = threading.Event()
+
+    def go_on():
+        while not ended.wait(1e-3):
+            receive(b'message', time.time_ns(), time.time_ns())
+
+    graph = threading.Thread(target=go_on)
+    graph.start()
+    begin = time.monotonic()
+    recorder.end()
+    duration = time.monotonic() - begin
+    ended.set()
+    graph.join()
+    assert duration < 0.9 * recording._SETTLE_LIMIT

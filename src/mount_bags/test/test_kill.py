@@ -1,0 +1,145 @@
+"""What a recording is worth when its recorder was not allowed to finish it."""
+
+import contextlib
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from fed_recorder import TOPICS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.exceptions import EndOfFile
+from mcap.records import Channel, Message
+from mcap.stream_reader import StreamReader
+
+import mount_bags
+from mount_bags.split import SplitRule
+from mount_bags.writer import BagWriter
+
+STRING = 'std_msgs/msg/String'
+KILLS = 5
+LIMIT = 30.0  # s: only a failure takes so long
+LARGEST_LOSS = 200  # samples at 1 kHz
+NAMES = ('/stream', '/latched')
+
+
+@pytest.mark.parametrize('seed', range(KILLS))
+def test_killed_recorder_loses_less_than_a_fifth_of_a_second(tmp_path, seed):
+    wanted = random.Random(seed).randrange(50, 900)
+    progress = tmp_path / 'progress'
+    progress.write_bytes(bytes(8))
+    program = Path(__file__).with_name('fed_recorder.py')
+    process = subprocess.Popen([sys.executable, str(program), str(tmp_path / 'bag'), str(progress)])
+    try:
+        end = time.monotonic() + LIMIT
+        while samples_told(progress) < wanted:
+            assert process.poll() is None, 'the recorder ended by itself'
+            assert time.monotonic() < end, 'the recorder took no samples'
+            time.sleep(1e-3)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    taken = samples_told(progress)
+    recording = mount_bags.open(tmp_path / 'bag')
+    streamed = [messages_of(path) for path in pieces_of(tmp_path / 'bag')]
+    for topic in TOPICS:
+        series = recording[topic]
+        indices = [sample_index(bytes(series.payloads[place])) for place in range(len(series))]
+        assert indices == list(range(len(indices)))
+        assert taken - len(indices) <= LARGEST_LOSS
+        assert indices == [sample_index(data) for piece in streamed for name, data in piece if name == topic]
+    assert recording.latched('session').data == 's'
+    assert len(recording['session']) == 1
+
+
+def samples_told(progress):
+    return int.from_bytes(progress.read_bytes(), 'little')
+
+
+def sample_index(raw):
+    return int.from_bytes(raw[4:12], 'little')
+
+
+def pieces_of(folder):
+    return sorted(folder.glob('*.mcap'), key=lambda path: int(path.stem.rpartition('_')[2]))
+
+
+def messages_of(path):
+    """Return (topic, data) of what an independent reader finds in a file without an end."""
+    channels, found = {}, []
+    with path.open('rb') as file, contextlib.suppress(EndOfFile):
+        for record in StreamReader(file, validate_crcs=True).records:
+            if isinstance(record, Channel):
+                channels[record.id] = record.topic
+            elif isinstance(record, Message):
+                found.append((channels[record.channel_id], record.data))
+    return found
+
+
+steps = st.lists(
+    st.one_of(
+        st.just('flush'), st.tuples(st.sampled_from(NAMES), st.binary(max_size=30), st.integers(0, 40))
+    ),
+    max_size=40,
+)
+
+
+@settings(deadline=None, derandomize=True, max_examples=100)
+@given(steps, st.sampled_from([0, 5, 20]), st.integers(1, 300), st.floats(0.0, 1.0))
+def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
+    tmp_path_factory, steps, duration, chunk_size, share
+):
+    folder = tmp_path_factory.mktemp('bags') / 'bag'
+    writer = BagWriter(folder, split=SplitRule(duration=duration), chunk_size=chunk_size)
+    for name in NAMES:
+        writer.add_topic(name, STRING, latched=name == '/latched')
+    written, safe, safe_sizes = [], 0, {}
+    for step in steps:
+        if step != 'flush':
+            writer.write(*step)
+            written.append(step)
+            continue
+        writer.flush()
+        writer._wait_for_closing()
+        safe, safe_sizes = len(written), {path: path.stat().st_size for path in pieces_of(folder)}
+    kill(writer)
+    cut(folder, safe_sizes, share)
+    expected = {name: [tuple(rest) for topic, *rest in written if topic == name] for name in NAMES}
+    kept = read(folder, safe)
+    for name in NAMES:
+        found = kept.get(name, [])
+        assert found == expected[name][: len(found)]
+        assert len(found) >= sum(topic == name for topic, *_ in written[:safe])
+
+
+def kill(writer):
+    """Leave the files of a writer as SIGKILL would."""
+    writer._wait_for_closing()
+    writer._piece.file.release_room()
+    writer._piece.file.close()
+
+
+def cut(folder, safe_sizes, share):
+    """Cut the last file anywhere behind what was safe."""
+    last = pieces_of(folder)[-1]
+    safe, size = safe_sizes.get(last, 0), last.stat().st_size
+    with last.open('r+b') as file:
+        file.truncate(safe + round(share * (size - safe)))
+
+
+def read(folder, safe):
+    try:
+        recording = mount_bags.open(folder)
+    except mount_bags.ReadingError:
+        assert safe == 0
+        return {}
+    found = {}
+    for name in recording:
+        series = recording[name]
+        raws = [bytes(series.payloads[place]) for place in range(len(series))]
+        found[name] = list(zip(raws, series.receive_times.tolist(), strict=True))
+    return found

@@ -1,0 +1,166 @@
+"""Marks: their text, and those that the recorder sets by itself."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from recorded_drive import PERIOD, START
+
+from mount_bags.automatic_marks import (
+    BURST,
+    REFILL,
+    AutomaticMarks,
+    AutomaticMarksError,
+    FaultWatch,
+    LostSampleWatch,
+    MarkKind,
+    SwitchOnWatch,
+    mark_kinds,
+)
+from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time, read_mark
+from mount_bags.recording import Recorder
+from mount_bags.stamps import StampWatch
+from mount_bags.watching import watch_topic
+from mount_bags.writer import BagWriter
+from mount_ros.cdr import serialised
+from mount_ros.scalars import ScalarsLayout
+from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS
+
+
+class Clock:
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def sent():
+    return []
+
+
+@pytest.fixture
+def marks(sent, clock):
+    return AutomaticMarks(sent.append, clock=clock)
+
+
+@settings(deadline=None, derandomize=True, max_examples=50)
+@given(st.integers(-(2**63), 2**63), st.text(max_size=20), st.text(max_size=40))
+def test_mark_survives_its_text(time, kind, text):
+    mark = Mark(time, kind, text)
+    assert read_mark(mark_text(mark), received=0) == mark
+
+
+@pytest.mark.parametrize(
+    ('text', 'mark'),
+    [
+        ('a pothole', Mark(7, BY_HAND, 'a pothole')),
+        ('kind: pothole', Mark(7, 'pothole', '')),
+        ('{time: 5, text: deep}', Mark(5, BY_HAND, 'deep')),
+        ('{time: soon, kind: 3}', Mark(7, '3', '')),
+        ('{unclosed', Mark(7, BY_HAND, '{unclosed')),
+        ('', Mark(7, BY_HAND, '')),
+    ],
+)
+def test_anybody_may_publish_any_text(text, mark):
+    assert read_mark(text, received=7) == mark
+
+
+def test_present_time_is_that_of_the_stamps_in_lock_step():
+    assert present_time(START, 5 * PERIOD) == 5 * PERIOD
+    assert present_time(START, START - 10 * PERIOD) == START
+    assert present_time(START, 0) == START
+
+
+def test_switching_on_is_marked_each_time_and_switching_off_is_not(marks, sent):
+    watch = SwitchOnWatch(marks)
+    for stamp, active in enumerate((0.0, 1.0, 1.0, 0.0, 1.0)):
+        watch.add(stamp, active, 4.2e-4)
+    assert sent == [Mark(time, 'switch_on', 'damping on at 0.42 mm in the band') for time in (1, 4)]
+
+
+def status(name, level, message=''):
+    return DiagnosticStatus(name=name, level=bytes([level]), message=message)
+
+
+def test_fault_is_marked_once_until_it_is_over(marks, sent):
+    watch = FaultWatch(marks, '/')
+    for time, level in enumerate((0, 1, 2, 2, 0, 2)):
+        watch.add(time, status('mount_driver', level, f'silent for {time} s'))
+    assert sent == [Mark(time, 'fault', f'mount_driver: silent for {time} s') for time in (2, 5)]
+
+
+def test_faults_of_other_mounts_are_theirs(marks, sent):
+    watch = FaultWatch(marks, '/mount_right')
+    watch.add(0, status('mount_left/mount_driver', 2))
+    watch.add(1, status('mount_right/mount_driver', 2))
+    assert [mark.time for mark in sent] == [1]
+
+
+def test_lost_samples_are_marked_where_the_stamps_go_on(marks, sent):
+    watch = LostSampleWatch(marks, '/displacement', StampWatch(1000.0))
+    for index in (0, 1, 2, 5, 6, 8):
+        watch.add(START + index * PERIOD)
+    assert sent == [
+        Mark(START + 5 * PERIOD, 'lost_sample', '/displacement: 2 samples missing'),
+        Mark(START + 8 * PERIOD, 'lost_sample', '/displacement: 1 sample missing'),
+    ]
+
+
+def test_broken_stream_does_not_flood(marks, sent, clock):
+    watch = LostSampleWatch(marks, '/displacement', StampWatch(1000.0))
+    for index in range(10_000):  # every second sample is missing, for 20 s
+        clock.now = 2e-3 * index
+        watch.add(START + 2 * index * PERIOD)
+    assert BURST < len(sent) <= BURST + 20.0 / REFILL
+    assert sent[BURST].text.endswith(f'{round(REFILL / 2e-3) - BURST} more since the mark before')
+
+
+def test_kinds_have_rations_of_their_own(marks, sent):
+    for _ in range(2 * BURST):
+        marks.mark(MarkKind.LOST_SAMPLE, 0, '')
+    marks.mark(MarkKind.FAULT, 0, '')
+    assert sent[-1].kind == 'fault'
+    assert marks.sent == len(sent) == BURST + 1
+
+
+def test_kinds_that_are_not_wanted_are_not_marked(sent):
+    marks = AutomaticMarks(sent.append, mark_kinds('fault, switch_on'))
+    marks.mark(MarkKind.LOST_SAMPLE, 0, '')
+    assert sent == []
+    assert mark_kinds('') == ()
+
+
+def test_unknown_kind_is_refused():
+    with pytest.raises(AutomaticMarksError, match="some of switch_on, fault.*'fault earthquake'"):
+        mark_kinds('fault earthquake')
+
+
+def test_recorder_marks_from_the_messages_that_it_writes(tmp_path, marks, sent):
+    recorder = Recorder(BagWriter(tmp_path / 'bag'))
+    layout = ScalarsLayout(CONTROL_TRACE)
+    active = CONTROL_TRACE.names.index('damping_active')
+    receivers = {}
+    for topic in (CONTROL_TRACE, DIAGNOSTICS):
+        recorder._writer.add_topic(topic.name, topic.type)
+        watch_topic(recorder, topic, topic.name, marks, '/', lambda: 77)
+        receivers[topic] = recorder.receiver(topic.name)
+    recorder.begin()
+    for index, value in ((0, 0.0), (1, 1.0), (4, 1.0)):
+        numbers = [0.0] * len(CONTROL_TRACE.names)
+        numbers[active] = value
+        receivers[CONTROL_TRACE](layout.pack(START + index * PERIOD, numbers), START, START)
+    fault = DiagnosticArray(status=[status('mount_init', 2, 'no ripple')])
+    receivers[DIAGNOSTICS](serialised(fault), START, START)
+    recorder.end()
+    assert [(mark.kind, mark.time) for mark in sent] == [
+        ('switch_on', START + PERIOD),
+        ('lost_sample', START + 4 * PERIOD),
+        ('fault', 77),
+    ]
