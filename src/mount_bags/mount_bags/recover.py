@@ -10,7 +10,7 @@ encoding, within the times of its chunk; the new recording says so whenever it i
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -61,15 +61,15 @@ class Recovery:
         return f'{kept}; lost {self._lost_text()}'
 
     def _lost_text(self) -> str:
-        if not (self.lost or self.lost_bytes or self.lost_seconds > 0.0):
-            return 'what was not yet written when the recording broke off: how much, the file cannot tell'
-        about = '' if self.lost_is_counted else 'about '
-        seconds = (
-            'a time that cannot be told' if math.isnan(self.lost_seconds) else f'{self.lost_seconds:.3f} s'
+        if self.lost is None:
+            return 'what followed the last whole chunk: how much, the file cannot tell'
+        about = '' if self.lost_is_counted else 'at least about '
+        unknown = math.isnan(self.lost_seconds)
+        seconds = 'a time that cannot be told' if unknown else f'{self.lost_seconds:.3f} s'
+        more = '' if self.lost_is_counted else '; whether more followed, the file cannot tell'
+        return (
+            f'{about}{self.lost} messages, {seconds}, {_size(self.lost_bytes)} of the file not readable{more}'
         )
-        messages = 'messages that cannot be counted' if self.lost is None else f'{about}{self.lost} messages'
-        more = '' if self.lost_is_counted else ', and what was not yet written when it broke off'
-        return f'{messages}, {seconds}, {_size(self.lost_bytes)}{more}'
 
 
 def recover(
@@ -200,26 +200,37 @@ def _balance(recording: Recording, bag: VerbatimBag, copied: _Copied) -> Recover
     size = sum(file.path.stat().st_size for file in recording.files)
     expected = _expected(recording)
     here = copied.stored + copied.unchecked
-    lost = None if expected is None else max(0, expected - here)
-    if lost is None and lost_bytes:
-        lost = round(lost_bytes * here / max(1, size - lost_bytes))
-    spans = [bag.time_range or (0, 0)]
-    lost_seconds = sum(_lost_inside(file) for file in files) / _SECOND + _lost_at_ends(recording, spans[0])
-    whole_seconds = (spans[0][1] - spans[0][0]) / _SECOND
-    complete = recording.whole and not lost
+    lost = max(0, expected - here) if expected is not None else _estimate(files, here)
+    inside = sum(_lost_inside(file) for file in files) / _SECOND
+    span = bag.time_range or (0, 0)
+    complete = recording.whole and not (lost and expected is not None)
     return Recovery(
         folder=bag.folder,
         kept=bag.kept,
         unchecked=copied.unchecked,
         lost=0 if complete else lost,
         lost_is_counted=expected is not None,
-        kept_seconds=whole_seconds - sum(_lost_inside(file) for file in files) / _SECOND,
-        lost_seconds=0.0 if complete else lost_seconds,
+        kept_seconds=(span[1] - span[0]) / _SECOND - inside,
+        lost_seconds=0.0 if complete else inside + _lost_at_ends(recording, span),
         kept_bytes=size - lost_bytes,
         lost_bytes=lost_bytes,
         complete=complete,
         notes=(*recording.warnings, *((copied.note,) if copied.unchecked else ())),
     )
+
+
+def _estimate(files: Sequence[McapFile], kept: int) -> int | None:
+    """Return about how many messages the damaged and cut-off chunks had, None if there is none such."""
+    whole = [chunk for file in files for chunk in file.chunks if not chunk.damaged]
+    unpacked = sum(chunk.size for chunk in whole)
+    packed = sum(chunk.end - chunk.position for chunk in whole)
+    lost = sum(chunk.size for file in files for chunk in file.chunks if chunk.damaged) / max(1, unpacked)
+    for file in files:
+        lost += (file.tail.size if file.tail else 0) / max(1, unpacked)
+        lost += sum(part.end - part.begin for part in file.unexplained if part.end < file.size) / max(
+            1, packed
+        )
+    return round(lost * kept) or None
 
 
 def _expected(recording: Recording) -> int | None:

@@ -138,7 +138,7 @@ def test_kinds_that_are_not_wanted_are_not_marked(sent):
 
 
 def test_unknown_kind_is_refused():
-    with pytest.raises(AutomaticMarksError, match="some of switch_on, fault.*'fault earthquake'"):
+    with pytest.raises(AutomaticMarksError, match=r"some of switch_on, fault.*'fault earthquake'"):
         mark_kinds('fault earthquake')
 
 

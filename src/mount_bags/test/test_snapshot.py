@@ -160,9 +160,13 @@ def test_unknown_topic_is_refused(tmp_path):
 def test_full_disk_ends_it_and_every_later_message_is_refused(tmp_path):
     snapshot = snapshot_of(tmp_path / 'bag', open_file=small_disk((1 << 20) + 20_000), chunk_size=100)
     stream(snapshot, 0, 100)
-    with pytest.raises(RecordingError, match='no space left'):
+
+    def go_on():
         for event in range(100, 10_000):
             snapshot.write('/event', b'boom', event, event)
+
+    with pytest.raises(RecordingError, match='no space left'):
+        go_on()
     with pytest.raises(RecordingError, match='no space left'):
         snapshot.write('/stream', b'', 20_000, 20_000)
     assert 0 < snapshot.unwritten(0) < 20

@@ -1,21 +1,19 @@
 """Performance figures as ratios: ours and its alternative in turn, in one run, medians of several."""
 
 import statistics
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import cantools
 import numpy as np
-from mcap.writer import Writer
 from rclpy.serialization import deserialize_message, serialize_message
 from rich.console import Console
 from rich.table import Table
 from sensor_msgs.msg import JointState
 
-from mount_bags.writer import BagWriter
+from mount_bringup.bench_storage import ROUNDS as STORAGE_ROUNDS
+from mount_bringup.bench_storage import storage_figures
 from mount_bringup.core_run import run_core
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
@@ -43,14 +41,17 @@ class Comparison:
 
 def print_bench(console: Console) -> None:
     """Measure and print all comparisons."""
-    table = Table(title=f'medians of {_ROUNDS} rounds, in turn')
+    table = Table(title=f'medians of {_ROUNDS} rounds (storage: {STORAGE_ROUNDS}), in turn')
     for title in ('what', 'ours', 'beside', 'other', 'ratio'):
         table.add_column(title, justify='left' if title in ('what', 'beside') else 'right', no_wrap=True)
     with console.status('measuring'):
-        for row in (_packing(), _unpacking(), _coding(), _writing(), _control(), _closed_loop()):
+        storage = storage_figures()
+        for row in (_packing(), _unpacking(), _coding(), *storage, _control(), _closed_loop()):
             faster = f'{row.other / row.ours:.1f}'
             table.add_row(row.what, _duration(row.ours), row.other_name, _duration(row.other), faster)
     console.print(table)
+    for figure in storage:
+        console.print(f'{figure.what}: {figure.per_second:,.0f} messages/s', highlight=False)
 
 
 def _packing() -> Comparison:
@@ -78,32 +79,6 @@ def _coding() -> Comparison:
     frame = codec.encode_measurement(Measurement(7, 7000, 1e-4, 0.2, 300.0, 110.0), 7)
     ours, other = _in_turn(lambda: codec.decode_measurement(frame), lambda: message.decode(frame), 2000)
     return Comparison('decode one CAN frame with CRC', ours, 'cantools, no CRC', other)
-
-
-def _writing() -> Comparison:
-    count, raw = 20_000, ScalarsLayout(CONTROL_TRACE).pack(_STAMP, tuple([0.0] * len(CONTROL_TRACE.names)))
-    with tempfile.TemporaryDirectory() as folder:
-        places = iter(range(1000))
-
-        def ours() -> None:
-            writer = BagWriter(Path(folder) / f'ours_{next(places)}')
-            writer.add_topic('/control_trace', CONTROL_TRACE.type)
-            for index in range(count):
-                writer.write('/control_trace', raw, _STAMP + index)
-            writer.close()
-
-        def other() -> None:
-            with (Path(folder) / f'other_{next(places)}.mcap').open('wb') as stream:
-                writer = Writer(stream, chunk_size=64 * 1024)
-                writer.start('ros2')
-                schema = writer.register_schema(CONTROL_TRACE.type, 'ros2msg', b'')
-                channel = writer.register_channel('/control_trace', 'cdr', schema)
-                for index in range(count):
-                    writer.add_message(channel, _STAMP + index, raw, _STAMP + index)
-                writer.finish()
-
-        first, second = _in_turn(ours, other, 1)
-    return Comparison('write a message to a bag', first / count, 'mcap.writer', second / count)
 
 
 def _control() -> Comparison:

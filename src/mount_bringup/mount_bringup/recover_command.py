@@ -36,7 +36,7 @@ def recover(
 
     console = Console()
     target = out if out is not None else _beside(recording)
-    with Progress(console=console, transient=True) as bar:
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task('recovering', total=None)
         result = recovered(recording, target, lambda done, of: bar.update(task, completed=done, total=of))
     for note in result.notes:

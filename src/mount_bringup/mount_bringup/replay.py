@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.reading import Recording, open_recording
+from mount_bags.reading import Recording
 from mount_bringup.core_chain import Parameters, chosen_damper, chosen_specimen, control_parameters
+from mount_bringup.recording_path import open_run
 from mount_bringup.replay_core import Progress, Replayed, controller_for, replay_in_core
 from mount_bringup.replay_difference import Difference, difference
 from mount_bringup.replay_foreign import ForeignOrder, chosen_gap, foreign_input
@@ -64,7 +65,7 @@ class ReplayOutcome:
     @property
     def held(self) -> bool:
         """Whether the replay gave what it promises: the recorded answers, where nothing was changed."""
-        return not self.as_recorded or self.difference is None or self.difference.equal
+        return not self.as_recorded or self.difference is None or self.difference.agrees
 
 
 def replay(order: ReplayOrder, progress: Progress = lambda share: None) -> ReplayOutcome:
@@ -135,7 +136,7 @@ def _read(order: ReplayOrder) -> tuple[ReplayInput, float]:
         given.notes.insert(0, sentence)
         return given, time.perf_counter() - begin
     begin = time.perf_counter()
-    recording = open_recording(order.recording)
+    recording = open_run(order.recording)
     _load_displacement(recording)
     reading_time = time.perf_counter() - begin
     gap, sentence = chosen_gap(order.table, {}) if order.table else (None, '')

@@ -10,6 +10,7 @@ import numpy as np
 from mount_bags.reading import ReadingError, Recording, open_recording
 from mount_bags.series import Series, SeriesError
 from mount_bringup.core_chain import Parameters, chosen_specimen, control_parameters
+from mount_bringup.recording_path import open_run
 from mount_bringup.replay_input import (
     SECOND,
     Column,
@@ -137,7 +138,7 @@ def chosen_gap(table: str, parameters: Parameters) -> tuple[MeasuredGap, str]:
             f'current-force table: calculated for the specimen {name!r} with the nominal gaps {rest:.0f} um '
             f'at rest and {contact:.0f} um in contact; nothing was measured on this mount'
         )
-    recording = open_recording(table)
+    recording = open_run(Path(table))
     gaps = measured_gaps(recording)
     if not gaps:
         raise ReplayError(f'--table {table}: that recording holds no air_gap with its current_force_table')

@@ -250,9 +250,10 @@ def _without_foreign(answered: Times, answers: RecordedAnswers, notes: Notes) ->
     near = bounds[places + 1] - bounds[places] <= 20 * _PERIOD  # a hole in the traces, not another speaker
     foreign = answered[odd][~near]
     if foreign.size:
+        span = f'{notes.at(int(foreign[0]))} to {notes.at(int(foreign[-1]))}'
         notes.append(
-            f'{foreign.size} setpoints from {notes.at(int(foreign[0]))} to {notes.at(int(foreign[-1]))} are of '
-            'no step of the controller and no complete initialisation (a ramp that was given up?): not replayed'
+            f'{foreign.size} setpoints from {span} are of no step of the controller and of no complete '
+            'initialisation (a ramp that was given up?): not replayed'
         )
     return np.setdiff1d(answered, foreign, assume_unique=True)
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from rich.console import Console
 
-from mount_bags.reading import Recording, open_recording
+from mount_bags.reading import Recording
 from mount_bags.series import Payloads, registered_topic
 from mount_bringup.core_chain import Parameters
 from mount_bringup.domain import domain_lock
 from mount_bringup.graph import SIMULATED
+from mount_bringup.recording_path import open_run
 from mount_bringup.replay import check_parameters
 from mount_bringup.replay_input import Notes, ReplayError, has, recorded_parameters
 from mount_bringup.replay_keyboard import Keyboard
@@ -67,7 +68,7 @@ class _Film:
 
 def play_live(order: LiveOrder, console: Console) -> None:
     """Play to the end, to `q` or to Ctrl-C; raises `ReplayError` with the reason where it cannot."""
-    recording = open_recording(order.recording)
+    recording = open_run(order.recording)
     if not 0.01 <= order.rate <= 100.0:
         raise ReplayError(f'--rate ({order.rate:g}) must lie within 0.01 .. 100')
     film = _film(recording, _chosen(recording, order))

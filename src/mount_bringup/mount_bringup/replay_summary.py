@@ -10,6 +10,8 @@ from rich.table import Table
 from mount_bringup.replay import LOCKSTEP, ReplayOutcome
 from mount_bringup.replay_core import Replayed
 from mount_bringup.replay_difference import (
+    SETTLED,
+    SETTLING,
     Moment,
     Switching,
     change_in_words,
@@ -128,7 +130,10 @@ def _verdict(outcome: ReplayOutcome) -> list[str]:
         return ['nothing recorded to compare with']
     sentences = difference_in_words(found)
     if found.settling_skipped:
-        sentences.append(f'the first {found.settling_skipped} setpoints were not compared: see the notes')
+        sentences.append(
+            f'not compared: the first {SETTLING:g} s ({found.settling_skipped} setpoints), see the notes; '
+            f'then up to {1e6 * SETTLED:g} uA apart is as near as it can be'
+        )
     refusals = [run.refusal for run in outcome.replayed.runs if run.refusal]
     return sentences + refusals
 
