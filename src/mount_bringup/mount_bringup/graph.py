@@ -37,9 +37,9 @@ VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 URGENT: tuple[GraphNode, ...] = (DRIVER, SIM, INIT, CONTROL)
 """The nodes of the 1 kHz loop."""
 
-LOCKSTEP_TOGETHER: tuple[GraphNode, ...] = (DRIVER, SIM, INIT, CONTROL)
-"""The nodes that share a process in lock-step: while one of them works the others wait for it anyway, and
-handing over to another process costs more than the work."""
+LOCKSTEP_TOGETHER: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
+"""The nodes that share a process and its data thread in lock-step: while one of them works the others wait
+for it anyway, and handing over to another thread or process costs more than the work."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import can
+from can.interfaces.virtual import VirtualBus
 
 from mount_driver.loopback import LoopbackMulticastBus
 
@@ -62,6 +63,11 @@ def open_bus(
         raise CanLinkError(f'{tried} does not open: {error}; {remedy}') from error
     _widen_receive_buffer(bus)
     return bus
+
+
+def may_have_frames(bus: can.BusABC) -> bool:
+    """Return False only where nothing can be received now; costs less than trying."""
+    return not (isinstance(bus, VirtualBus) and bus.queue.empty())
 
 
 def _python_can_bus(interface: str, channel: str, filters: Any, **options: Any) -> can.BusABC:

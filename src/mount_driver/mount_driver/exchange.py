@@ -11,7 +11,7 @@ from typing import Protocol
 
 import can
 
-from mount_driver.bus import CanLinkError, open_bus
+from mount_driver.bus import CanLinkError, may_have_frames, open_bus
 from mount_driver.codec import Measurement, MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.link import Arrival, Link, Refusal
@@ -79,12 +79,13 @@ class Exchange:
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def start(self) -> None:
-        """Open the bus and begin to receive; raises `CanLinkError`."""
+    def start(self, *, threaded: bool = True) -> None:
+        """Open the bus and begin to receive, in a thread or by `poll`; raises `CanLinkError`."""
         self._bus = self._open()
         self._accepting = True
-        self._thread = threading.Thread(target=self._serve, name='can_receive', daemon=True)
-        self._thread.start()
+        if threaded:
+            self._thread = threading.Thread(target=self._serve, name='can_receive', daemon=True)
+            self._thread.start()
         atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
 
     def stop(self) -> None:
@@ -106,25 +107,34 @@ class Exchange:
             setpoint = self.link.answer(stamp, current, self._now())
             return setpoint is not None and self._send(setpoint)
 
+    def poll(self) -> bool:
+        """Handle the next frame if one is there and return whether; for who did not start a thread."""
+        bus = self._bus
+        return bus is not None and may_have_frames(bus) and self._attempt(0.0)
+
     def _serve(self) -> None:
+        while not self._ending.is_set() and not self.failure:
+            self._attempt(_WAKE)
+
+    def _attempt(self, wait: float) -> bool:
+        """Handle the frame that comes within `wait` s; what cannot be recovered ends the exchange safely."""
         try:
-            while not self._ending.is_set():
-                try:
-                    self._receive()
-                except can.CanError as error:
-                    self._recover(error)
+            try:
+                return self._receive(wait)
+            except can.CanError as error:
+                self._recover(error)
         except Exception as error:
             # The border of the thread: whatever the reason, say it and be safe.
             known = isinstance(error, CanLinkError)
             self.failure = str(error) if known else f'{type(error).__name__}: {error}'
-        finally:
             self._leave_off()
+        return False
 
-    def _receive(self) -> None:
+    def _receive(self, wait: float) -> bool:
         bus = self._bus
-        if bus is None:
-            return
-        message = bus.recv(_WAKE)
+        if bus is None or self.failure:
+            return False
+        message = bus.recv(wait)
         received = time.monotonic_ns()
         if message is not None:
             if message.is_error_frame:
@@ -134,6 +144,7 @@ class Exchange:
             elif message.arbitration_id == self._ids[1]:
                 self.link.take_status(message.data)
         self._watch()
+        return message is not None
 
     def _take_measurement(self, message: can.Message, received: int) -> None:
         link = self.link

@@ -40,6 +40,7 @@ class MountDriver(SafeLifecycleNode):
         self._publish_ripple = path.sender(COIL_RIPPLE)
         path.subscribe(CURRENT_SETPOINT, self._on_setpoint)
         path.start()
+        self._path = path
 
     def activate(self) -> None:
         assert self._codec is not None
@@ -49,12 +50,17 @@ class MountDriver(SafeLifecycleNode):
         exchange = Exchange(self._settings, self._codec, clock, self._on_sample, lockstep=self.lockstep)
         self._watch = LinkWatch()
         self._started_ns = time.monotonic_ns()
-        exchange.start()
+        # In lock-step on a bus within this process, frames only come while the data thread is free.
+        attended = self.lockstep and self._settings.interface == 'virtual'
+        exchange.start(threaded=not attended)
         self._exchange = exchange
+        if attended:
+            self._path.attend(exchange.poll)
 
     def deactivate(self) -> None:
         exchange, self._exchange = self._exchange, None
         if exchange is not None:
+            self._path.leave_work()
             exchange.stop()
 
     def cleanup(self) -> None:

@@ -41,14 +41,14 @@ def make(multicast, samples):
     group, port = multicast
     opened = []
 
-    def start(*, interface='udp_multicast', lockstep=True, take=samples.take, **parameters):
+    def start(*, interface='udp_multicast', lockstep=True, take=samples.take, threaded=True, **parameters):
         channel = group if interface == 'udp_multicast' else f'exchange-{port}'
         chosen = DriverParameters(interface=interface, channel=channel, port=port)._replace(**parameters)
         far = FarEnd(interface, channel, port)
         opened.append(far.close)
         clock = CounterClock() if lockstep else ElectronicsClock(0)
         exchange = Exchange(chosen, CODEC, clock, take, lockstep=lockstep)
-        exchange.start()
+        exchange.start(threaded=threaded)
         opened.append(exchange.stop)
         return exchange, far
 
@@ -63,6 +63,31 @@ def test_a_sample_is_handed_out_with_its_stamp(make, samples, interface):
     far.send(sample(7))
     samples.wait_for(1)
     assert samples == [(7 * MS, sample(7))]
+
+
+def test_without_a_thread_each_poll_handles_one_frame(make, samples):
+    exchange, far = make(interface='virtual', threaded=False)
+    assert not exchange.poll()
+    far.send(sample(7))
+    far.send(sample(8))
+    assert exchange.poll()
+    assert samples == [(7 * MS, sample(7))]
+    assert exchange.poll()
+    assert not exchange.poll()
+    assert samples == [(7 * MS, sample(7)), (8 * MS, sample(8))]
+
+
+def test_what_goes_wrong_in_a_poll_ends_the_exchange_at_0_ampere(make):
+    def choke(stamp, measurement):
+        raise RuntimeError('nobody foresaw this')
+
+    exchange, far = make(interface='virtual', threaded=False, take=choke)
+    far.send(sample(7))
+    assert not exchange.poll()
+    assert exchange.failure == 'RuntimeError: nobody foresaw this'
+    assert far.setpoint() == OFF
+    far.send(sample(8))
+    assert not exchange.poll()
 
 
 def test_a_setpoint_leaves_as_the_answer_to_its_sample(make, samples):

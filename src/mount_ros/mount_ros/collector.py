@@ -7,11 +7,13 @@ message was sent and when it arrived.
 
 import operator
 import threading
+import time
 from collections.abc import Callable
 
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
+from mount_ros.data_path import DataThread, io_node
 from mount_ros.message_types import message_class
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import Topic
@@ -20,20 +22,20 @@ Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns), both of the system clock."""
 
 _PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold five seconds
+_SHARED_PERIOD = 0.02  # s, chosen: the same where nobody looks at the recording while it grows
 
 
 class Collector:
-    """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first."""
+    """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first.
 
-    def __init__(self, owner: Node):
-        self.node = Node(
-            f'{owner.get_name()}_io',
-            namespace=owner.get_namespace(),
-            context=owner.context,
-            use_global_arguments=False,
-            start_parameter_services=False,
-            enable_rosout=False,
-        )
+    The thread is its own, or the one that also serves the publishers: two that take turns in one
+    process cost more than the work.
+    """
+
+    def __init__(self, owner: Node, *, thread: DataThread | None = None):
+        self.node = io_node(owner)
+        self._shared_thread = thread
+        self._taken_at = 0.0
         self._receivers: list[tuple[Subscription, Receive]] = []
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
@@ -57,6 +59,9 @@ class Collector:
 
     def start(self) -> None:
         """Begin to take messages."""
+        if self._shared_thread is not None:
+            self._shared_thread.attend(self._take_when_due)
+            return
         self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
         self._thread.start()
 
@@ -65,6 +70,8 @@ class Collector:
         if self._ending.is_set():
             return
         self._ending.set()
+        if self._shared_thread is not None:
+            self._shared_thread.leave(self._take_when_due)
         if self._thread is not None:
             self._thread.join()
         self.node.destroy_node()
@@ -73,6 +80,13 @@ class Collector:
         while not self._ending.wait(_PERIOD):
             self._take_batch()
         self._take_batch()
+
+    def _take_when_due(self) -> bool:
+        now = time.monotonic()
+        if now - self._taken_at > _SHARED_PERIOD:
+            self._taken_at = now
+            self._take_batch()
+        return False
 
     def _take_batch(self) -> None:
         batch: list[tuple[int, int, bytes, Receive]] = []

@@ -7,6 +7,7 @@ share the thread too: a message from one to the other then wakes nobody.
 
 import threading
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.executors import Executor
@@ -20,7 +21,23 @@ from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Topic
 
 _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
+_WORK_PERIOD = 0.001  # s, chosen: how often it looks for other work when no message comes
 _REST_PERIOD = 0.05  # s, chosen
+
+Work = Callable[[], bool]
+"""Does what there is to do without waiting; returns whether there was anything."""
+
+
+def io_node(owner: Node) -> Node:
+    """Return the plain node `<name>_io` that carries the data of the node `owner`."""
+    return Node(
+        f'{owner.get_name()}_io',
+        namespace=owner.get_namespace(),
+        context=owner.context,
+        use_global_arguments=False,
+        start_parameter_services=False,
+        enable_rosout=False,
+    )
 
 
 class DataPath:
@@ -29,18 +46,12 @@ class DataPath:
     def __init__(self, owner: Node, *, lockstep: bool = False, thread: 'DataThread | None' = None):
         self.lockstep = lockstep
         self._thread = thread or DataThread(owner.context)
-        self.node = Node(
-            f'{owner.get_name()}_io',
-            namespace=owner.get_namespace(),
-            context=owner.context,
-            use_global_arguments=False,
-            start_parameter_services=False,
-            enable_rosout=False,
-        )
+        self.node = io_node(owner)
         self._serving = False
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
         self._resting: _RareLook | None = None
+        self._works: list[Work] = []
         self._stopped = False
 
     def publisher(self, topic: Topic) -> Publisher:
@@ -61,7 +72,7 @@ class DataPath:
         subscription = self.node.create_subscription(
             message_class(topic.type),
             topic.name,
-            self._surviving(topic, callback),
+            self._surviving(f'message of {topic.name} not used', callback),
             control_qos(topic, lockstep=self.lockstep),
             raw=True,
         )
@@ -81,6 +92,19 @@ class DataPath:
         self._thread.add(self.node)
         self._serving = True
 
+    def attend(self, work: Work) -> None:
+        """Let the thread that serves the messages do `work` too, whenever it has handled one.
+
+        Who waits for nothing but what happens in this thread needs no thread of its own.
+        """
+        self._works.append(self._surviving('work not done', work))
+        self._thread.attend(self._works[-1])
+
+    def leave_work(self) -> None:
+        """Return when none of the attended work is done any more."""
+        while self._works:
+            self._thread.leave(self._works.pop())
+
     def rest(self) -> None:
         """From now on only look at what came last, a few times a second: nobody waits for an answer."""
         if self._resting is None and self._serving:
@@ -99,48 +123,58 @@ class DataPath:
         if self._stopped:
             return
         self._stopped = True
+        self.leave_work()
         if self._resting is not None:
             self._resting.end()
         elif self._serving:
             self._thread.remove(self.node)
         self.node.destroy_node()
 
-    def _surviving(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[bytes], None]:
+    def _surviving(self, trouble: str, callback: Callable[..., Any]) -> Callable[..., Any]:
         # The border of the data thread: an exception would end it, and with it every node that it serves.
         logger = self.node.get_logger()
 
-        def guarded(raw: bytes) -> None:
+        def guarded(*arguments: bytes) -> Any:
             try:
-                callback(raw)
+                return callback(*arguments)
             except Exception as error:
-                text = f'message of {topic.name} not used: {type(error).__name__}: {error}'
-                logger.error(text, throttle_duration_sec=1.0)
+                logger.error(f'{trouble}: {type(error).__name__}: {error}', throttle_duration_sec=1.0)
+                return False
 
         return guarded
 
 
 class DataThread:
-    """A thread with an EventsExecutor; it lives as long as it has nodes to serve."""
+    """A thread with an EventsExecutor; it lives as long as it has nodes to serve or work to do."""
 
     def __init__(self, context: Context):
         self._context = context
         self._executor: Executor | None = None
         self._thread: threading.Thread | None = None
-        self._changes: list[tuple[Node, bool, threading.Event]] = []
+        self._works: list[Work] = []
+        self._changes: list[tuple[Callable[[Executor], Any], threading.Event]] = []
         self._guard = threading.Lock()
 
     def add(self, node: Node) -> None:
         """Serve `node` from now on."""
-        self._change(node, wanted=True)
+        self._change(lambda executor: executor.add_node(node))
 
     def remove(self, node: Node) -> None:
         """Return when `node` is served no more and none of its callbacks runs."""
-        self._change(node, wanted=False)
+        self._change(lambda executor: executor.remove_node(node))
 
-    def _change(self, node: Node, *, wanted: bool) -> None:
+    def attend(self, work: Work) -> None:
+        """Do `work` between the messages from now on, again and again until it has nothing to do."""
+        self._change(lambda _: self._works.append(work))
+
+    def leave(self, work: Work) -> None:
+        """Return when `work` is done no more and does not run."""
+        self._change(lambda _: self._works.remove(work))
+
+    def _change(self, change: Callable[[Executor], Any]) -> None:
         done = threading.Event()
         with self._guard:
-            self._changes.append((node, wanted, done))
+            self._changes.append((change, done))
             if self._executor is None:
                 self._executor = EventsExecutor(context=self._context)
                 arguments = (self._executor,)
@@ -156,21 +190,32 @@ class DataThread:
         # spin() of this executor dispatches nothing in the pinned wheels; spin_once does, one event a call.
         spin_once = executor.spin_once
         while self._apply_changes(executor):
+            works = self._works
+            period = _WORK_PERIOD if works else _SPIN_PERIOD
             while not self._changes:
-                spin_once(_SPIN_PERIOD)
+                if not _any_done(works):
+                    spin_once(period)
 
     def _apply_changes(self, executor: Executor) -> bool:
-        """Add and remove nodes; return whether there is anything left to serve."""
+        """Return whether there is anything left to serve or to do."""
         with self._guard:
             changes, self._changes = self._changes, []
-            for node, wanted, _ in changes:
-                (executor.add_node if wanted else executor.remove_node)(node)
-            serving = bool(executor.get_nodes())
+            for change, _ in changes:
+                change(executor)
+            serving = bool(executor.get_nodes()) or bool(self._works)
             if not serving:
                 self._executor = None
-            for _, _, done in changes:
+            for _, done in changes:
                 done.set()
             return serving
+
+
+def _any_done(works: list[Work]) -> bool:
+    done = False
+    for work in works:
+        if work():
+            done = True
+    return done
 
 
 class _RareLook:

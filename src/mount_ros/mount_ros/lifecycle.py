@@ -65,7 +65,7 @@ class SafeLifecycleNode(LifecycleNode):
 
     def open_collector(self) -> Collector:
         """Create the data path of a node that takes all messages but answers none."""
-        collector = Collector(self)
+        collector = Collector(self, thread=self.data_thread if self.lockstep else None)
         self.data_path = collector
         return collector
 

@@ -15,7 +15,7 @@ from mount_ros.data_path import DataThread
 from mount_ros.environment import prepare_environment
 from mount_ros.lifecycle import SafeLifecycleNode
 
-_SPIN_PERIOD = 0.1  # s: how soon a signal is noticed
+_SPIN_PERIOD = 5.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
 
 Create = Callable[[], SafeLifecycleNode]
 
@@ -38,43 +38,55 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     data_thread = DataThread(nodes[0].context)
     for node in nodes:
         node.data_thread = data_thread
+    over = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: [node.ending.set() for node in nodes])
+        signal.signal(number, lambda *_: over.set())
     gc.freeze()  # what stands after set-up need not be looked at again
-    failed: list[SafeLifecycleNode] = []
-
-    def serve(node: SafeLifecycleNode) -> None:
-        try:
-            _serve(node)
-        except Exception as error:
-            # The border of the process: nobody would close the nodes, and the others would live on alone.
-            traceback.print_exc()
-            node.get_logger().fatal(f'{type(error).__name__}: {error}')
-            failed.append(node)
-            for each in nodes:
-                each.ending.set()
-
-    threads = [threading.Thread(target=serve, args=(node,), name=node.get_name()) for node in nodes[1:]]
-    for thread in threads:
-        thread.start()
-    serve(nodes[0])
+    services = [_Service(node, over) for node in nodes]
+    over.wait()  # here, and only here, Python notices a signal
+    for node in nodes:
+        node.ending.set()
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
-    for thread in threads:
-        thread.join()
+    for service in services:
+        service.end()
     for node in reversed(nodes):
         node.close()
         node.destroy_node()
     rclpy.try_shutdown()
-    if failed:
+    if any(service.failed for service in services):
         sys.exit(1)
 
 
-def _serve(node: SafeLifecycleNode) -> None:
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    try:
-        while rclpy.ok() and not node.ending.is_set():
-            executor.spin_once(_SPIN_PERIOD)
-    finally:
-        executor.remove_node(node)
-        executor.shutdown()
+class _Service:
+    """The thread that serves the rest of a node: transitions, parameters, diagnostics.
+
+    It sleeps until something arrives: whatever wakes Python there takes the interpreter from the data path.
+    """
+
+    def __init__(self, node: SafeLifecycleNode, over: threading.Event):
+        self.failed = False
+        self._node = node
+        self._over = over
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._thread = threading.Thread(target=self._serve, name=node.get_name())
+        self._thread.start()
+
+    def end(self) -> None:
+        self._node.ending.set()
+        self._executor.wake()
+        self._thread.join()
+        self._executor.remove_node(self._node)
+        self._executor.shutdown()
+
+    def _serve(self) -> None:
+        try:
+            while rclpy.ok() and not self._node.ending.is_set():
+                self._executor.spin_once(_SPIN_PERIOD)
+        except Exception as error:
+            # The border of the process: nobody would close the nodes, and the others would live on alone.
+            traceback.print_exc()
+            self._node.get_logger().fatal(f'{type(error).__name__}: {error}')
+            self.failed = True
+        finally:
+            self._over.set()

@@ -8,6 +8,7 @@ import pytest
 from rclpy.node import Node
 
 from mount_ros.collector import Collector
+from mount_ros.data_path import DataThread
 from mount_ros.message_types import message_class
 from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout, stamp_of
@@ -164,3 +165,23 @@ def test_a_receiver_that_raises_costs_its_own_message_only(collector, sender, wa
         sender.send(DISPLACEMENT, stamp)
     wait_until(lambda: received == [0, 2, 3], 'arrival of the others')
     assert 'a message was not taken: ValueError: indigestible' in capfd.readouterr().err
+
+
+def test_in_a_shared_thread_everything_is_taken_up_to_the_end(context, owner, sender, wait_until):
+    received, threads = [], set()
+
+    def receive(raw, *_):
+        received.append(stamp_of(raw))
+        threads.add(threading.current_thread().name)
+
+    collector = Collector(owner, thread=DataThread(context))
+    collector.collect(DISPLACEMENT, receive)
+    connect(collector, sender, wait_until, DISPLACEMENT)
+    collector.start()
+    for stamp in range(200):
+        sender.send(DISPLACEMENT, stamp)
+    wait_until(lambda: len(received) == 200, 'arrival of all messages')
+    collector.stop()
+    assert received == list(range(200))
+    assert threads == {'data'}
+    assert not [thread for thread in threading.enumerate() if thread.name == 'data']

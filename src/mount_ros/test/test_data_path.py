@@ -197,3 +197,59 @@ def test_a_thread_serves_again_after_its_last_node_has_left(context, make_end, w
         publish(sender.layout.pack(3, (0.0,)))
         wait_until(lambda end=end: 3 in end.stamps, 'arrival')
         end.path.stop()
+
+
+def test_attended_work_is_done_between_messages_and_without_any(pair, wait_until):
+    receiver, send = pair
+    doing = []
+
+    def work():
+        doing.append(threading.current_thread().name)
+        return False
+
+    receiver.path.attend(work)
+    wait_until(lambda: len(doing) > 3, 'work without messages')
+    send(1)
+    wait_until(lambda: receiver.stamps == [1], 'arrival')
+    receiver.path.leave_work()
+    done = len(doing)
+    send(2)
+    wait_until(lambda: receiver.stamps == [1, 2], 'arrival after the work was left')
+    assert len(doing) == done
+    assert set(doing) == {'data'}
+
+
+def test_work_that_has_something_to_do_is_done_again_before_the_next_message(make_end, wait_until):
+    end, order = make_end('busy'), []
+    publish = end.path.sender(DISPLACEMENT)
+    end.path.subscribe(DISPLACEMENT, lambda raw: order.append('message'))
+    end.path.start()
+    wait_until(lambda: not end.path.unmatched(), 'connection')
+    left = 5
+
+    def work():
+        nonlocal left
+        if not left:
+            return False
+        if left == 5:
+            publish(end.layout.pack(1, (0.0,)))
+        left -= 1
+        order.append('work')
+        return True
+
+    end.path.attend(work)
+    wait_until(lambda: 'message' in order, 'the message')
+    assert order == ['work'] * 5 + ['message']
+
+
+def test_work_that_raises_ends_neither_the_thread_nor_the_service(pair, wait_until, capfd):
+    receiver, send = pair
+
+    def work():
+        raise ValueError('too hard')
+
+    receiver.path.attend(work)
+    send(1)
+    wait_until(lambda: receiver.stamps == [1], 'arrival')
+    receiver.path.stop()
+    assert 'work not done: ValueError: too hard' in capfd.readouterr().err

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import can
 
+from mount_driver.bus import may_have_frames
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
 from mount_sim.electronics import Reading
@@ -76,16 +77,19 @@ class CanEnd:
     def wait_for_answer(self, number: int, limit: float) -> ReceivedSetpoint | None:
         """Return the setpoint that answers sample `number`, or None after `limit` s without it.
 
-        A frame that switches off answers none, whatever number it carries.
+        With a limit of 0 s it takes one frame if there is one. A frame that switches off answers none,
+        whatever number it carries.
         """
+        if limit == 0.0 and not may_have_frames(self._bus):
+            return None
         end = time.monotonic() + limit
-        while (remaining := end - time.monotonic()) > 0.0:
-            received = self._receive(min(remaining, _RECEIVE_PATIENCE))
+        while True:
+            remaining = end - time.monotonic()
+            received = self._receive(max(0.0, min(remaining, _RECEIVE_PATIENCE)))
             if received is not None and received.answers(number & _COUNTER_MASK):
                 return received
-            if self._ending.is_set():
+            if remaining <= 0.0 or self._ending.is_set():
                 return None
-        return None
 
     def listen(self) -> None:
         """Receive setpoints in a thread from now on; `latest` is the newest."""

@@ -9,9 +9,10 @@ DRIVING, FINISHED = 'driving', 'finished'
 
 def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
     """Return level and sentence; the figures carry the progress of the run."""
-    simulated = figures.samples * SAMPLE_TIME
+    samples = figures.samples  # goes on while this is written
+    simulated = samples * SAMPLE_TIME
     values = {
-        'samples': figures.samples,
+        'samples': samples,
         'samples_of_run': run.samples,
         'simulated_s': f'{simulated:.3f}',
         'excitation_start_s': f'{run.excitation_start * SAMPLE_TIME:.3f}',
@@ -23,14 +24,14 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
         'fatal': bool(figures.failure),
     }
     if figures.failure:
-        values['waiting_stamp'] = round((figures.samples - 1) * SAMPLE_TIME * 1e9)
+        values['waiting_stamp'] = round((samples - 1) * SAMPLE_TIME * 1e9)
         return Verdict(Level.ERROR, figures.failure, values)
-    if figures.samples >= run.samples:
+    if samples >= run.samples:
         return Verdict(Level.OK, FINISHED, values)
-    if not lockstep and figures.overruns > 0.05 * max(figures.samples, 1000):
+    if not lockstep and figures.overruns > 0.05 * max(samples, 1000):
         return Verdict(
             Level.WARN,
-            f'{figures.overruns} of {figures.samples} samples were late (limit 5 %): this machine is too '
+            f'{figures.overruns} of {samples} samples were late (limit 5 %): this machine is too '
             'busy for real time; close other programs, or use lock-step',
             values,
         )

@@ -14,6 +14,7 @@ from mount_sim.faults import Fault
 from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
 
 _STATUS_EVERY = 100  # samples: 10 Hz
+_LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
 _REMEMBERED = 1024  # samples whose sending time is kept
 _MICROSECONDS = 1_000_000
 
@@ -51,6 +52,10 @@ class ElectronicsLoop:
         self._fault = fault
         self._publish = publish
         self._sent_at = [math.nan] * _REMEMBERED
+        self._asked: int | None = None  # lock-step: the sample that waits for its answer
+        self._answer: ReceivedSetpoint | None = None
+        self._asked_at = 0.0
+        self._answered_first = math.nan
         self.figures = LoopFigures()
         self.last_latency = math.nan
 
@@ -74,17 +79,32 @@ class ElectronicsLoop:
 
     def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
         """Sample as fast as the answers come; raise `NoAnswerError` after `patience` s without one."""
-        pending: ReceivedSetpoint | None = None
-        begin: float | None = None
-        while not self._mount.finished and not ending.is_set():
-            number = self._mount.sample
-            self._tick(pending)
-            # The first sample waits for the activation of whoever answers it.
-            pending = self._wait_for_answer(number, patience if begin is not None else math.inf, ending)
-            begin = begin or time.monotonic()
-            self.figures.wall_time = time.monotonic() - begin
-        if pending is not None:
-            self._note(pending)
+        while not self.finished and not ending.is_set():
+            self.step_in_lockstep(patience, _LOCKSTEP_WAIT)
+
+    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
+        """Take the next sample if the last one is answered within `wait` s; return whether it was.
+
+        Raises `NoAnswerError` when no answer came for `patience` s; the first sample waits for the
+        activation of whoever answers it.
+        """
+        if self._asked is not None:
+            answer = self._can_end.wait_for_answer(self._asked, wait)
+            if answer is None:
+                self._check_patience(self._asked, patience)
+                return False
+            self._take_answer(answer)
+        if self._mount.finished:
+            return False
+        self._asked, self._asked_at = self._mount.sample, time.monotonic()
+        answer, self._answer = self._answer, None
+        self._tick(answer)
+        return True
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run is over, in lock-step with its last sample answered."""
+        return self._mount.finished and self._asked is None
 
     def _tick(self, received: ReceivedSetpoint | None) -> None:
         mount, number, now = self._mount, self._mount.sample, self._mount.time
@@ -117,20 +137,21 @@ class ElectronicsLoop:
         self.last_latency = received.arrival - sent
         self.figures.latency.add(self.last_latency)
 
-    def _wait_for_answer(
-        self, number: int, patience: float, ending: threading.Event
-    ) -> ReceivedSetpoint | None:
-        waited = 0.0
-        while not ending.is_set():
-            received = self._can_end.wait_for_answer(number, 0.5)
-            if received is not None:
-                return received
-            waited += 0.5
-            if waited >= patience:
-                raise NoAnswerError(
-                    f'sample {number} ({number * SAMPLE_TIME:.3f} s) was not answered within {patience:g} s'
-                )
-        return None
+    def _take_answer(self, answer: ReceivedSetpoint) -> None:
+        now = time.monotonic()
+        if math.isnan(self._answered_first):
+            self._answered_first = now
+        self.figures.wall_time = now - self._answered_first
+        self._asked, self._answer = None, answer
+        if self._mount.finished:
+            self._note(answer)
+
+    def _check_patience(self, number: int, patience: float) -> None:
+        first = math.isnan(self._answered_first)
+        if not first and time.monotonic() - self._asked_at >= patience:
+            raise NoAnswerError(
+                f'sample {number} ({number * SAMPLE_TIME:.3f} s) was not answered within {patience:g} s'
+            )
 
     def _status(self) -> Status:
         return Status(

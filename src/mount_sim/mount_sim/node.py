@@ -55,11 +55,13 @@ class MountSim(SafeLifecycleNode):
         self._send_acceleration = path.sender(topics.SIM_CHASSIS_ACCELERATION)
         self._send_force = path.sender(topics.SIM_MOUNT_FORCE)
         path.start()
+        self._path = path
         self._prepare_mount()
 
     def activate(self) -> None:
+        interface = self.get_parameter('interface').value
         bus = open_bus(
-            self.get_parameter('interface').value,
+            interface,
             self.get_parameter('channel').value,
             port=self.get_parameter('port').value,
         )
@@ -71,11 +73,17 @@ class MountSim(SafeLifecycleNode):
         )
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
-        self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
-        self._thread.start()
+        self._patience = self.get_parameter('answer_patience').value
+        if self.lockstep and interface == 'virtual':
+            # Both ends of the bus live in this process: whoever answers works in the data thread.
+            self._path.attend(self._step)
+        else:
+            self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
+            self._thread.start()
 
     def deactivate(self) -> None:
         self._ending.set()
+        self._path.leave_work()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -94,16 +102,29 @@ class MountSim(SafeLifecycleNode):
         rehearsal.advance(0.0)
 
     def _run(self) -> None:
-        loop = self._loop
-        assert loop is not None
+        assert self._loop is not None
         try:
             if self.lockstep:
-                loop.run_in_lockstep(self._ending, self.get_parameter('answer_patience').value)
+                self._loop.run_in_lockstep(self._ending, self._patience)
             else:
-                loop.run_in_real_time(self._ending)
+                self._loop.run_in_real_time(self._ending)
         except (NoAnswerError, OSError) as error:
-            loop.figures.failure = str(error)
-            self.get_logger().error(str(error))
+            self._fail(error)
+
+    def _step(self) -> bool:
+        loop = self._loop
+        if loop is None or loop.figures.failure:
+            return False
+        try:
+            return loop.step_in_lockstep(self._patience)
+        except (NoAnswerError, OSError) as error:
+            self._fail(error)
+            return False
+
+    def _fail(self, error: Exception) -> None:
+        assert self._loop is not None
+        self._loop.figures.failure = str(error)
+        self.get_logger().error(str(error))
 
     def _publish(self, number: int) -> None:
         stamp = self._time_zero + number * _SAMPLE_NANOSECONDS

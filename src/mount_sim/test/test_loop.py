@@ -195,6 +195,23 @@ def test_the_first_sample_waits_for_whoever_answers_it(ends, make_mount):
     assert loop.figures.samples == 1
 
 
+def test_step_by_step_the_loop_never_waits(ends, make_mount):
+    end, host = ends
+    mount = make_mount()
+    loop = _loop(mount, end)
+    assert loop.step_in_lockstep(LIMIT)  # the first sample
+    assert not loop.step_in_lockstep(LIMIT)  # has no answer yet
+    steps = 1
+    while not loop.finished:
+        sample = host.receive()
+        if sample is None:
+            continue
+        host.send(Setpoint(0.5, sample.sample_counter))
+        steps += loop.step_in_lockstep(LIMIT)
+    assert (steps, loop.figures.samples, loop.figures.answered) == (300, 300, 300)
+    assert not loop.step_in_lockstep(LIMIT)
+
+
 # Faults and real time
 
 
