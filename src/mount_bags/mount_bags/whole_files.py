@@ -33,10 +33,12 @@ def mapped(path: Path) -> mmap.mmap:
 
 def unpacked_payload(raw: bytes) -> bytes:
     """Return a message that rosbag2 compressed by itself; one that cannot be unpacked stays as it is."""
+    unpacking = zstandard.ZstdDecompressor().decompressobj()
     try:
-        return zstandard.ZstdDecompressor().decompressobj().decompress(raw)
+        unpacked = unpacking.decompress(raw)
     except (zstandard.ZstdError, MemoryError):
         return raw
+    return unpacked if unpacking.eof else raw
 
 
 def _unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:

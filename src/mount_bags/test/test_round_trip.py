@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
@@ -59,6 +59,7 @@ def read(folder):
     return found
 
 
+@example([('/a', b'(\xb5/\xfd', 1, 1)], 1, SplitRule())  # begins as if it were packed
 @settings(deadline=None, derandomize=True, max_examples=40)
 @given(MESSAGES, st.sampled_from([1, 300, 5000]), st.sampled_from([SplitRule(), SplitRule(0, 1 << 60)]))
 def test_what_is_written_is_read_here_and_by_others(messages, chunk_size, split):
