@@ -18,7 +18,8 @@ drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and 
 	@$(BIN)/engine-mount drive $(DRIVE_OPTIONS)
 
 test: $(VENV)/.ready-dev ## pass all tests
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -m 'not real_time' -n auto --maxprocesses 4 --dist worksteal
+	@$(BIN)/python -m pytest -m real_time
 
 bench: $(VENV)/.ready-dev ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench

@@ -5,26 +5,16 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from mount_ros.testing import free_domain
-
 REPOSITORY = Path(__file__).resolve().parents[1]
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 LIMIT = 240.0  # s: only a hang takes so long
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    """A ROS domain that no other test of this machine uses at the same time."""
-    with free_domain() as number:
-        yield number
 
 
 @dataclass
@@ -86,14 +76,3 @@ def command(tmp_path: Path, domain: int) -> Iterator[Command]:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             process.wait(30)
-
-
-def wait_for(condition: Callable[[], Any], what: str, limit: float = 60.0) -> Any:
-    """Return the first true value of `condition`, or fail."""
-    end = time.monotonic() + limit
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    return pytest.fail(f'{what} did not happen within {limit:g} s')

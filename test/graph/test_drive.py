@@ -49,6 +49,7 @@ def test_lockstep_repeats_itself_in_any_namespace_and_equals_the_core_run(comman
     assert topics - {'/diagnostics'} == {name for name in topics if name.startswith('/mount_right/')}
 
 
+@pytest.mark.real_time
 def test_real_time_drive_records_every_sample_and_damps_the_gap(command, tmp_path):
     figures_file = tmp_path / 'figures.json'
     result = command.drive(

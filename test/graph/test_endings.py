@@ -10,8 +10,7 @@ import pytest
 import mount_bags
 from mount_driver.bus import MULTICAST_GROUP, open_bus
 from mount_driver.codec import MountCodec
-
-from ..conftest import wait_for
+from mount_ros.testing import wait_until
 
 FIRST_PORT = 43113
 
@@ -64,7 +63,7 @@ def test_ctrl_c_ends_at_zero_current_with_a_closed_recording(command, bus_listen
             sum(s.current > 0.4 for s in bus_listener[-200:]) > 100 and len(bus_listener) > 4000
         ),
     }[moment]
-    wait_for(reached, moment)
+    wait_until(reached, moment)
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 130, output
@@ -75,12 +74,12 @@ def test_ctrl_c_ends_at_zero_current_with_a_closed_recording(command, bus_listen
         recording = mount_bags.open(out / 'recording')
         assert recording.warnings == []
         assert len(recording['displacement']) > 100
-    wait_for(lambda: not _node_pids(process.pid), 'the end of all nodes')
+    wait_until(lambda: not _node_pids(process.pid), 'the end of all nodes')
 
 
 def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_listener):
     process, out = command.start_drive('--scenario', 'bench', '--duration', '60')
-    wait_for(
+    wait_until(
         lambda: sum(s.current > 0.4 for s in bus_listener[-200:]) > 100 and len(bus_listener) > 4000,
         'damping',
     )
@@ -94,12 +93,12 @@ def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_list
 
 def test_nodes_end_when_their_supervisor_is_killed(command, bus_listener):
     process, _ = command.start_drive('--scenario', 'bench', '--duration', '60')
-    wait_for(lambda: len(bus_listener) > 500, 'setpoints')
+    wait_until(lambda: len(bus_listener) > 500, 'setpoints')
     nodes = _node_pids(process.pid)
     assert len(nodes) == 5
     process.kill()
     process.communicate(timeout=30)
-    wait_for(lambda: not any(_alive(pid) for pid in nodes.values()), 'the end of all nodes')
+    wait_until(lambda: not any(_alive(pid) for pid in nodes.values()), 'the end of all nodes')
     assert bus_listener[-1].current == 0.0
 
 
@@ -118,7 +117,7 @@ def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
 
 def test_a_second_graph_on_the_same_domain_is_refused(command, domain):
     first, _ = command.start_drive('--scenario', 'bench', '--duration', '60')
-    wait_for(lambda: len(_node_pids(first.pid)) == 5, 'the first graph')
+    wait_until(lambda: len(_node_pids(first.pid)) == 5, 'the first graph')
     second = command.drive('--scenario', 'bench', '--duration', '1')
     assert second.code == 1
     assert f'a graph already runs in ROS domain {domain}' in second.output

@@ -1,24 +1,14 @@
-"""What the tests share: a domain of their own, small recordings, the genuine bags beside the repository."""
+"""What the tests share: small recordings, the genuine bags beside the repository."""
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from mount_ros.testing import free_domain
 
 # The tests are imported one by one (importmode importlib); what they share is found by this path.
 sys.path.insert(0, str(Path(__file__).parent))
 
 from recorded_drive import write_drive
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    """Return a domain id that no other test of this machine uses at the same time."""
-    with free_domain() as number:
-        yield number
 
 
 @pytest.fixture

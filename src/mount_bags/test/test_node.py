@@ -8,7 +8,6 @@ import threading
 import time
 
 import pytest
-import rclpy
 from mcap.reader import make_reader
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -23,22 +22,13 @@ from mount_bags.event_marks import read_marks
 from mount_bags.metadata import read_metadata
 from mount_bags.node import MountRecorder
 from mount_ros.data_path import DataPath
-from mount_ros.environment import prepare_environment
 from mount_ros.qos import publisher_qos
+from mount_ros.testing import wait_until
 from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 STREAMS = (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT)
 LIMIT = 20.0  # s
 COUNT = 2000
-
-
-@pytest.fixture
-def context(domain):
-    prepare_environment()
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain)
-    yield context
-    rclpy.try_shutdown(context=context)
 
 
 @pytest.fixture
@@ -69,13 +59,6 @@ def make_recorder(context, tmp_path):
         node.destroy_node()
 
 
-def wait_until(condition, what):
-    limit = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < limit, f'{what}: not within {LIMIT} s'
-        time.sleep(0.005)
-
-
 def publish_streams(publishers, count):
     """Publish `count` samples of each stream at 1 kHz."""
     begin = time.monotonic()
@@ -99,6 +82,7 @@ def assert_all_recorded(folder, count):
         assert found[f'/{topic.name}'] == [sample(topic, index) for index in range(count)]
 
 
+@pytest.mark.real_time
 def test_three_streams_at_1_khz_are_recorded_without_loss(make_recorder, source, tmp_path):
     publishers = {topic: source.publisher(topic) for topic in STREAMS}
     recorder = make_recorder()
@@ -176,7 +160,7 @@ def test_recorder_that_never_began_leaves_nothing_behind(make_recorder, tmp_path
     assert not (tmp_path / 'bag').exists()
 
 
-def test_sigint_closes_the_recording_and_exits_with_code_0(context, domain, source, tmp_path):
+def test_sigint_closes_the_recording_and_exits_with_code_0(context, source, tmp_path):
     publishers = {topic: source.publisher(topic) for topic in STREAMS}
     process = subprocess.Popen(
         [
@@ -189,7 +173,7 @@ def test_sigint_closes_the_recording_and_exits_with_code_0(context, domain, sour
             '-p',
             f'topics:={[topic.name for topic in STREAMS]}',
         ],
-        env={**os.environ, 'ROS_DOMAIN_ID': str(domain)},
+        env={**os.environ, 'ROS_DOMAIN_ID': str(context.get_domain_id())},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -17,6 +17,7 @@ from mount_bags.statement import RECORDER_RECORD, read_statement
 from mount_bags.writer import BagWriter, RecordingError
 from mount_ros.diagnostics import Level
 from mount_ros.scalars import stamp_of
+from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
@@ -58,13 +59,6 @@ def statement_of(folder):
     with (folder / f'{folder.name}_0.mcap').open('rb') as file:
         records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
     return read_statement(records[RECORDER_RECORD])
-
-
-def wait_until(condition, what):
-    limit = time.monotonic() + 30.0
-    while not condition():
-        assert time.monotonic() < limit, f'{what} did not happen'
-        time.sleep(1e-3)
 
 
 def verdict_of(recorder, on_full=OnFull.STOP, **state):

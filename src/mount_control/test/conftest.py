@@ -1,6 +1,4 @@
-"""What the tests share: a force table as an initialisation makes it, controllers, a ROS domain."""
-
-from collections.abc import Iterator
+"""What the tests share: a force table as an initialisation makes it, controllers."""
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_ros.testing import free_domain
 
 # Currents (A) and normal forces (N) of a closing actuator, rounded; the first is the touch of the pads.
 CURRENTS = np.array([0.4725, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])
@@ -45,10 +42,3 @@ def sine():
         return amplitude * np.sin(2.0 * np.pi * frequency * 1e-3 * np.arange(round(duration * 1e3)))
 
     return sampled
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    """A ROS domain that no other test of this machine uses at the same time."""
-    with free_domain() as number:
-        yield number

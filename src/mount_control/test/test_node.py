@@ -1,12 +1,9 @@
 """The node between a driver and an initialisation that the test plays, in the real middleware."""
 
-import gc
 import math
-import time
 
 import numpy as np
 import pytest
-import rclpy
 from lifecycle_msgs.msg import State, Transition
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
@@ -23,9 +20,9 @@ from mount_ros import topics
 from mount_ros.cdr import serialised
 from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level
-from mount_ros.environment import prepare_environment
 from mount_ros.force_table_message import to_message
 from mount_ros.scalars import ScalarsLayout
+from mount_ros.testing import wait_until
 
 LIMIT = 30.0  # s
 MS = 1_000_000  # ns
@@ -95,22 +92,6 @@ class Surroundings:
         self.node.destroy_node()
 
 
-def wait_until(condition, what):
-    limit = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < limit, f'{what}: not within {LIMIT} s'
-        time.sleep(0.002)
-
-
-@pytest.fixture
-def context(domain):
-    prepare_environment()
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain)
-    yield context
-    rclpy.try_shutdown(context=context)
-
-
 @pytest.fixture
 def make_control(context):
     """Return a function that creates a controller node with parameters."""
@@ -128,7 +109,6 @@ def make_control(context):
         node.destroy_node()
     del node
     made.clear()
-    gc.collect()  # until then rclpy keeps the services of a lifecycle node in the graph
 
 
 @pytest.fixture

@@ -24,14 +24,6 @@ def sample(index: int, **changes) -> Measurement:
     return Measurement(index % 65536, index * 1000 % 2**32, **(values | changes))
 
 
-def wait_until(condition, what: str) -> None:
-    """Wait for a condition; fail with a sentence if it does not come true."""
-    limit = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < limit, f'{what}: not within {LIMIT} s'
-        time.sleep(0.002)
-
-
 class FarEnd:
     """Sends measurements and collects setpoints."""
 

@@ -1,6 +1,5 @@
 """The driver as a node: CAN frames on one side, topics of the real middleware on the other."""
 
-import gc
 import itertools
 import math
 import os
@@ -10,9 +9,8 @@ import sys
 import time
 
 import pytest
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from far_end import CODEC, LIMIT, FarEnd, sample, wait_until
+from far_end import CODEC, LIMIT, FarEnd, sample
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.executors import SingleThreadedExecutor
@@ -25,22 +23,13 @@ from mount_driver.link import Arrival
 from mount_driver.node import MountDriver
 from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level
-from mount_ros.environment import prepare_environment
 from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout, stamp_of
+from mount_ros.testing import wait_until
 from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT
 
 MS = 1_000_000
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
-
-
-@pytest.fixture
-def context(domain):
-    prepare_environment()
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=domain)
-    yield context
-    rclpy.try_shutdown(context=context)
 
 
 @pytest.fixture
@@ -60,7 +49,6 @@ def make_driver(context, multicast):
         node.destroy_node()
     del node
     made.clear()
-    gc.collect()  # until then rclpy keeps the services of a lifecycle node in the graph, answered by nobody
 
 
 @pytest.fixture
@@ -288,10 +276,10 @@ def test_a_parameter_outside_its_range_is_refused(make_driver):
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_sends_0_ampere_and_ends_the_process_with_code_0(domain, context, multicast, far, number):
+def test_a_signal_sends_0_ampere_and_ends_the_process_with_code_0(context, multicast, far, number):
     command = [sys.executable, '-m', 'mount_driver.node', '--ros-args', '-p', 'lockstep:=true']
     command += ['-p', f'channel:={multicast[0]}', '-p', f'port:={multicast[1]}']
-    process = subprocess.Popen(command, env=os.environ | {'ROS_DOMAIN_ID': str(domain)})
+    process = subprocess.Popen(command, env=os.environ | {'ROS_DOMAIN_ID': str(context.get_domain_id())})
     commander = Node('commander', context=context)
     try:
         change(commander, Transition.TRANSITION_CONFIGURE)

@@ -1,7 +1,7 @@
 """A simulated actuator with coil, springs and pads, behind the same samples and setpoints as the real one."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numba
 import numpy as np
@@ -13,7 +13,6 @@ from mount_models.actuator.reluctance import ReluctanceActuator, mean_incrementa
 from mount_models.closing import ClosingMechanics, closed_state
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
 from mount_models.specimen import Specimen, default_specimen
-from mount_ros.testing import free_domain
 
 SAMPLE_TIME_NS = 1_000_000
 STEPS_PER_SAMPLE = 10
@@ -129,10 +128,3 @@ def run_ramp():
 @pytest.fixture(scope='session')
 def run_initialisation():
     return initialise
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    """Return a domain id that no other test of this machine uses at the same time."""
-    with free_domain() as number:
-        yield number

@@ -1,10 +1,8 @@
 """The node between electronics that wait for each answer and a lifecycle service."""
 
 import threading
-import time
 
 import pytest
-import rclpy
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
@@ -14,9 +12,9 @@ from rclpy.parameter import Parameter
 from mount_init.node import MountInit
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.environment import prepare_environment
 from mount_ros.force_table_message import from_bytes
 from mount_ros.scalars import ScalarsLayout
+from mount_ros.testing import wait_until
 
 LIMIT = 30.0  # s
 STEP = 1_000_000  # ns
@@ -72,12 +70,10 @@ class Electronics:
 
 
 class Graph:
-    """The node under test, electronics, and a client of its lifecycle, in a domain of their own."""
+    """The node under test, electronics, and a client of its lifecycle, in a context of the tests."""
 
-    def __init__(self, domain, plant, parameters):
-        prepare_environment()
-        self.context = rclpy.Context()
-        rclpy.init(context=self.context, domain_id=domain)
+    def __init__(self, context, plant, parameters):
+        self.context = context
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         self.init = MountInit(context=self.context, parameter_overrides=overrides)
         self.electronics = Electronics(self.context, plant)
@@ -95,7 +91,7 @@ class Graph:
         assert self.change(Transition.TRANSITION_CONFIGURE)
         node = self.init.data_path.node
         path = self.electronics.path.node
-        self.await_true(
+        wait_until(
             lambda: (
                 node.count_publishers('coil_ripple') == 1
                 and path.count_subscribers('coil_ripple') == 1
@@ -104,7 +100,8 @@ class Graph:
                 and node.count_subscribers('current_setpoint') == 2
                 and self.electronics._publisher.get_subscription_count() == 1
                 and node.count_subscribers('air_gap') == 1
-            )
+            ),
+            'the connection of both sides',
         )
 
     def change(self, transition):
@@ -115,12 +112,6 @@ class Graph:
 
     def state(self):
         return self._result(self._state.call_async(GetState.Request())).current_state.id
-
-    def await_true(self, condition):
-        deadline = time.monotonic() + LIMIT
-        while not condition():
-            assert time.monotonic() < deadline, 'the condition was not met in time'
-            self._ending.wait(0.005)
 
     def refusal(self):
         return self.init._refusal
@@ -133,7 +124,6 @@ class Graph:
         self.electronics.close()
         self.init.destroy_node()
         self._client_node.destroy_node()
-        rclpy.try_shutdown(context=self.context)
 
     def _result(self, future):
         done = threading.Event()
@@ -151,13 +141,13 @@ class Graph:
 
 
 @pytest.fixture
-def graph(domain, simulated_actuator):
+def graph(context, simulated_actuator):
     """Return a function that builds the graph; by default in lock-step around a fault-free actuator."""
     made = []
     simulated_actuator().follow(0.0)  # compiled before the node waits for its samples
 
     def make(plant=None, **parameters):
-        made.append(Graph(domain, plant or simulated_actuator(), {'lockstep': True, **parameters}))
+        made.append(Graph(context, plant or simulated_actuator(), {'lockstep': True, **parameters}))
         return made[-1]
 
     yield make
@@ -172,7 +162,7 @@ def test_activation_measures_in_lock_step_and_latches_gaps_and_table(
     g.configure()
     g.electronics.send_sample()
     assert g.change(Transition.TRANSITION_ACTIVATE)
-    g.await_true(lambda: g.electronics.tables and g.electronics.results)
+    wait_until(lambda: g.electronics.tables and g.electronics.results, 'the table and the gaps')
 
     stamps = [stamp // STEP for stamp, _ in g.electronics.setpoints]
     assert stamps == list(range(1, RAMP_LENGTH + 1))
@@ -204,11 +194,11 @@ def test_after_the_ramp_the_node_leaves_the_coil_to_others(graph):
     g.configure()
     g.electronics.send_sample()
     assert g.change(Transition.TRANSITION_ACTIVATE)
-    g.await_true(lambda: g.electronics.stamp == (RAMP_LENGTH + 1) * STEP)
+    wait_until(lambda: g.electronics.stamp == (RAMP_LENGTH + 1) * STEP, 'the end of the ramp')
     for _ in range(20):
         before = g.electronics.stamp
         g.electronics.drive_as_another_node(0.5)
-        g.await_true(lambda before=before: g.electronics.stamp > before)
+        wait_until(lambda before=before: g.electronics.stamp > before, 'the next sample')
     # mount_init is deactivated while another node drives: it must not interfere
     assert g.change(Transition.TRANSITION_DEACTIVATE)
     assert g.state() == State.PRIMARY_STATE_INACTIVE
@@ -220,14 +210,16 @@ def test_a_second_activation_measures_anew(graph, simulated_actuator):
     g.configure()
     g.electronics.send_sample()
     assert g.change(Transition.TRANSITION_ACTIVATE)
-    g.await_true(lambda: len(g.electronics.tables) == 1)
+    wait_until(lambda: len(g.electronics.tables) == 1, 'the first table')
     assert g.change(Transition.TRANSITION_DEACTIVATE)
     number = g.electronics.plant.number
     worn = simulated_actuator(contact_gap=330e-6)
     worn.number = number
     g.electronics.plant = worn
     assert g.change(Transition.TRANSITION_ACTIVATE)
-    g.await_true(lambda: len(g.electronics.results) == 2 and len(g.electronics.tables) == 2)
+    wait_until(
+        lambda: len(g.electronics.results) == 2 and len(g.electronics.tables) == 2, 'the second activation'
+    )
     assert g.electronics.results[1][1][1] == pytest.approx(330e-6, abs=0.2e-6)
     assert g.electronics.results[1][0] == 2 * RAMP_LENGTH * STEP
     assert g.electronics.tables[1].stamp == 2 * RAMP_LENGTH * STEP
@@ -252,7 +244,7 @@ def test_samples_that_stop_end_in_a_refusal_with_zero_current(graph):
     g.configure()
     g.electronics.send_sample()
     assert not g.change(Transition.TRANSITION_ACTIVATE)
-    g.await_true(lambda: len(g.electronics.setpoints) == 1001)
+    wait_until(lambda: len(g.electronics.setpoints) == 1001, '0 A after the last sample')
     assert '1000 of 2750 ripple samples, none in the last 0.1 s' in g.refusal()
     assert g.electronics.setpoints[-2][1] > 1.0
     assert g.electronics.setpoints[-1] == (1000 * STEP, 0.0)
@@ -267,7 +259,7 @@ def test_a_refused_estimate_leaves_no_result_and_zero_current(graph, simulated_a
     assert not g.change(Transition.TRANSITION_ACTIVATE)
     assert g.state() == State.PRIMARY_STATE_INACTIVE
     assert 'contact gap not estimated' in g.refusal()
-    g.await_true(lambda: len(g.electronics.setpoints) == RAMP_LENGTH)
+    wait_until(lambda: len(g.electronics.setpoints) == RAMP_LENGTH, 'the end of the ramp')
     assert g.electronics.setpoints[-1][1] == 0.0
     assert g.electronics.results == []
 
@@ -278,7 +270,7 @@ def test_an_open_coil_is_refused_at_once_and_the_next_activation_may_succeed(gra
     g.electronics.send_sample()
     assert not g.change(Transition.TRANSITION_ACTIVATE)
     assert 'must follow its setpoint' in g.refusal()
-    g.await_true(lambda: g.electronics.setpoints and g.electronics.setpoints[-1][1] == 0.0)
+    wait_until(lambda: g.electronics.setpoints and g.electronics.setpoints[-1][1] == 0.0, '0 A')
     assert len(g.electronics.setpoints) < 100
     mended = simulated_actuator()
     mended.number = g.electronics.plant.number
@@ -300,7 +292,7 @@ def test_while_another_node_drives_the_coil_activation_is_refused(graph):
     other = threading.Thread(target=drive)
     other.start()
     try:
-        g.await_true(lambda: len(g.electronics.setpoints) > 5)
+        wait_until(lambda: len(g.electronics.setpoints) > 5, 'the begin of the ramp')
         assert not g.change(Transition.TRANSITION_ACTIVATE)
     finally:
         stop.set()
@@ -318,10 +310,10 @@ def test_the_end_of_the_process_ends_a_ramp_with_zero_current(graph):
     future = g._change.call_async(
         ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
     )
-    g.await_true(lambda: len(g.electronics.setpoints) == 1000)
+    wait_until(lambda: len(g.electronics.setpoints) == 1000, '1000 setpoints')
     g.init.ending.set()
     assert not g._result(future).success
-    g.await_true(lambda: len(g.electronics.setpoints) == 1001)
+    wait_until(lambda: len(g.electronics.setpoints) == 1001, '0 A after the last sample')
     assert g.electronics.setpoints[-1] == (1000 * STEP, 0.0)
 
 

@@ -75,6 +75,11 @@ class SafeLifecycleNode(LifecycleNode):
             self._leave_active()
         self._release()
 
+    def destroy_node(self) -> None:
+        """Destroy the node at once; rclpy leaves it in the graph until nothing refers to its services."""
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
+
     # Transitions.
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:

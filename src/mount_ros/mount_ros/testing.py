@@ -1,17 +1,30 @@
-"""For tests of nodes: a ROS domain of their own.
+"""For tests of nodes: ROS domains that nobody else uses, one context, one way to wait; a plugin of pytest.
 
 A participant that was killed stays in its domain's graph for some seconds, and other tests may run at
-the same time; so each test takes a domain that nobody else on this machine holds.
+the same time; so tests take domains that nobody else on this machine holds. Creating and removing DDS
+participants by the hundred is slow and now and then stalls within the middleware; so the nodes of all
+tests of a process live in one context, one after the other.
 """
 
 import contextlib
 import fcntl
 import os
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
+import pytest
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+LIMIT = 30.0  # s: what has not happened by then does not happen
 _HIGHEST_DOMAIN = 101
+
+Found = TypeVar('Found')
 
 
 @contextlib.contextmanager
@@ -32,3 +45,48 @@ def free_domain() -> Iterator[int]:
             os.close(handle)
         return
     raise OSError(f'all {_HIGHEST_DOMAIN} ROS domains are held by other tests')
+
+
+def wait_until(condition: Callable[[], Found], what: str, limit: float = LIMIT) -> Found:
+    """Return the first true value of `condition`; fails saying `what` did not happen within `limit` (s)."""
+    end = time.monotonic() + limit
+    while not (found := condition()):
+        if time.monotonic() >= end:
+            pytest.fail(f'{what} did not happen within {limit:g} s')
+        time.sleep(0.002)
+    return found
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """Hold a ROS domain for one test and the processes that it starts."""
+    with free_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def context(_observer: 'Node') -> Iterator['Context']:
+    """Return the context of this process's tests; fails if a test leaves a node behind."""
+    yield _observer.context
+    alone = [(_observer.get_name(), _observer.get_namespace())]
+    wait_until(
+        lambda: _observer.get_node_names_and_namespaces() == alone,
+        f'that only {alone} is left of {_observer.get_node_names_and_namespaces()}',
+    )
+
+
+@pytest.fixture(scope='session')
+def _observer() -> Iterator['Node']:
+    """A node in a context and domain of this process that sees which others are there."""
+    import rclpy
+
+    from mount_ros.environment import prepare_environment
+
+    prepare_environment()
+    context = rclpy.Context()
+    with free_domain() as number:
+        rclpy.init(context=context, domain_id=number)
+        node = rclpy.create_node('observer', context=context, namespace='test', enable_rosout=False)
+        yield node
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)

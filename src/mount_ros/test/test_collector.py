@@ -12,6 +12,7 @@ from mount_ros.data_path import DataThread
 from mount_ros.message_types import message_class
 from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout, stamp_of
+from mount_ros.testing import wait_until
 from mount_ros.topics import AIR_GAP, CURRENT_SETPOINT, DISPLACEMENT
 
 LIMIT = 30.0  # s
@@ -53,20 +54,20 @@ def sender(owner):
     return Sender(owner)
 
 
-def connect(collector, sender, wait_until, *topics):
+def connect(collector, sender, *topics):
     ends = [sender.open(topic) for topic in topics]
     wait_until(
         lambda: not collector.unmatched() and all(end.get_subscription_count() for end in ends), 'connection'
     )
 
 
-def test_messages_of_several_topics_come_in_the_order_of_their_arrival(collector, sender, wait_until):
+def test_messages_of_several_topics_come_in_the_order_of_their_arrival(collector, sender):
     received = []
     for topic in (DISPLACEMENT, CURRENT_SETPOINT):
         collector.collect(
             topic, lambda raw, arrival, sent, topic=topic: received.append((arrival, topic, stamp_of(raw)))
         )
-    connect(collector, sender, wait_until, DISPLACEMENT, CURRENT_SETPOINT)
+    connect(collector, sender, DISPLACEMENT, CURRENT_SETPOINT)
     # All of it is in the queues before the first batch is taken: one topic after the other would be wrong.
     expected = []
     for stamp in range(50):
@@ -83,10 +84,10 @@ def test_messages_of_several_topics_come_in_the_order_of_their_arrival(collector
     assert turns > 20, 'the topics must come mixed, as they were sent'
 
 
-def test_times_of_sending_and_arrival_are_those_of_the_system_clock(collector, sender, wait_until):
+def test_times_of_sending_and_arrival_are_those_of_the_system_clock(collector, sender):
     received = []
     collector.collect(DISPLACEMENT, lambda raw, arrival, sent: received.append((sent, arrival)))
-    connect(collector, sender, wait_until, DISPLACEMENT)
+    connect(collector, sender, DISPLACEMENT)
     collector.start()
     before = time.time_ns()
     sender.send(DISPLACEMENT, 1)
@@ -95,7 +96,7 @@ def test_times_of_sending_and_arrival_are_those_of_the_system_clock(collector, s
     assert before <= sent <= arrival <= time.time_ns()
 
 
-def test_latched_messages_reach_a_collector_that_comes_later(owner, sender, wait_until):
+def test_latched_messages_reach_a_collector_that_comes_later(owner, sender):
     end = sender.open(AIR_GAP)
     sender.send(AIR_GAP, 7)
     late, received = Collector(owner), []
@@ -108,7 +109,7 @@ def test_latched_messages_reach_a_collector_that_comes_later(owner, sender, wait
         late.stop()
 
 
-def test_stopping_takes_what_is_there_and_ends_the_thread(owner, collector, sender, wait_until):
+def test_stopping_takes_what_is_there_and_ends_the_thread(owner, collector, sender):
     received, witnessed, entered, released = [], [], threading.Event(), threading.Event()
 
     def wait_and_receive(raw, *_):
@@ -150,7 +151,7 @@ def test_topics_without_a_publisher_are_named_with_their_namespace(collector):
     assert collector.unmatched() == ['/mount_right/air_gap', '/mount_right/displacement']
 
 
-def test_a_receiver_that_raises_costs_its_own_message_only(collector, sender, wait_until, capfd):
+def test_a_receiver_that_raises_costs_its_own_message_only(collector, sender, capfd):
     received = []
 
     def choke(raw, *_):
@@ -159,7 +160,7 @@ def test_a_receiver_that_raises_costs_its_own_message_only(collector, sender, wa
         received.append(stamp_of(raw))
 
     collector.collect(DISPLACEMENT, choke)
-    connect(collector, sender, wait_until, DISPLACEMENT)
+    connect(collector, sender, DISPLACEMENT)
     collector.start()
     for stamp in range(4):
         sender.send(DISPLACEMENT, stamp)
@@ -167,7 +168,7 @@ def test_a_receiver_that_raises_costs_its_own_message_only(collector, sender, wa
     assert 'a message was not taken: ValueError: indigestible' in capfd.readouterr().err
 
 
-def test_in_a_shared_thread_everything_is_taken_up_to_the_end(context, owner, sender, wait_until):
+def test_in_a_shared_thread_everything_is_taken_up_to_the_end(context, owner, sender):
     received, threads = [], set()
 
     def receive(raw, *_):
@@ -176,7 +177,7 @@ def test_in_a_shared_thread_everything_is_taken_up_to_the_end(context, owner, se
 
     collector = Collector(owner, thread=DataThread(context))
     collector.collect(DISPLACEMENT, receive)
-    connect(collector, sender, wait_until, DISPLACEMENT)
+    connect(collector, sender, DISPLACEMENT)
     collector.start()
     for stamp in range(200):
         sender.send(DISPLACEMENT, stamp)

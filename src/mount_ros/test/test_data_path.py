@@ -7,6 +7,7 @@ from rclpy.node import Node
 
 from mount_ros.data_path import DataPath, DataThread
 from mount_ros.scalars import ScalarsLayout
+from mount_ros.testing import wait_until
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
 
 LIMIT = 30.0  # s
@@ -48,7 +49,7 @@ def make_end(context):
 
 
 @pytest.fixture
-def pair(make_end, wait_until):
+def pair(make_end):
     """A sender and a receiver of the displacement, connected, and the function that sends a stamp."""
     sender, receiver = make_end('sender'), make_end('receiver')
     publish = sender.path.sender(DISPLACEMENT)
@@ -59,7 +60,7 @@ def pair(make_end, wait_until):
     return receiver, lambda stamp: publish(sender.layout.pack(stamp, (0.0,)))
 
 
-def test_messages_arrive_in_the_thread_of_the_data(pair, wait_until):
+def test_messages_arrive_in_the_thread_of_the_data(pair):
     receiver, send = pair
     for stamp in range(20):
         send(stamp)
@@ -68,13 +69,13 @@ def test_messages_arrive_in_the_thread_of_the_data(pair, wait_until):
     assert receiver.threads == {'data'}
 
 
-def test_data_arrives_while_the_owner_serves_nothing(pair, wait_until):
+def test_data_arrives_while_the_owner_serves_nothing(pair):
     receiver, send = pair  # nobody spins the owners' nodes here
     send(1)
     wait_until(lambda: receiver.stamps == [1], 'arrival')
 
 
-def test_a_resting_path_still_takes_what_comes_and_a_woken_one_serves_at_once_again(pair, wait_until):
+def test_a_resting_path_still_takes_what_comes_and_a_woken_one_serves_at_once_again(pair):
     receiver, send = pair
     receiver.path.rest()
     receiver.path.rest()  # a second time changes nothing
@@ -90,7 +91,7 @@ def test_a_resting_path_still_takes_what_comes_and_a_woken_one_serves_at_once_ag
     assert receiver.threads == {'data'}
 
 
-def test_what_came_during_rest_is_not_lost_by_waking(pair, wait_until):
+def test_what_came_during_rest_is_not_lost_by_waking(pair):
     receiver, send = pair
     for turn in range(10):
         receiver.path.rest()
@@ -117,7 +118,7 @@ def test_a_path_that_was_never_started_neither_rests_nor_hangs(make_end):
 
 
 @pytest.mark.parametrize('resting', [False, True])
-def test_a_callback_that_raises_costs_its_own_message_only(pair, wait_until, capfd, resting):
+def test_a_callback_that_raises_costs_its_own_message_only(pair, capfd, resting):
     receiver, send = pair
     take = receiver.take
 
@@ -138,7 +139,7 @@ def test_a_callback_that_raises_costs_its_own_message_only(pair, wait_until, cap
     assert 'message of displacement not used: ValueError: indigestible' in capfd.readouterr().err
 
 
-def test_the_end_does_not_hang_after_a_callback_that_raised(make_end, wait_until):
+def test_the_end_does_not_hang_after_a_callback_that_raised(make_end):
     sender, receiver = make_end('sender'), make_end('receiver')
     publish = sender.path.sender(DISPLACEMENT)
     raised = threading.Event()
@@ -163,7 +164,7 @@ def test_topics_without_another_side_are_named_once_and_in_order(make_end):
     assert end.path.unmatched() == ['/air_gap', '/coil_ripple', '/current_setpoint']
 
 
-def test_nodes_that_share_a_thread_are_served_until_the_last_one_leaves(context, make_end, wait_until):
+def test_nodes_that_share_a_thread_are_served_until_the_last_one_leaves(context, make_end):
     thread = DataThread(context)
     one, other, sender = make_end('one', thread), make_end('other', thread), make_end('sender', thread)
     publish = sender.path.sender(DISPLACEMENT)
@@ -185,7 +186,7 @@ def test_nodes_that_share_a_thread_are_served_until_the_last_one_leaves(context,
     assert not [t for t in threading.enumerate() if t.name == 'data']
 
 
-def test_a_thread_serves_again_after_its_last_node_has_left(context, make_end, wait_until):
+def test_a_thread_serves_again_after_its_last_node_has_left(context, make_end):
     thread = DataThread(context)
     sender = make_end('sender')
     publish = sender.path.sender(DISPLACEMENT)
@@ -199,7 +200,7 @@ def test_a_thread_serves_again_after_its_last_node_has_left(context, make_end, w
         end.path.stop()
 
 
-def test_attended_work_is_done_between_messages_and_without_any(pair, wait_until):
+def test_attended_work_is_done_between_messages_and_without_any(pair):
     receiver, send = pair
     doing = []
 
@@ -219,7 +220,7 @@ def test_attended_work_is_done_between_messages_and_without_any(pair, wait_until
     assert set(doing) == {'data'}
 
 
-def test_work_that_has_something_to_do_is_done_again_before_the_next_message(make_end, wait_until):
+def test_work_that_has_something_to_do_is_done_again_before_the_next_message(make_end):
     end, order = make_end('busy'), []
     publish = end.path.sender(DISPLACEMENT)
     end.path.subscribe(DISPLACEMENT, lambda raw: order.append('message'))
@@ -242,7 +243,7 @@ def test_work_that_has_something_to_do_is_done_again_before_the_next_message(mak
     assert order == ['work'] * 5 + ['message']
 
 
-def test_work_that_raises_ends_neither_the_thread_nor_the_service(pair, wait_until, capfd):
+def test_work_that_raises_ends_neither_the_thread_nor_the_service(pair, capfd):
     receiver, send = pair
 
     def work():

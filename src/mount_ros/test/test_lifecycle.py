@@ -13,6 +13,7 @@ from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level, Verdict
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.qos import publisher_qos
+from mount_ros.testing import wait_until
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT
 
 LIMIT = 30.0  # s
@@ -97,7 +98,7 @@ def probe(context, serve):
 
 
 @pytest.fixture
-def operator(context, serve, probe, wait_until):
+def operator(context, serve, probe):
     operator = Operator(context)
     serve(operator.node)
     wait_until(lambda: operator.heard(Level.OK, 'inactive'), 'first diagnostics')
@@ -143,9 +144,7 @@ def test_a_second_activation_is_refused_and_the_node_stays_active(probe, operato
     ],
 )
 @pytest.mark.parametrize('step', ['configure', 'activate'])
-def test_a_refused_step_says_why_and_can_be_tried_again(
-    probe, operator, wait_until, capfd, step, error, sentence
-):
+def test_a_refused_step_says_why_and_can_be_tried_again(probe, operator, capfd, step, error, sentence):
     steps = {'configure': (CONFIGURE, UNCONFIGURED), 'activate': (ACTIVATE, INACTIVE)}
     transition, state_after = steps[step]
     if step == 'activate':
@@ -214,7 +213,7 @@ def test_closing_leaves_the_active_state_first(probe, operator, transitions, ste
     assert not probe.active
 
 
-def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(probe, operator, wait_until):
+def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(probe, operator):
     operator.change(CONFIGURE)
     operator.change(ACTIVATE)
     wait_until(lambda: operator.heard(Level.OK, 'at work'), 'diagnostics of the active node')
@@ -224,7 +223,7 @@ def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(pro
     assert figures == {'turns': '3', 'state': 'active', 'unmatched': '/mount_right/displacement'}
 
 
-def test_a_change_of_the_verdict_is_told_at_once_and_no_change_once_a_second(probe, operator, wait_until):
+def test_a_change_of_the_verdict_is_told_at_once_and_no_change_once_a_second(probe, operator):
     operator.change(CONFIGURE)
     operator.change(ACTIVATE)
     before = probe._diagnostics._beats  # ten in a second

@@ -6,12 +6,13 @@ from pathlib import Path
 from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level
 from mount_ros.scalars import ScalarsLayout
+from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
 README = Path(__file__).resolve().parents[1] / 'README.md'
 
 
-def test_the_example_node_warns_of_what_it_watches(context, serve, wait_until):
+def test_the_example_node_warns_of_what_it_watches(context, serve):
     example = {'__name__': 'example'}
     exec(re.search(r'```python\n(.*?)```', README.read_text(), re.DOTALL)[1], example)
     watch = example['PeakWatch'](context=context)

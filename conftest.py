@@ -1,0 +1,3 @@
+"""What the tests of all packages share: the fixtures of `mount_ros.testing`."""
+
+pytest_plugins = ['mount_ros.testing']
