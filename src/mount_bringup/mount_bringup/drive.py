@@ -25,7 +25,6 @@ from mount_bringup.core_chain import Parameters, control_parameters
 from mount_bringup.core_run import run_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.evaluation import load_drive
-from mount_bringup.figure import draw_drive
 from mount_bringup.graph import LOCKSTEP_TOGETHER, RECORDER, SIM, SIMULATED, URGENT, GraphSettings
 from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
@@ -81,6 +80,8 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
 def _evaluate(
     order: DriveOrder, folder: RunFolder, recording: Recording, run: dict[str, Any], console: Console
 ) -> dict[str, Any]:
+    from mount_bringup.figure import draw_drive  # after the drive: what draws takes a second to load
+
     drive_data = load_drive(recording, run['excitation_start'])
     figures = summarise(recording, drive_data, order.parameters, run)
     control = control_parameters(order.parameters)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from mount_bags.audit import audit
 from mount_bags.reading import Recording
@@ -86,8 +85,10 @@ def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCu
     moment, without any delay; so the error holds phase and delay as well as force. NaN if damping was
     never on.
     """
+    from scipy.signal import lfilter  # here, for it takes longer to load than all the rest
+
     band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, SAMPLE_TIME)
-    velocity = signal.lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], drive.true_velocity)
+    velocity = lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], drive.true_velocity)
     wanted = damper.force(velocity)
     places = np.clip(np.searchsorted(drive.true_time, drive.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1)
     on = places[drive.damping_active]

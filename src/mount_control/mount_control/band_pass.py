@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from mount_models.compiled import compiled
 
@@ -33,15 +32,16 @@ def design(eigenfrequency: float, quality: float, lead_time: float, sample_time:
     H(s) = (w0/Q) s / (s^2 + (w0/Q) s + w0^2): gain 1 and phase 0 at the eigenfrequency.
     """
     w0 = 2.0 * math.pi * eigenfrequency
-    prewarped_rate = w0 / (2.0 * math.tan(0.5 * w0 * sample_time))
-    b, a = signal.bilinear([w0 / quality, 0.0], [1.0, w0 / quality, w0 * w0], fs=prewarped_rate)
+    warped = math.tan(0.5 * w0 * sample_time)  # s becomes (w0 / warped) (z - 1) / (z + 1)
+    bandwidth = warped / quality
+    scale = 1.0 / (1.0 + bandwidth + warped * warped)
     # A sine A sin(p) has the band velocity A w0 cos(p - f) because the difference of two samples
     # stands half a sample back, f = w0 Ts/2. Wanted is A w0 cos(p + l), l = w0 lead_time.
     lead, half_sample = w0 * lead_time, 0.5 * w0 * sample_time
     return BandPass(
-        gain=float(b[0]),
-        a1=float(a[1]),
-        a2=float(a[2]),
+        gain=bandwidth * scale,
+        a1=2.0 * (warped * warped - 1.0) * scale,
+        a2=(1.0 - bandwidth + warped * warped) * scale,
         sample_time=sample_time,
         from_velocity=math.cos(lead) / math.cos(half_sample),
         from_displacement=-w0 * math.sin(lead + half_sample) / math.cos(half_sample),

@@ -29,6 +29,16 @@ def test_gain_is_1_and_phase_0_at_the_eigenfrequency(frequency, quality):
     assert response == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.parametrize('frequency', [2.0, 8.0, 20.0])
+@pytest.mark.parametrize('quality', [0.5, 3.0])
+def test_the_coefficients_are_those_of_the_prewarped_bilinear_transform(frequency, quality):
+    w0 = 2.0 * math.pi * frequency
+    rate = w0 / (2.0 * math.tan(0.5 * w0 * SAMPLE_TIME))
+    b, a = signal.bilinear([w0 / quality, 0.0], [1.0, w0 / quality, w0 * w0], fs=rate)
+    filtered = band_pass.design(frequency, quality, 0.0019, SAMPLE_TIME)
+    assert (filtered.gain, filtered.a1, filtered.a2) == pytest.approx((b[0], a[1], a[2]), rel=1e-12)
+
+
 def test_25_hz_passes_with_a_third_only():
     # 0.3358 in continuous time; the bilinear transform bends the frequency axis there by 0.2 %
     gain = abs(_response(band_pass.design(8.0, 1.0, 0.0, SAMPLE_TIME), 25.0))

@@ -13,8 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
-from scipy.interpolate import CubicSpline
 
 LOWEST_RATE = 50.0  # Hz, chosen: 2.5 times the 20 Hz below which the engine moves on its mounts
 LONGEST_GAP = 0.125  # s: one period of the eigenfrequency cannot be interpolated
@@ -80,14 +78,17 @@ def resample(recorded: RecordedSignal, step_time: float) -> NDArray[np.float64]:
     First onto an even grid at its own rate, then band-limited (polyphase) to at least 1 kHz, then by a
     cubic spline to the step, where no more than 1/20 of the rate is in use.
     """
+    from scipy.interpolate import CubicSpline  # here, for they take longer to load than all the rest
+    from scipy.signal import resample_poly
+
     rate = recorded.rate
     count = math.floor(recorded.times[-1] * rate + 1e-9) + 1
     even = CubicSpline(recorded.times, recorded.values - np.mean(recorded.values))(np.arange(count) / rate)
     if rate * step_time > 1.0:
         ratio = Fraction(1.0 / (step_time * rate)).limit_denominator(1000)
-        return signal.resample_poly(even, ratio.numerator, ratio.denominator)
+        return resample_poly(even, ratio.numerator, ratio.denominator)
     factor = max(1, math.ceil(1000.0 / rate))
-    fine = signal.resample_poly(even, factor, 1)
+    fine = resample_poly(even, factor, 1)
     fine_times = np.arange(len(fine)) / (rate * factor)
     steps = np.arange(0.0, recorded.times[-1], step_time)
     return CubicSpline(fine_times, fine)(steps)
