@@ -62,6 +62,7 @@ def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words)
         (('--scenario', 'race'), ("scenario 'race' is unknown", 'motorway, bench, recorded')),
         (('--scenario', 'recorded'), ('needs a file',)),
         (('--set', 'mount_control.quality=50'), ('quality (50', '0.3 .. 5')),
+        (('--set', 'mount_control.quality=5e1'), ('quality (50', '0.3 .. 5')),
         (('--set', 'mount_control.qualty=1'), ("'qualty' is no parameter of mount_control", 'quality')),
         (('--set', 'mount_kontrol.quality=1'), ("'mount_kontrol' is no node",)),
         (('--set', 'mount_control.damper=soft'), ("'soft'", 'viscous_2000')),

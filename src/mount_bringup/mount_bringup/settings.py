@@ -1,5 +1,6 @@
 """Parameters of the nodes as given by the user: names known, types as declared, before a node starts."""
 
+import contextlib
 import difflib
 from collections.abc import Mapping
 from typing import Any
@@ -57,8 +58,9 @@ def _known_name(node: str, name: str, known: Mapping[str, Any]) -> str:
 
 
 def _typed(name: str, value: Any, default: Any) -> Any:
-    if isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
+    if isinstance(default, float) and not isinstance(value, bool):
+        with contextlib.suppress(TypeError, ValueError):
+            return float(value)  # of 3e-5 too, which is text in YAML
     if not isinstance(value, type(default)):
         raise ParameterError(
             f'{name} must be a {type(default).__name__} such as {default!r}; instead received {value!r}'
