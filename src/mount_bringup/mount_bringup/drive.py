@@ -2,11 +2,8 @@
 
 import math
 import platform
-import signal
 import time
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from importlib import metadata
@@ -24,6 +21,7 @@ from mount_bags.writer import BagWriter
 from mount_bringup.core_chain import Parameters, control_parameters
 from mount_bringup.core_run import run_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
+from mount_bringup.ending_signals import ending_signals
 from mount_bringup.evaluation import load_drive
 from mount_bringup.figure import draw_drive
 from mount_bringup.graph import LOCKSTEP_TOGETHER, RECORDER, SIM, SIMULATED, URGENT, GraphSettings
@@ -105,7 +103,7 @@ def _drive_graph(
         priority=order.priority,
     )
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
-    with domain_lock(order.domain, order.namespace), _interrupting(supervisor):
+    with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
         try:
             with console.status('starting') as status:
                 supervisor.start(lambda all_parameters: _session(order, all_parameters), status.update)
@@ -173,19 +171,6 @@ def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> di
         'latency_median_s': float('nan'),
         'latency_p99_s': float('nan'),
     }
-
-
-@contextmanager
-def _interrupting(supervisor: Supervisor) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end the drive in order instead of tearing it."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    for number in before:
-        signal.signal(number, lambda *_: supervisor.interrupt())
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _progress(console: Console) -> Progress:
