@@ -9,9 +9,10 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def ending_signals(end: Callable[[], None]) -> Iterator[None]:
-    """Call `end` on SIGINT, SIGTERM and SIGHUP while the context lasts; what is ignored stays ignored."""
+    """Call `end` on SIGINT, SIGTERM and SIGHUP while the context lasts."""
     before = {number: signal.getsignal(number) for number in _ENDING}
-    before = {number: handler for number, handler in before.items() if handler is not signal.SIG_IGN}
+    if before[signal.SIGHUP] is signal.SIG_IGN:
+        del before[signal.SIGHUP]  # nohup: the run outlives its terminal
     for number in before:
         signal.signal(number, lambda *_: end())
     try:
