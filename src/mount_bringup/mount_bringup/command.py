@@ -118,13 +118,14 @@ def drive(
     }
     sim = parameters.setdefault('mount_sim', {})
     sim.update({name: value for name, value in given.items() if value is not None})
-    recorder = parameters.setdefault('mount_recorder', {})
-    recorder.update(on_full=on_full, **recorder_options(split or [], snapshot))
+    recorder = recorder_options(split or [], snapshot)
+    if on_full != 'stop':
+        recorder['on_full'] = on_full
+    if recorder:
+        parameters.setdefault('mount_recorder', {}).update(recorder)
     parameters = checked_settings(parameters)
-    if core and parameters['mount_recorder'].get('snapshot'):
-        raise typer.BadParameter(
-            '--snapshot needs the recorder; --core has no nodes, so leave one of them out'
-        )
+    if core and parameters.get('mount_recorder', {}).get('snapshot'):
+        raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
     order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority)

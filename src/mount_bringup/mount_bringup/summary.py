@@ -74,8 +74,8 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
         return 'No event came, so no snapshot was saved; m or space sets one by hand in real time.'
     noun = 'snapshot was' if count == 1 else 'snapshots were'
     return (
-        f'{count} {noun} saved, up to {parameters.snapshot:g} s before and {parameters.snapshot_after:g} s after '
-        'an event; figures of the drive need a full recording, so there are none.'
+        f'{count} {noun} saved, up to {parameters.snapshot:g} s before an event and '
+        f'{parameters.snapshot_after:g} s after it; figures of the drive need a full recording.'
     )
 
 

@@ -118,11 +118,12 @@ class Supervisor:
 
         def set_mark() -> None:
             if client.service_is_ready():
-                client.call_async(Trigger.Request()).add_done_callback(
-                    lambda answer: say(answer.result().message)
-                )
+                client.call_async(Trigger.Request()).add_done_callback(lambda call: say(told(call.result())))
             else:
                 say('no mark was set: the recorder is not there yet')
+
+        def told(answer: Trigger.Response) -> str:
+            return 'marked' if answer.success else f'no mark was set: {answer.message}'
 
         return set_mark
 
