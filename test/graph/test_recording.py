@@ -69,7 +69,7 @@ def samples(publishers, indices):
             publishers[topic].publish(ScalarsLayout(topic).pack(BEGIN + index * PERIOD, [1e-6 * index]))
 
 
-def test_record_holds_all_that_was_published_in_several_files_with_the_mark(command, source):
+def test_record_holds_all_that_was_published_in_several_files_with_the_mark(source, command):
     process, publishers = start_record(command, source, '--split', '500MB', '--split', '1s')
     samples(publishers, range(COUNT))
     publishers[EVENT].publish(String(data='a bump'))
@@ -86,7 +86,7 @@ def test_record_holds_all_that_was_published_in_several_files_with_the_mark(comm
     assert [mark.text for mark in read_marks(recording['event'])] == ['a bump']
 
 
-def test_record_ends_with_code_1_where_samples_are_missing(command, source):
+def test_record_ends_with_code_1_where_samples_are_missing(source, command):
     process, publishers = start_record(command, source)
     samples(publishers, [0, 1, 4])
     code, output = end_record(process)
@@ -94,7 +94,7 @@ def test_record_ends_with_code_1_where_samples_are_missing(command, source):
     assert 'Lost: 2 of ' in output
 
 
-def test_a_snapshot_without_an_event_saves_nothing_and_says_so(command, source):
+def test_a_snapshot_without_an_event_saves_nothing_and_says_so(source, command):
     process, _ = start_record(command, source, '--snapshot', '5s')
     code, output = end_record(process)
     assert code == 0, output
@@ -102,7 +102,7 @@ def test_a_snapshot_without_an_event_saves_nothing_and_says_so(command, source):
     assert not (command.folder / 'bag').exists()
 
 
-def test_a_key_press_marks_and_sets_a_snapshot_off(command, source):
+def test_a_key_press_marks_and_sets_a_snapshot_off(source, command):
     keys, terminal = pty.openpty()
     process, publishers = start_record(command, source, '--snapshot', '60s', stdin=terminal)
     samples(publishers, range(10))
