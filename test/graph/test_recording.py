@@ -3,6 +3,7 @@
 import os
 import pty
 import signal
+import subprocess
 import threading
 import time
 
@@ -37,7 +38,7 @@ def source(context):
     node.destroy_node()
 
 
-def start_record(command, source, *options, stdin=None):
+def start_record(command, source, *options, stdin=subprocess.DEVNULL):
     """Start `record` in the domain of `source` and return it once it listens."""
     publishers = {topic: source.publisher(topic) for topic in (DISPLACEMENT, CURRENT_SETPOINT, EVENT)}
     domain = str(source.node.context.get_domain_id())
