@@ -96,7 +96,7 @@ class _LoneRecorder:
             namespace=order.namespace,
             parameter_overrides=[Parameter(name, value=value) for name, value in values.items()],
         )
-        self._node.get_logger().set_level(LoggingSeverity.WARN)  # this command speaks for it
+        self._node.get_logger().set_level(LoggingSeverity.FATAL)  # this command speaks for it
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self._node)
         self._ending = threading.Event()

@@ -67,11 +67,11 @@ def record(
     )
     console = Console()
     outcome = run_record(order, console)
-    sound = [_told(folder, console) for folder in outcome.folders]
-    if not sound:
-        console.print('no event came, so no snapshot was saved')
     if outcome.failure:
-        console.print(f'[yellow]note[/yellow] {outcome.failure}', soft_wrap=True, highlight=False)
+        _print('note', outcome.failure, console)
+    sound = [_told(folder, console) for folder in outcome.folders]
+    if not sound and not outcome.failure:
+        console.print('no event came, so no snapshot was saved')
     if outcome.failure or outcome.lost or not all(sound):
         raise typer.Exit(1)
 
