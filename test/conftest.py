@@ -49,10 +49,11 @@ class Command:
         out = self.folder / f'run_{self._runs}'
         return self.start('drive', '--out', str(out), *options), out
 
-    def start(self, *arguments: str) -> subprocess.Popen[str]:
-        """Start the command."""
+    def start(self, *arguments: str, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
+        """Start the command; `stdin` is a file descriptor."""
         return subprocess.Popen(
             [str(Path(sys.executable).parent / 'engine-mount'), *arguments],
+            stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -67,8 +68,8 @@ def command(tmp_path: Path, domain: int) -> Iterator[Command]:
     started: list[subprocess.Popen[str]] = []
 
     class Watched(Command):
-        def start(self, *arguments: str) -> subprocess.Popen[str]:
-            started.append(super().start(*arguments))
+        def start(self, *arguments: str, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
+            started.append(super().start(*arguments, stdin=stdin))
             return started[-1]
 
     yield Watched(tmp_path, domain)

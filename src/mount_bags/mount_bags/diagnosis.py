@@ -31,7 +31,8 @@ class RecorderState:
     free: int = LEAST_FREE
     rate: float = 0.0
     overflowed: Mapping[str, int] = field(default_factory=dict)
-    marks: int = 0
+    marks: int = 0  # set by the recorder itself
+    events: int = 0  # all that came on `event`
     snapshot: SnapshotFigures | None = None
 
 
@@ -97,6 +98,7 @@ def _figures(state: RecorderState) -> dict[str, object]:
         'bytes_per_second': round(state.rate),
         'last_stamp': max((watch.last_stamp for watch in state.watches.values()), default=0),
         'marks': state.marks,
+        'events': state.events,
         **_snapshot_figures(state.snapshot),
         **{f'lost.{topic}': count for topic, count in state.overflowed.items()},
         **{f'publishers.{topic}': count for topic, count in state.publishers.items()},

@@ -14,11 +14,10 @@ from mount_bags.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
 from mount_bags.diagnosis import OnFull, RecorderState, judge
 from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time
 from mount_bags.offered_qos import OfferedQos
-from mount_bags.recorder_parameters import RecorderParameters
+from mount_bags.recorder_parameters import RecorderParameters, split_of
 from mount_bags.recording import Recorder
 from mount_bags.snapshot import Snapshot, SnapshotRule
 from mount_bags.space import SpaceGuard
-from mount_bags.split import SplitRule, checked_rule
 from mount_bags.watching import watch_topic
 from mount_bags.writer import BagWriter, RecordingError
 from mount_ros.cdr import serialised
@@ -51,6 +50,7 @@ class MountRecorder(SafeLifecycleNode):
         self._marks: AutomaticMarks | None = None
         self._subscriptions_by_topic: dict[str, Subscription] = {}
         self._on_full = OnFull.STOP
+        self._event = EVENT.name
         self._announced_failure = ''
         self._begun_at = 0.0
         self._mark_service = self.create_service(Trigger, '~/mark', self._on_mark)
@@ -68,7 +68,9 @@ class MountRecorder(SafeLifecycleNode):
         if shortage := self._space.shortage():
             raise RecordingError(f'recording {folder} cannot be started: {shortage}')
         data_path = self.open_collector()
-        self._sink = _sink(folder, parameters, data_path.node.resolve_topic_name(EVENT.name), topics)
+        event = data_path.node.resolve_topic_name(EVENT.name)
+        self._sink = _sink(folder, parameters, event, topics)
+        self._event = event
         self._send_event = data_path.sender(EVENT)
         self._marks = AutomaticMarks(partial(self._publish_automatic, data_path), kinds)
         self._recorder = Recorder(self._sink, space=self._space, on_loss=self._mark_loss)
@@ -118,6 +120,7 @@ class MountRecorder(SafeLifecycleNode):
             figures.file_size / elapsed if elapsed > 1.0 else 0.0,
             recorder.overflowed(),
             self._marks.sent if self._marks is not None else 0,
+            recorder.received_on(self._event),
             sink.figures() if isinstance(sink, Snapshot) else None,
         )
         return judge(state, self._on_full)
@@ -190,8 +193,7 @@ def main() -> None:
 def _sink(
     folder: Path, parameters: RecorderParameters, event: str, topics: list[Topic]
 ) -> BagWriter | Snapshot:
-    split = checked_rule(SplitRule(parameters.split_size, round(1e9 * parameters.split_duration)))
-    open_writer = partial(BagWriter, split=split)
+    open_writer = partial(BagWriter, split=split_of(parameters))
     if not parameters.snapshot:
         return open_writer(folder)
     if EVENT not in topics:

@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 from mount_bags.automatic_marks import MarkKind
 from mount_bags.snapshot import AFTER, MEMORY
 from mount_bags.space import RESERVE
+from mount_bags.split import SplitRule, checked_rule
 from mount_models.quantity import Quantity
 
 _PETABYTE = 10**15
@@ -33,3 +34,8 @@ class RecorderParameters(NamedTuple):
         str, Quantity('words', 'which events are marked without being asked; empty: none')
     ] = _ALL_KINDS
     mark_text: Annotated[str, Quantity('text', 'text of the marks that the service sets')] = ''
+
+
+def split_of(parameters: RecorderParameters) -> SplitRule:
+    """Return the limits of a file; raises `SplitError`."""
+    return checked_rule(SplitRule(parameters.split_size, round(1e9 * parameters.split_duration)))

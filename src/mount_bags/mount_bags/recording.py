@@ -180,6 +180,11 @@ class Recorder:
         """Return how many messages of each topic did not fit into the queue, where there are any."""
         return {name: entry.overflowed for name, entry in self._receptions.items() if entry.overflowed}
 
+    def received_on(self, topic: str) -> int:
+        """Return how many messages of `topic` came since `begin`."""
+        entry = self._receptions.get(topic)
+        return entry.received if entry is not None else 0
+
     @property
     def last_stamp(self) -> int:
         """The latest stamp of all watched topics, ns."""

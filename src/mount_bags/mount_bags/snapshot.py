@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -46,6 +47,17 @@ class _Announced:
     type: str
     offers: Sequence[OfferedQos] | Offers
     latched: bool
+
+
+def snapshot_folder(first: Path, number: int) -> Path:
+    """Return the folder of a snapshot, numbered from 1: `first`, `first`_2, `first`_3, ..."""
+    return first if number == 1 else first.with_name(f'{first.name}_{number}')
+
+
+def saved_snapshots(first: Path) -> list[Path]:
+    """Return the folders of the snapshots that a recorder with the folder `first` has saved."""
+    folders = (snapshot_folder(first, number) for number in count(1))
+    return list(takewhile(Path.exists, folders))
 
 
 class Snapshot:
@@ -184,9 +196,7 @@ class Snapshot:
             self._latched[item[0]] = item
 
     def _begin_recording(self) -> None:
-        number = len(self.folders) + 1
-        folder = self.folder if number == 1 else self.folder.with_name(f'{self.folder.name}_{number}')
-        self._guard(partial(self._open, folder))
+        self._guard(partial(self._open, snapshot_folder(self.folder, len(self.folders) + 1)))
         begin = self._ring[0][2]
         for topic, raw, _, sent in self._latched.values():
             self._store((topic, raw, begin, sent))

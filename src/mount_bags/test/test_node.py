@@ -240,6 +240,7 @@ def test_marks_by_service_by_others_and_by_itself_are_recorded(make_recorder, so
         publisher.publish(sample(DISPLACEMENT, index))
     wait_until(lambda: recorder.judge().figures['received'] == 6, 'all received')
     assert recorder.judge().figures['marks'] == 1
+    wait_until(lambda: recorder.judge().figures['events'] == 3, 'the automatic mark')
     executor.shutdown()
     recorder.trigger_deactivate()
     marks = marks_of(tmp_path / 'bag')

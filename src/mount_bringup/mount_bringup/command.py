@@ -14,6 +14,7 @@ from mount_bringup import (
     compare_command,
     cut_command,
     merge_command,
+    record_command,
     recover_command,
     replay_command,
 )
@@ -43,6 +44,8 @@ def _top() -> None:
 `engine-mount drive --scenario bench --lockstep --duration 10` - 8 Hz, 1 mm, as fast as it goes
 
 `engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
+
+`engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
 `engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.damper=viscous_3000`
 """
@@ -79,6 +82,13 @@ def drive(
     on_full: Annotated[
         str, typer.Option(help='full disk: stop the run, or continue without recording')
     ] = 'stop',
+    split: Annotated[
+        list[str] | None,
+        typer.Option(metavar='LIMIT', help='largest or longest file: 500MB, 60s; may be given once for each'),
+    ] = None,
+    snapshot: Annotated[
+        str, typer.Option(metavar='DURATION', help='record only around events, with so much before: 30s')
+    ] = '',
     priority: Annotated[
         int,
         typer.Option(min=0, max=20, help='steps above normal (nice) of the 1 kHz loop, where permitted'),
@@ -89,6 +99,7 @@ def drive(
     """Drive the simulated car through the whole graph, record it and print what happened."""
     from mount_bringup import drive as driving
     from mount_bringup.domain import chosen_domain
+    from mount_bringup.recorder_options import recorder_options
     from mount_bringup.settings import checked_settings
     from mount_bringup.summary import write_json
 
@@ -107,16 +118,25 @@ def drive(
     }
     sim = parameters.setdefault('mount_sim', {})
     sim.update({name: value for name, value in given.items() if value is not None})
+    recorder = recorder_options(split or [], snapshot)
+    if on_full != 'stop':
+        recorder['on_full'] = on_full
+    if recorder:
+        parameters.setdefault('mount_recorder', {}).update(recorder)
     parameters = checked_settings(parameters)
+    if core and parameters.get('mount_recorder', {}).get('snapshot'):
+        raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, on_full, out, priority)
+    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority)
     console = Console()
     outcome = driving.drive(order, console)
-    folder = outcome.folder
     if json_file is not None:
         write_json(outcome.figures, json_file)
-    console.print(f'figure     {folder.figure}\nrecording  {folder.recording}', highlight=False)
+    if outcome.folder.figure.exists():
+        console.print(f'figure     {outcome.folder.figure}', highlight=False)
+    for place in outcome.recordings:
+        console.print(f'recording  {place}', highlight=False)
     for complaint in outcome.complaints:
         console.print(f'[yellow]note[/yellow] {complaint}')
     if outcome.complaints:
@@ -144,6 +164,7 @@ def prepare() -> None:
 
 
 app.command(name='audit', epilog=audit_command.EPILOG)(audit_command.audit)
+app.command(name='record', epilog=record_command.EPILOG)(record_command.record)
 app.command(name='recover', epilog=recover_command.EPILOG)(recover_command.recover)
 app.command(name='replay', epilog=replay_command.EPILOG)(replay_command.replay)
 app.command(name='compare', epilog=compare_command.EPILOG)(compare_command.compare)

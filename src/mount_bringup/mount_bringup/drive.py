@@ -1,12 +1,10 @@
 """One simulated drive from the first node to the last figure."""
 
+import contextlib
 import math
 import platform
-import signal
 import time
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from importlib import metadata
@@ -18,20 +16,31 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from std_msgs.msg import String
 
 from mount_bags.audit import audit
-from mount_bags.audit_report import as_table
+from mount_bags.audit_report import as_table, sentences
 from mount_bags.reading import Recording, open_recording
+from mount_bags.recorder_parameters import RecorderParameters, split_of
+from mount_bags.snapshot import saved_snapshots
 from mount_bags.writer import BagWriter
 from mount_bringup.core_chain import Parameters, control_parameters
 from mount_bringup.core_run import run_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
+from mount_bringup.ending_signals import ending_signals
 from mount_bringup.evaluation import load_drive
 from mount_bringup.graph import LOCKSTEP_TOGETHER, RECORDER, SIM, SIMULATED, URGENT, GraphSettings
+from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
-from mount_bringup.summary import print_summary, summarise, write_json
+from mount_bringup.summary import (
+    print_summary,
+    snapshots_sentence,
+    summarise,
+    summarise_snapshots,
+    write_json,
+)
 from mount_bringup.supervisor import Supervisor, session_text
+from mount_models.quantity import with_flattened
 from mount_ros.cdr import serialised
-from mount_ros.topics import SESSION, TOPICS, Topic
+from mount_ros.topics import SESSION, TOPICS, Delivery, Topic
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
 
@@ -49,17 +58,17 @@ class DriveOrder:
     parameters: dict[str, dict[str, Any]]
     domain: int = 0
     namespace: str = ''
-    on_full: str = 'stop'
     out: Path | None = None
     priority: int = 0
 
 
 @dataclass
 class DriveOutcome:
-    """What came of it: the figures, and a sentence for each thing that was not as it should be."""
+    """What came of it: figures, recordings, and a sentence for each thing that was not as it should be."""
 
     figures: dict[str, Any]
     folder: RunFolder
+    recordings: list[Path]
     complaints: list[str] = field(default_factory=list)
 
 
@@ -72,9 +81,33 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
         run = _drive_in_core(order, folder, console)
     else:
         run = _drive_graph(order, excitation, folder, console, complaints)
+    if _recorder_parameters(order).snapshot:
+        return _tell_snapshots(order, folder, run, complaints, console)
     recording = open_recording(folder.recording)
     complaints += recording.warnings
-    return DriveOutcome(_evaluate(order, folder, recording, run, console), folder, complaints)
+    figures = _evaluate(order, folder, recording, run, console)
+    return DriveOutcome(figures, folder, [folder.recording], complaints)
+
+
+def _tell_snapshots(
+    order: DriveOrder, folder: RunFolder, run: dict[str, Any], complaints: list[str], console: Console
+) -> DriveOutcome:
+    """Say what a run has that recorded only events: its figures would need all of the drive."""
+    saved = saved_snapshots(folder.recording)
+    for place in saved:
+        recording = open_recording(place)
+        verdict = sentences(audit(recording), recording)[-1]
+        console.print(f'{place.name}: {verdict}', soft_wrap=True, highlight=False)
+        complaints += recording.warnings
+    parameters = _recorder_parameters(order)
+    console.print(snapshots_sentence(len(saved), parameters), soft_wrap=True, highlight=False)
+    figures = summarise_snapshots(saved, run)
+    write_json(figures, folder.summary)
+    return DriveOutcome(figures, folder, saved, complaints)
+
+
+def _recorder_parameters(order: DriveOrder) -> RecorderParameters:
+    return with_flattened(RecorderParameters(), order.parameters.get(RECORDER.name, {}))
 
 
 def _evaluate(
@@ -106,7 +139,7 @@ def _drive_graph(
         priority=order.priority,
     )
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
-    with domain_lock(order.domain, order.namespace), _interrupting(supervisor):
+    with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
         try:
             with console.status('starting') as status:
                 supervisor.start(lambda all_parameters: _session(order, all_parameters), status.update)
@@ -132,8 +165,12 @@ def _drive_graph(
 
 
 def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, console: Console) -> None:
-    with _progress(console) as progress:
-        task = progress.add_task(f'driving ({order.scenario})', total=1.0)
+    # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
+    keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
+    with keyboard as keys, _progress(console) as progress:
+        set_mark = supervisor.mark_setter(lambda answer: console.print(answer, highlight=False))
+        hint = '; m or space: mark' if keys is not None and keys.present else ''
+        task = progress.add_task(f'driving ({order.scenario}{hint})', total=1.0)
 
         def finished() -> bool:
             figures = supervisor.figures(SIM)
@@ -141,16 +178,19 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
                 supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
             share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
             progress.update(task, completed=share)
+            for key in keys.wait(0.0) if keys is not None else ():
+                if key in MARK_KEYS:
+                    set_mark()
             return figures.get('sentence') == FINISHED
 
         supervisor.wait_until(finished, limit, 'the end of the drive')
 
 
 def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> dict[str, Any]:
-    writer = BagWriter(folder.recording)
+    writer = BagWriter(folder.recording, split=split_of(_recorder_parameters(order)))
     prefix = f'/{order.namespace.strip("/")}/' if order.namespace else '/'
     for topic in TOPICS:
-        writer.add_topic(_full_name(topic, prefix), topic.type)
+        writer.add_topic(_full_name(topic, prefix), topic.type, latched=topic.delivery is Delivery.LATCHED)
     names = {topic.name: _full_name(topic, prefix) for topic in TOPICS}
     session = serialised(String(data=_session(order, order.parameters)))
     begin = time.time_ns()
@@ -176,19 +216,6 @@ def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> di
     }
 
 
-@contextmanager
-def _interrupting(supervisor: Supervisor) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end the drive in order instead of tearing it."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    for number in before:
-        signal.signal(number, lambda *_: supervisor.interrupt())
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def _progress(console: Console) -> Progress:
     columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     return Progress(*columns, console=console)
@@ -199,7 +226,7 @@ def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str
     # In lock-step both ends of the bus live in one process.
     can = {'interface': 'virtual' if lockstep else 'udp_multicast', 'port': _port(order)}
     added: dict[str, dict[str, Any]] = {
-        'mount_recorder': {'uri': str(folder.recording), 'on_full': order.on_full},
+        'mount_recorder': {'uri': str(folder.recording)},
         'mount_driver': can,
         'mount_sim': can,
         # Nothing but a stalled process may end a ramp in lock-step.

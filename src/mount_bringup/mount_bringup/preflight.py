@@ -1,6 +1,8 @@
 """Refuses an order that a node would refuse, before any node is started."""
 
+from mount_bags.recorder_parameters import RecorderParameters
 from mount_bringup.core_chain import CoreChain, Parameters
+from mount_bringup.recorder_options import checked_recorder
 from mount_driver.parameters import DriverParameters
 from mount_models.closing import checked_closing
 from mount_models.quantity import with_flattened
@@ -17,5 +19,6 @@ def preflight(parameters: Parameters) -> Excitation:
     Fault(sim.fault)
     checked_closing(sim.mechanics, sim.actuator)
     with_flattened(DriverParameters(), parameters.get('mount_driver', {}))
+    checked_recorder(RecorderParameters(), parameters.get('mount_recorder', {}))
     CoreChain(parameters)
     return excitation

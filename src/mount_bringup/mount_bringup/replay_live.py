@@ -17,10 +17,10 @@ from mount_bags.series import Payloads, registered_topic
 from mount_bringup.core_chain import Parameters
 from mount_bringup.domain import domain_lock
 from mount_bringup.graph import SIMULATED
+from mount_bringup.keyboard import Keyboard
 from mount_bringup.recording_path import open_run
 from mount_bringup.replay import check_parameters
 from mount_bringup.replay_input import Notes, ReplayError, has, recorded_parameters
-from mount_bringup.replay_keyboard import Keyboard
 from mount_bringup.replay_live_control import LiveControl
 from mount_bringup.replay_lockstep import ros_context
 from mount_bringup.replay_playback import Playback
@@ -146,7 +146,7 @@ class _Show:
             (playback.play if playback.paused else playback.pause)(now)
         elif key == '.' or (key == 'right' and playback.paused):
             playback.step(now)
-        else:
+        elif key in _SEEK:
             playback.seek(now, _SEEK[key])
             self._arrive()
 

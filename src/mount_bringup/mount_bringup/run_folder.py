@@ -36,14 +36,20 @@ class RunFolder:
         return self.path / 'log'
 
 
+def new_place(what: str) -> Path:
+    """Return `bags/<time>_<what>`, numbered where that exists."""
+    name = f'{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}_{what}'
+    wanted = Path('bags') / name
+    number = 2
+    while wanted.exists():
+        wanted, number = Path('bags') / f'{name}_{number}', number + 1
+    return wanted
+
+
 def make_run_folder(wanted: Path | None, scenario: str) -> RunFolder:
     """Create the folder asked for, or `bags/<time>_<scenario>`; one that holds anything is refused."""
     if wanted is None:
-        name = f'{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}_{scenario}'
-        wanted = Path('bags') / name
-        number = 2
-        while wanted.exists():
-            wanted, number = Path('bags') / f'{name}_{number}', number + 1
+        wanted = new_place(scenario)
     if wanted.exists() and (not wanted.is_dir() or any(wanted.iterdir())):
         raise RunFolderError(f'{wanted} exists and is not empty; choose another folder with --out')
     folder = RunFolder(wanted)

@@ -5,6 +5,7 @@ import difflib
 from collections.abc import Mapping
 from typing import Any
 
+from mount_bags.recorder_parameters import RecorderParameters
 from mount_control.parameters import ControlParameters
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
@@ -28,7 +29,7 @@ def defaults_of_nodes() -> dict[str, dict[str, Any]]:
             **flattened(FrictionContact(), 'contact'),
             'damper': DEFAULT_DAMPER,
         },
-        'mount_recorder': {'on_full': 'stop'},
+        'mount_recorder': flattened(RecorderParameters()),
     }
 
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from mount_bags.reading import Recording
+from mount_bags.recorder_parameters import RecorderParameters
 from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
 from mount_bringup.evaluation import Drive, lost_samples, switching, tracking_error, unanswered_samples
 
@@ -52,6 +53,30 @@ def summarise(
         'latency_median_s': _known(run['latency_median_s']),
         'latency_p99_s': _known(run['latency_p99_s']),
     }
+
+
+def summarise_snapshots(snapshots: list[Path], run: dict[str, Any]) -> dict[str, Any]:
+    """Return the figures of a drive that recorded only events: those of `run`, as in `summarise`."""
+    return {
+        'snapshots': [str(place) for place in snapshots],
+        'scenario': run['scenario'],
+        'mode': run['mode'],
+        'samples': run['samples'],
+        'real_time_factor': run['real_time_factor'],
+        'latency_median_s': _known(run['latency_median_s']),
+        'latency_p99_s': _known(run['latency_p99_s']),
+    }
+
+
+def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
+    """Return what a drive with `--snapshot` saved."""
+    if not count:
+        return 'No event came, so no snapshot was saved; m or space sets one by hand in real time.'
+    noun = 'snapshot was' if count == 1 else 'snapshots were'
+    return (
+        f'{count} {noun} saved, up to {parameters.snapshot:g} s before an event and '
+        f'{parameters.snapshot_after:g} s after it; figures of the drive need a full recording.'
+    )
 
 
 def write_json(figures: dict[str, Any], file: Path) -> None:

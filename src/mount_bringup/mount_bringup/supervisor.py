@@ -17,8 +17,9 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-from mount_bringup.graph import CONTROL, DRIVER, INIT, GraphNode, GraphSettings
+from mount_bringup.graph import CONTROL, DRIVER, INIT, RECORDER, GraphNode, GraphSettings
 from mount_bringup.processes import NodeProcess, end_all, start_processes
 from mount_ros.diagnostics import Level
 from mount_ros.qos import publisher_qos, recording_qos
@@ -110,6 +111,21 @@ class Supervisor:
             if time.monotonic() - begin > limit:
                 raise GraphError(f'{what} did not happen within {limit:g} s; {self._complaints()}')
             self._executor.spin_once(0.05)
+
+    def mark_setter(self, say: Callable[[str], None]) -> Callable[[], None]:
+        """Return the function that asks the recorder to mark this moment; `say` takes its answer."""
+        client = self._node.create_client(Trigger, f'{RECORDER.name}/mark')
+
+        def set_mark() -> None:
+            if client.service_is_ready():
+                client.call_async(Trigger.Request()).add_done_callback(lambda call: say(told(call.result())))
+            else:
+                say('no mark was set: the recorder is not there yet')
+
+        def told(answer: Trigger.Response) -> str:
+            return 'marked' if answer.success else f'no mark was set: {answer.message}'
+
+        return set_mark
 
     def transition(self, node: GraphNode, transition: int) -> None:
         """Take a node through a lifecycle transition, or raise `GraphError` with the node's own reason."""

@@ -10,7 +10,10 @@ import tty
 from typing import Any
 
 _ARROWS = {b'A': 'up', b'B': 'down', b'C': 'right', b'D': 'left'}
-_PLAIN = {b' ': 'space', b'q': 'q', b'.': '.'}
+_PLAIN = {b' ': 'space', b'q': 'q', b'.': '.', b'm': 'm'}
+
+MARK_KEYS = ('m', 'space')
+"""Keys that set a mark while something is recorded."""
 
 
 class Keyboard:
@@ -27,7 +30,8 @@ class Keyboard:
             self._saved = termios.tcgetattr(self._stream)
             # A signal that ended the process at once would leave the terminal without echo.
             for number in (signal.SIGTERM, signal.SIGHUP):
-                self._handlers[number] = signal.signal(number, _interrupt)
+                if signal.getsignal(number) is signal.SIG_DFL:
+                    self._handlers[number] = signal.signal(number, _interrupt)
             tty.setcbreak(self._stream)
         return self
 
@@ -39,14 +43,14 @@ class Keyboard:
 
     @property
     def present(self) -> bool:
-        """Whether there is a terminal."""
+        """Whether there is a terminal, and this process is in its foreground."""
         try:
-            return bool(self._stream.isatty())
+            return bool(self._stream.isatty()) and _in_foreground(self._stream.fileno())
         except (AttributeError, ValueError):  # closed, or none at all
             return False
 
     def wait(self, duration: float) -> list[str]:
-        """Wait up to `duration` s and return the keys pressed: `space`, `left`, `up`, ..., `q`, `.`."""
+        """Wait up to `duration` s and return the keys pressed: `space`, `left`, `up`, ..., `q`, `.`, `m`."""
         if self._saved is None:
             time.sleep(duration)
             return []
@@ -67,6 +71,14 @@ class Keyboard:
             if key is not None:
                 keys.append(key)
         return keys
+
+
+def _in_foreground(terminal: int) -> bool:
+    """Return whether the terminal's settings may be changed: a process in the background would be stopped."""
+    try:
+        return os.tcgetpgrp(terminal) == os.getpgrp()
+    except OSError:  # not the terminal that controls this process, so it cannot stop it
+        return True
 
 
 def _interrupt(*_: object) -> None:

@@ -1,0 +1,145 @@
+"""Recordings that users order: by `record` beside whoever publishes, and by `drive` in several files."""
+
+import os
+import pty
+import signal
+import subprocess
+import threading
+import time
+
+import pytest
+from rclpy.node import Node
+from std_msgs.msg import String
+from typer.testing import CliRunner
+
+import mount_bags
+from mount_bags.audit import audit
+from mount_bags.audit_report import is_lossless
+from mount_bags.event_marks import read_marks
+from mount_bringup.command import app
+from mount_ros.data_path import DataPath
+from mount_ros.scalars import ScalarsLayout
+from mount_ros.testing import wait_until
+from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, EVENT
+
+PERIOD = 1_000_000  # ns
+BEGIN = 7_000_000_000  # ns
+COUNT = 1500  # samples of each stream at 1 kHz, so more than one file of 1 s
+
+
+@pytest.fixture
+def source(context):
+    """A data path that publishes two streams and events, in the domain of this process."""
+    node = Node('source', context=context)
+    path = DataPath(node)
+    yield path
+    path.start()
+    path.stop()
+    node.destroy_node()
+
+
+def start_record(command, source, *options, stdin=subprocess.DEVNULL):
+    """Start `record` in the domain of `source` and return it once it listens."""
+    publishers = {topic: source.publisher(topic) for topic in (DISPLACEMENT, CURRENT_SETPOINT, EVENT)}
+    domain = str(source.node.context.get_domain_id())
+    process = command.start(
+        'record', 'displacement', 'current_setpoint', *options,
+        '--domain', domain, '--out', str(command.folder / 'bag'), stdin=stdin,
+    )  # fmt: skip
+    wait_until(
+        lambda: process.poll() is not None or all(p.get_subscription_count() for p in publishers.values()),
+        'matched by the recorder',
+    )
+    assert 'recording 3 topics' in process.stdout.readline()
+    return process, publishers
+
+
+def end_record(process):
+    """End as Ctrl-C does; return exit code and output."""
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    return process.returncode, output
+
+
+def samples(publishers, indices):
+    """Publish samples of both streams at 1 kHz."""
+    begin = time.monotonic()
+    for index in indices:
+        threading.Event().wait(max(0.0, begin + index * 1e-3 - time.monotonic()))
+        for topic in (DISPLACEMENT, CURRENT_SETPOINT):
+            publishers[topic].publish(ScalarsLayout(topic).pack(BEGIN + index * PERIOD, [1e-6 * index]))
+
+
+def test_record_holds_all_that_was_published_in_several_files_with_the_mark(source, command):
+    process, publishers = start_record(command, source, '--split', '500MB', '--split', '1s')
+    samples(publishers, range(COUNT))
+    publishers[EVENT].publish(String(data='a bump'))
+    code, output = end_record(process)
+    assert code == 0, output
+    assert 'Nothing is known to be lost: 3 topics are complete.' in output
+    folder = command.folder / 'bag'
+    assert str(folder) in output
+    assert len(list(folder.glob('*.mcap'))) > 1
+    recording = mount_bags.open(folder)
+    assert recording.warnings == []
+    for name in ('displacement', 'current_setpoint'):
+        assert recording[name].stamps.tolist() == [BEGIN + index * PERIOD for index in range(COUNT)]
+    assert [mark.text for mark in read_marks(recording['event'])] == ['a bump']
+
+
+def test_record_ends_with_code_1_where_samples_are_missing(source, command):
+    process, publishers = start_record(command, source)
+    samples(publishers, [0, 1, 4])
+    code, output = end_record(process)
+    assert code == 1, output
+    assert 'Lost: 2 of ' in output
+
+
+def test_a_snapshot_without_an_event_saves_nothing_and_says_so(source, command):
+    process, _ = start_record(command, source, '--snapshot', '5s')
+    code, output = end_record(process)
+    assert code == 0, output
+    assert 'no event came, so no snapshot was saved' in output
+    assert not (command.folder / 'bag').exists()
+
+
+def test_a_key_press_marks_and_sets_a_snapshot_off(source, command):
+    keys, terminal = pty.openpty()
+    process, publishers = start_record(command, source, '--snapshot', '60s', stdin=terminal)
+    samples(publishers, range(10))
+    os.write(keys, b'xm')
+    wait_until(lambda: (command.folder / 'bag').exists(), 'the snapshot')
+    code, output = end_record(process)
+    os.close(keys)
+    os.close(terminal)
+    assert code == 0, output
+    recording = mount_bags.open(command.folder / 'bag')
+    assert len(recording['displacement']) == 10
+    assert [mark.kind for mark in read_marks(recording['event'])] == ['mark']
+
+
+def test_a_drive_in_several_files_lost_nothing(command):
+    result = command.drive('--lockstep', '--scenario', 'bench', '--duration', '1', '--split', '1s')
+    assert result.code == 0, result.output
+    assert result.figures['lost_samples'] == 0
+    recording = mount_bags.open(result.folder / 'recording')
+    assert len(recording.files) > 1
+    assert is_lossless(audit(recording), recording)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (('record', 'no_such_topic'), "'no_such_topic' is no topic"),
+        (('record', '--split', '60'), 'no size and no duration'),
+        (('record', '--split', '10kB'), 'at least 1000000 bytes'),
+        (('drive', '--split', '60s', '--split', '2min'), 'second limit of its kind'),
+        (('drive', '--snapshot', 'long'), 'no duration such as 30s'),
+        (('drive', '--set', 'mount_recorder.split_duration=0.1'), 'at least 1 s'),
+    ],
+)
+def test_impossible_orders_leave_nothing_behind(tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, list(arguments))
+    assert words in str(result.exception)
+    assert list(tmp_path.iterdir()) == []
