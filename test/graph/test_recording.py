@@ -8,6 +8,8 @@ import threading
 import time
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 from typer.testing import CliRunner
@@ -18,9 +20,10 @@ from mount_bags.audit_report import is_lossless
 from mount_bags.event_marks import read_marks
 from mount_bringup.command import app
 from mount_ros.data_path import DataPath
+from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.testing import wait_until
-from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, EVENT
+from mount_ros.topics import CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT, EVENT
 
 PERIOD = 1_000_000  # ns
 BEGIN = 7_000_000_000  # ns
@@ -39,19 +42,36 @@ def source(context):
 
 
 def start_record(command, source, *options, stdin=subprocess.DEVNULL):
-    """Start `record` in the domain of `source` and return it once it listens."""
+    """Start `record` in the domain of `source` and return it once both sides know each other."""
     publishers = {topic: source.publisher(topic) for topic in (DISPLACEMENT, CURRENT_SETPOINT, EVENT)}
     domain = str(source.node.context.get_domain_id())
     process = command.start(
         'record', 'displacement', 'current_setpoint', *options,
         '--domain', domain, '--out', str(command.folder / 'bag'), stdin=stdin,
     )  # fmt: skip
-    wait_until(
-        lambda: process.poll() is not None or all(p.get_subscription_count() for p in publishers.values()),
-        'matched by the recorder',
-    )
     assert 'recording 3 topics' in process.stdout.readline()
+    wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'found by the source')
+    wait_until(heard_of_publishers(source.node, 3), 'found by the recorder')
     return process, publishers
+
+
+def heard_of_publishers(node, count):
+    """Return a condition: the recorder has said in its diagnostics that so many topics have a publisher."""
+    heard = set()
+
+    def hear(message):
+        values = [entry for status in message.status for entry in status.values]
+        heard.update(v.key for v in values if v.key.startswith('publishers.') and v.value != '0')
+
+    node.create_subscription(DiagnosticArray, DIAGNOSTICS.name, hear, publisher_qos(DIAGNOSTICS))
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+
+    def condition():
+        executor.spin_once(0.05)
+        return len(heard) >= count
+
+    return condition
 
 
 def end_record(process):
@@ -70,6 +90,7 @@ def samples(publishers, indices):
             publishers[topic].publish(ScalarsLayout(topic).pack(BEGIN + index * PERIOD, [1e-6 * index]))
 
 
+@pytest.mark.real_time
 def test_record_holds_all_that_was_published_in_several_files_with_the_mark(source, command):
     process, publishers = start_record(command, source, '--split', '500MB', '--split', '1s')
     samples(publishers, range(COUNT))
