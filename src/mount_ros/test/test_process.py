@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -12,10 +13,13 @@ from mount_ros.testing import free_domain
 LIMIT = 30.0  # s
 
 PROGRAM = """
-import sys, threading
+import os, threading
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.process import run_nodes
 from mount_ros.topics import DISPLACEMENT
+
+def say(node, what):
+    os.write(1, f'{{node.get_name()}} {{what}}\\n'.encode())  # whole lines, whichever threads speak at once
 
 class Probe(SafeLifecycleNode):
     def __init__(self):
@@ -28,14 +32,14 @@ class Probe(SafeLifecycleNode):
         path.subscribe(DISPLACEMENT, lambda raw: None)
         path.start()
     def deactivate(self):
-        print(self.get_name(), 'deactivate', flush=True)
+        say(self, 'deactivate')
         {at_the_end}
     def cleanup(self):
-        print(self.get_name(), 'cleanup', flush=True)
+        say(self, 'cleanup')
     def _first_turn(self):
         if not hasattr(self, 'served'):
             self.served = True
-            print(self.get_name(), 'served', flush=True)
+            say(self, 'served')
         {in_service}
 
 names = iter(['one', 'two'])
@@ -60,10 +64,15 @@ class Process:
 
     def wait_for(self, *lines):
         wanted = set(lines)
-        for line in self._process.stdout:
-            self.lines.append(line.strip())
-            if wanted <= set(self.lines):
-                return
+        limit = threading.Timer(LIMIT, self._process.kill)
+        limit.start()
+        try:
+            for line in self._process.stdout:
+                self.lines.append(line.strip())
+                if wanted <= set(self.lines):
+                    return
+        finally:
+            limit.cancel()
         pytest.fail(f'{wanted - set(self.lines)} not said; {self._process.stderr.read()}')
 
     def end(self, number=None):
