@@ -9,7 +9,7 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def ending_signals(end: Callable[[], None]) -> Iterator[None]:
-    """Call `end` on SIGINT, SIGTERM and SIGHUP while the context lasts."""
+    """Call `end` on SIGINT, SIGTERM and SIGHUP while the context lasts; it must take no lock."""
     before = {number: signal.getsignal(number) for number in _ENDING}
     if before[signal.SIGHUP] is signal.SIG_IGN:
         del before[signal.SIGHUP]  # nohup: the run outlives its terminal

@@ -58,13 +58,13 @@ class RecordOutcome:
 def record(order: RecordOrder, console: Console) -> RecordOutcome:
     """Record until Ctrl-C, SIGTERM or the end of the duration; raises a `ValueError` with the reason."""
     names = chosen_topics(order.topics)
-    over = threading.Event()
-    with ending_signals(over.set), ros_context(order.domain) as context:
+    asked: list[bool] = []  # to end, by a signal; no lock: a second one may come amid the first
+    with ending_signals(lambda: asked.append(True)), ros_context(order.domain) as context:
         recorder = _LoneRecorder(order, names, context)
         try:
             recorder.begin()
             console.print(f'recording {len(names)} topics', highlight=False)
-            _watch(recorder, order, over, console)
+            _watch(recorder, order, asked, console)
         finally:
             outcome = recorder.end()
     return outcome
@@ -145,7 +145,7 @@ class _LoneRecorder:
         return RecordOutcome(folders, _number(figures, 'lost'), failure)
 
 
-def _watch(recorder: _LoneRecorder, order: RecordOrder, over: threading.Event, console: Console) -> None:
+def _watch(recorder: _LoneRecorder, order: RecordOrder, asked: list[bool], console: Console) -> None:
     begin = time.monotonic()
     end = begin + order.duration if order.duration is not None else float('inf')
     line = _Line(begin)
@@ -155,7 +155,7 @@ def _watch(recorder: _LoneRecorder, order: RecordOrder, over: threading.Event, c
         Live(console=console, auto_refresh=False, transient=True, redirect_stderr=False) as live,
     ):
         hint = f'  ({_KEYS})' if keyboard.present else ''
-        while not over.is_set() and (now := time.monotonic()) < end:
+        while not asked and (now := time.monotonic()) < end:
             figures = recorder.figures()
             if figures['failed'] and stopping:
                 return

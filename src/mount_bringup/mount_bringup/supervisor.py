@@ -1,6 +1,5 @@
 """Starts the graph where there is no launch: processes up, transitions in order, all down again."""
 
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -47,14 +46,14 @@ class Supervisor:
         self._settings = settings
         self._folder = folder
         self._processes: list[NodeProcess] = []
-        self._interrupted = threading.Event()
+        self._interrupted = False  # no lock: a second signal may come amid the first
         self._verdicts: dict[str, dict[str, str]] = {}
         self._context = Context()
         self.notes: list[str] = []
 
     def interrupt(self) -> None:
         """Make every wait of the supervisor end with `Interrupted`; safe from a signal handler."""
-        self._interrupted.set()
+        self._interrupted = True
 
     def start(
         self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
@@ -105,7 +104,7 @@ class Supervisor:
         """Serve the graph until `condition`; raise `GraphError` if a node dies or `limit` s pass."""
         begin = time.monotonic()
         while not condition():
-            if self._interrupted.is_set():
+            if self._interrupted:
                 raise Interrupted
             self._check_processes()
             if time.monotonic() - begin > limit:

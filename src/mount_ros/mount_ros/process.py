@@ -1,6 +1,7 @@
 """The life of a process: nodes are made, served, and ended with exit code 0 on SIGINT and SIGTERM."""
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -38,12 +39,12 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     data_thread = DataThread(nodes[0].context)
     for node in nodes:
         node.data_thread = data_thread
-    over = threading.Event()
+    over = _Ending()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: over.set())
+        signal.signal(number, over.tell)
     gc.freeze()  # what stands after set-up need not be looked at again
     services = [_Service(node, over) for node in nodes]
-    over.wait()  # here, and only here, Python notices a signal
+    over.wait()
     for node in nodes:
         node.ending.set()
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
@@ -57,13 +58,29 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         sys.exit(1)
 
 
+class _Ending:
+    """Lets the main thread sleep until a signal or a thread tells it that the process shall end.
+
+    By a pipe: a lock, as in `threading.Event`, is held for ever by a second signal that comes amid the first.
+    """
+
+    def __init__(self) -> None:
+        self._read, self._write = os.pipe()
+
+    def tell(self, *_: object) -> None:
+        os.write(self._write, b'.')
+
+    def wait(self) -> None:
+        os.read(self._read, 1)
+
+
 class _Service:
     """The thread that serves the rest of a node: transitions, parameters, diagnostics.
 
     It sleeps until something arrives: whatever wakes Python there takes the interpreter from the data path.
     """
 
-    def __init__(self, node: SafeLifecycleNode, over: threading.Event):
+    def __init__(self, node: SafeLifecycleNode, over: _Ending):
         self.failed = False
         self._node = node
         self._over = over
@@ -89,4 +106,4 @@ class _Service:
             self._node.get_logger().fatal(f'{type(error).__name__}: {error}')
             self.failed = True
         finally:
-            self._over.set()
+            self._over.tell()

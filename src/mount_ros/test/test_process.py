@@ -75,10 +75,11 @@ class Process:
             limit.cancel()
         pytest.fail(f'{wanted - set(self.lines)} not said; {self._process.stderr.read()}')
 
-    def end(self, number=None):
+    def end(self, number=None, times=1):
         """Return exit code and errors after a signal, or after nothing if it ends on its own."""
         if number is not None:
-            self._process.send_signal(number)
+            for _ in range(times):
+                self._process.send_signal(number)
         out, errors = self._process.communicate(timeout=LIMIT)
         self.lines += out.splitlines()
         return self._process.returncode, errors
@@ -115,6 +116,14 @@ def test_nodes_of_one_process_are_closed_in_reverse_order(start, number):
     assert (code, errors) == (0, '')
     said = [line for line in process.lines if 'served' not in line]
     assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup', 'over']
+
+
+def test_a_burst_of_signals_ends_the_process_as_one_does(start):
+    process = start(1)
+    process.wait_for('one served')
+    code, errors = process.end(signal.SIGINT, times=300)
+    assert (code, errors) == (0, '')
+    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
 
 
 def test_a_step_that_raises_at_the_end_does_not_keep_the_others_from_theirs(start):
