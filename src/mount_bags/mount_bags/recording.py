@@ -72,6 +72,9 @@ class Recorder:
     The functions that `receiver` and `latched_receiver` return are all called by one thread, `begin`
     and `end` by any other. What `watch` and `observe` take is called by the writing thread, and so is
     `on_loss`, with the number of messages for which the queue had no room since it was called last.
+
+    Where the queue is full, messages are lost and counted; a `patient` recorder lets whoever brings them
+    wait instead. That is for lock-step, where the publishers wait for it and no time passes.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class Recorder:
         writer: Sink,
         *,
         memory_limit: int = MEMORY_LIMIT,
+        patient: bool = False,
         space: SpaceGuard | None = None,
         on_loss: Callable[[int], None] = lambda _: None,
     ):
@@ -86,6 +90,7 @@ class Recorder:
         self.begun = False
         self._writer = writer
         self._memory_limit = memory_limit
+        self._patient = patient
         self._space = space
         self._on_loss = on_loss
         self._observers: dict[str, Observe] = {}
@@ -196,14 +201,25 @@ class Recorder:
 
         def take(item: _Item) -> None:
             reception.received += 1
-            received_bytes = self._received_bytes + len(item[1])
-            if received_bytes - self._drained_bytes > self._memory_limit:
+            size = len(item[1])
+            if self._is_full(size) and not (self._patient and self._comes_free(size)):
                 reception.overflowed += 1
                 return
-            self._received_bytes = received_bytes
+            self._received_bytes += size
             append(item)
 
         return take
+
+    def _is_full(self, size: int) -> bool:
+        return self._received_bytes + size - self._drained_bytes > self._memory_limit
+
+    def _comes_free(self, size: int) -> bool:
+        """Wait until the writing thread has made room for `size` bytes; False if it never will."""
+        while self._is_full(size):
+            if self._failure or not self._thread.is_alive():
+                return False
+            time.sleep(_DRAIN_PERIOD)
+        return True
 
     def _received(self) -> int:
         return sum(entry.received for entry in self._receptions.values())

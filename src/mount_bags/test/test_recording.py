@@ -23,11 +23,11 @@ from mount_ros.topics import DISPLACEMENT
 STRING = 'std_msgs/msg/String'
 
 
-def recorder_of(folder, memory_limit=1 << 20, space=None, on_loss=lambda _: None, **options):
+def recorder_of(folder, memory_limit=1 << 20, patient=False, space=None, on_loss=lambda _: None, **options):
     writer = BagWriter(folder, **options)
     writer.add_topic('/displacement', DISPLACEMENT.type)
     writer.add_topic('/latched', STRING)
-    return Recorder(writer, memory_limit=memory_limit, space=space, on_loss=on_loss)
+    return Recorder(writer, memory_limit=memory_limit, patient=patient, space=space, on_loss=on_loss)
 
 
 @pytest.fixture
@@ -149,6 +149,36 @@ def test_full_queue_loses_and_counts_without_waiting(tmp_path, clocked):
     assert verdict.level is Level.WARN
     assert 'of 1000 messages lost' in verdict.sentence
     recorder.end()
+
+
+def test_patient_recorder_lets_whoever_brings_messages_wait_and_loses_none(tmp_path, clocked):
+    size = len(sample(DISPLACEMENT, 0))
+    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, patient=True)
+    receive = clocked(recorder.receiver('/displacement'))
+    recorder.begin()
+    for index in range(100):
+        receive(sample(DISPLACEMENT, index))
+    recorder.end()
+    assert recorder.figures().lost == 0
+    assert [data for _, data, _ in messages_of(tmp_path / 'bag')] == [
+        sample(DISPLACEMENT, index) for index in range(100)
+    ]
+
+
+def test_patient_recorder_does_not_wait_for_one_that_has_failed(tmp_path, clocked):
+    size = len(sample(DISPLACEMENT, 0))
+    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, patient=True)
+
+    def fail(*_):
+        raise RecordingError('no space left')
+
+    recorder._writer.write = fail
+    receive = clocked(recorder.receiver('/displacement'))
+    recorder.begin()
+    for index in range(100):
+        receive(sample(DISPLACEMENT, index))
+    recorder.end()
+    assert recorder.figures().lost == 100
 
 
 def test_missing_samples_are_seen_while_they_are_recorded(tmp_path, clocked):
