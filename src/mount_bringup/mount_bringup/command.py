@@ -91,7 +91,7 @@ def drive(
     ] = '',
     priority: Annotated[
         int,
-        typer.Option(min=0, max=20, help='steps above normal (nice) of the 1 kHz loop, where permitted'),
+        typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
     ] = 10,
     domain: Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')] = None,
     namespace: Annotated[str, typer.Option(help='namespace of this mount, such as mount_right')] = '',

@@ -47,7 +47,7 @@ class GraphSettings:
     """Where the graph lives and with which parameters: {node: {parameter: value}}.
 
     Nodes named in `together` share one process, all others have one of their own. The processes of the
-    `urgent` nodes run `priority` steps above others (nice; 0: as any other) where the system permits it.
+    `urgent` nodes run at the real-time `priority` (SCHED_FIFO; 0: off) where the system permits it.
     """
 
     namespace: str = ''

@@ -122,8 +122,8 @@ def _prepare_child(priority: int) -> None:
     # Without its supervisor a node must not go on driving the coil.
     ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGINT)
     if priority:
-        # Before the middleware makes its threads, so that they inherit it. Never SCHED_FIFO: threads of the
-        # middleware spin while a receiver's buffer is full, and would keep that receiver, and the whole
-        # machine, from running ever again. Where it is not permitted the node runs as any other process.
+        # Before the middleware makes its threads, so that those that receive inherit it; those that send
+        # again are taken out of it by `mount_ros.scheduling`. Where it is not permitted the node runs as any
+        # other process.
         with contextlib.suppress(PermissionError):
-            os.setpriority(os.PRIO_PROCESS, 0, -priority)
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))

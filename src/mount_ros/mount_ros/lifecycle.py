@@ -7,6 +7,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from mount_ros.collector import Collector
 from mount_ros.data_path import DataPath, DataThread
 from mount_ros.diagnostics import Diagnostics, Level, Verdict
+from mount_ros.scheduling import calm_resending
 
 
 class SafeLifecycleNode(LifecycleNode):
@@ -86,6 +87,7 @@ class SafeLifecycleNode(LifecycleNode):
         return self._attempt('configure', self.configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        calm_resending()
         outcome = self._attempt('activate', self.activate, undo=self.deactivate)
         self._active = outcome == TransitionCallbackReturn.SUCCESS
         return outcome
