@@ -1,5 +1,6 @@
 """Which threads of a process may run in real time."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -13,5 +14,6 @@ def calm_resending() -> None:
     machine with two cores, from running ever again.
     """
     for task in Path('/proc/self/task').iterdir():
-        if (task / 'comm').read_text().startswith(_RESENDING):
-            os.sched_setscheduler(int(task.name), os.SCHED_OTHER, os.sched_param(0))
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # a thread that has just ended
+            if (task / 'comm').read_text().startswith(_RESENDING):
+                os.sched_setscheduler(int(task.name), os.SCHED_OTHER, os.sched_param(0))
