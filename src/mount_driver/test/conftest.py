@@ -10,7 +10,8 @@ import pytest
 # The tests are imported one by one (importmode importlib); what they share is found by this path.
 sys.path.insert(0, str(Path(__file__).parent))
 
-_ports = itertools.count(20_000)
+# A socket hears every group of its port that anyone on this machine has joined: ports of each process, too.
+_ports = itertools.count(20_000 + 100 * (os.getpid() % 400))
 
 
 @pytest.fixture
