@@ -19,17 +19,14 @@ from mount_bags.metadata import (
 from mount_bags.offered_qos import OfferedQos, QosError, read_qos
 from mount_bags.piece_topics import BagFile
 from mount_bags.record_file import RecordFile
+from mount_bags.writer import create_folder
 
 _PROFILE = 'ros2'
 _LIBRARY = 'engine-mount mount_bags 0.1.0'
 
 
-class VerbatimError(ValueError):
-    """A recording cannot be created; the text says why."""
-
-
 class VerbatimBag:
-    """One recording of one file; types need not be installed."""
+    """One recording of one file; types need not be installed. Raises `RecordingError` where one exists."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = Path(folder)
@@ -37,7 +34,7 @@ class VerbatimBag:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int], int] = {}
         self._topics: dict[int, TopicInformation] = {}
-        _create(self.folder)
+        create_folder(self.folder)
         self._file = RecordFile(self.folder / self._file_name)
         self._container = ChunkedMcap(self._file)
         self._container.start(_PROFILE, _LIBRARY)
@@ -134,17 +131,3 @@ def _offers(metadata: Mapping[str, str]) -> tuple[OfferedQos, ...]:
         return read_qos(metadata.get('offered_qos_profiles', ''))
     except QosError:
         return ()
-
-
-def _create(folder: Path) -> None:
-    if not folder.name:
-        raise VerbatimError(f'{str(folder)!r} names no folder for the recording')
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        folder.mkdir()
-    except FileExistsError:
-        raise VerbatimError(
-            f'{folder} exists already; a recording is never written over: name another folder or remove it'
-        ) from None
-    except OSError as error:
-        raise VerbatimError(f'folder {folder} cannot be created: {error.strerror}') from None
