@@ -10,7 +10,6 @@ import time
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from std_msgs.msg import String
 from typer.testing import CliRunner
 
@@ -19,7 +18,6 @@ from mount_bags.audit import audit
 from mount_bags.audit_report import is_lossless
 from mount_bags.event_marks import read_marks
 from mount_bringup.command import app
-from mount_ros.data_path import DataPath
 from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.testing import wait_until
@@ -28,17 +26,6 @@ from mount_ros.topics import CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT, EVENT
 PERIOD = 1_000_000  # ns
 BEGIN = 7_000_000_000  # ns
 COUNT = 1500  # samples of each stream at 1 kHz, so more than one file of 1 s
-
-
-@pytest.fixture
-def source(context):
-    """A data path that publishes two streams and events, in the domain of this process."""
-    node = Node('source', context=context)
-    path = DataPath(node)
-    yield path
-    path.start()
-    path.stop()
-    node.destroy_node()
 
 
 def start_record(command, source, *options, stdin=subprocess.DEVNULL):

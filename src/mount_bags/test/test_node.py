@@ -11,7 +11,6 @@ import pytest
 from mcap.reader import make_reader
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from recorded_drive import PERIOD, START, sample
 from std_msgs.msg import String
@@ -21,7 +20,6 @@ import mount_bags
 from mount_bags.event_marks import read_marks
 from mount_bags.metadata import read_metadata
 from mount_bags.node import MountRecorder
-from mount_ros.data_path import DataPath
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import wait_until
 from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
@@ -29,17 +27,6 @@ from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, EVENT,
 STREAMS = (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT)
 LIMIT = 20.0  # s
 COUNT = 2000
-
-
-@pytest.fixture
-def source(context):
-    """Return a node whose data path publishes."""
-    node = Node('source', context=context)
-    path = DataPath(node)
-    yield path
-    path.start()
-    path.stop()
-    node.destroy_node()
 
 
 @pytest.fixture

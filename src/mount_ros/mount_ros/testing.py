@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.node import Node
 
+    from mount_ros.data_path import DataPath
+
 LIMIT = 30.0  # s: what has not happened by then does not happen
 _HIGHEST_DOMAIN = 101
 
@@ -73,6 +75,21 @@ def context(_observer: 'Node') -> Iterator['Context']:
         lambda: _observer.get_node_names_and_namespaces() == alone,
         f'that only {alone} is left of {_observer.get_node_names_and_namespaces()}',
     )
+
+
+@pytest.fixture
+def source(context: 'Context') -> Iterator['DataPath']:
+    """Return a data path whose node publishes, beside the node that is tested."""
+    from rclpy.node import Node
+
+    from mount_ros.data_path import DataPath
+
+    node = Node('source', context=context)
+    path = DataPath(node)
+    yield path
+    path.start()
+    path.stop()
+    node.destroy_node()
 
 
 @pytest.fixture(scope='session')
