@@ -24,7 +24,6 @@ from mount_ros.force_table_message import to_message
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.testing import wait_until
 
-LIMIT = 30.0  # s
 MS = 1_000_000  # ns
 ACTIVATION = 5000 * MS
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE

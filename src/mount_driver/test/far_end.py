@@ -8,8 +8,8 @@ import can
 from mount_driver.bus import open_bus
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter
+from mount_ros.testing import LIMIT, wait_until
 
-LIMIT = 20.0  # s: what has not come by then does not come
 CODEC = MountCodec()
 
 
@@ -56,12 +56,7 @@ class FarEnd:
 
     def setpoint_where(self, condition) -> Setpoint:
         """Return the next setpoint that fulfils a condition."""
-        limit = time.monotonic() + LIMIT
-        while time.monotonic() < limit:
-            setpoint = self.setpoint()
-            if condition(setpoint):
-                return setpoint
-        raise AssertionError(f'no such setpoint within {LIMIT} s')
+        return wait_until(lambda: found if condition(found := self.setpoint()) else None, 'such a setpoint')
 
     def nothing_for(self, seconds: float) -> bool:
         """Whether no setpoint arrives for so long."""

@@ -7,7 +7,7 @@ import textwrap
 
 import can
 import pytest
-from far_end import CODEC, LIMIT, FarEnd, sample
+from far_end import CODEC, FarEnd, sample
 
 from mount_driver import exchange as exchange_module
 from mount_driver.clock import CounterClock, ElectronicsClock
@@ -15,7 +15,7 @@ from mount_driver.codec import Setpoint, Status
 from mount_driver.exchange import Exchange
 from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 
 OFF = Setpoint(0.0, 0xFFFF, False)
 MS = 1_000_000

@@ -10,7 +10,7 @@ import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from far_end import CODEC, LIMIT, FarEnd, sample
+from far_end import CODEC, FarEnd, sample
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.executors import SingleThreadedExecutor
@@ -25,7 +25,7 @@ from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout, stamp_of
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT
 
 MS = 1_000_000

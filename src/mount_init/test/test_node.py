@@ -14,9 +14,8 @@ from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.force_table_message import from_bytes
 from mount_ros.scalars import ScalarsLayout
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 
-LIMIT = 30.0  # s
 STEP = 1_000_000  # ns
 RAMP_LENGTH = 2750
 

@@ -12,10 +12,8 @@ from mount_ros.data_path import DataThread
 from mount_ros.message_types import message_class
 from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout, stamp_of
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, CURRENT_SETPOINT, DISPLACEMENT
-
-LIMIT = 30.0  # s
 
 
 @pytest.fixture

@@ -7,10 +7,8 @@ from rclpy.node import Node
 
 from mount_ros.data_path import DataPath, DataThread
 from mount_ros.scalars import ScalarsLayout
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
-
-LIMIT = 30.0  # s
 
 
 class End:

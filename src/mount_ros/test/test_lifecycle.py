@@ -13,10 +13,9 @@ from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level, Verdict
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT
 
-LIMIT = 30.0  # s
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
 UNCONFIGURED, INACTIVE = State.PRIMARY_STATE_UNCONFIGURED, State.PRIMARY_STATE_INACTIVE

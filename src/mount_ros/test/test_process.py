@@ -8,9 +8,7 @@ import threading
 
 import pytest
 
-from mount_ros.testing import free_domain
-
-LIMIT = 30.0  # s
+from mount_ros.testing import LIMIT, free_domain
 
 PROGRAM = """
 import os, threading

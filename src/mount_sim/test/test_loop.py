@@ -9,13 +9,13 @@ import pytest
 
 from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
+from mount_ros.testing import LIMIT
 from mount_sim.can_end import CanEnd
 from mount_sim.electronics import ElectronicsParameters, Reading
 from mount_sim.faults import Fault, FaultParameters
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 
 CODEC = MountCodec()
-LIMIT = 20.0  # s
 _channels = itertools.count()
 
 
