@@ -17,11 +17,12 @@ from mount_bringup.bench_storage import storage_figures
 from mount_bringup.core_run import run_core
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
-from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_control.parameters import ControlParameters
 from mount_driver.codec import DATABASE_FILE, Measurement, MountCodec
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import CONTROL_TRACE
 

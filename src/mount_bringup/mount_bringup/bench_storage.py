@@ -13,7 +13,7 @@ from mcap.writer import Writer
 import mount_bags
 from mount_bags.container import CHUNK_SIZE
 from mount_bags.writer import BagWriter
-from mount_control.parameters import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import DISPLACEMENT
 

@@ -10,7 +10,7 @@ from typing import Any
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
-from mount_control.parameters import SAMPLE_TIME, ControlParameters, checked_parameters
+from mount_control.parameters import ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_init.initialisation import OFF, Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
@@ -18,6 +18,7 @@ from mount_models.damper import DamperCurve, damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import Specimen, default_specimen, load_specimen
 from mount_sim.electronics import Reading
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from mount_bags.audit import audit
 from mount_bags.reading import Recording
 from mount_control import band_pass
-from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_control.parameters import ControlParameters
 from mount_models.damper import DamperCurve
+from mount_models.sampling import SAMPLE_TIME
 
 _SECOND = 1e9  # ns
 _MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mount_bags.switching_changes import SwitchingChange, paired_switchings, switching_times
 from mount_bringup.replay_core import ControlAnswers, RampAnswers, Replayed
 from mount_bringup.replay_input import Column, ReplayInput, Times
-from mount_control.parameters import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME
 
 # Where a recording begins in the middle of control: what the controller remembered is not in it. The
 # band-pass forgets by e^-25 in 1 s, the friction deflection slowly; measured after 3 s: within 0.06 uA.

@@ -22,11 +22,11 @@ from mount_bringup.replay_input import (
     dated,
 )
 from mount_bringup.replay_ramps import MeasuredGap, measured_gaps
-from mount_control.parameters import SAMPLE_TIME
 from mount_init.parameters import InitParameters
 from mount_models.closing import ClosingMechanics
 from mount_models.force_table import contact_force, current_force_table, offset_current
 from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
 from mount_ros.force_table_message import ForceTable
 from mount_ros.scalars import ScalarsLayout

@@ -17,8 +17,9 @@ from mount_bags.reading import Recording
 from mount_bags.series import Payloads
 from mount_bringup.replay_ramps import MeasuredGap, Ramp, measured_gaps, ramps_of
 from mount_bringup.settings import checked_settings, defaults_of_nodes
-from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_control.parameters import ControlParameters
 from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
 from mount_ros.force_table_message import ForceTable
 from mount_ros.topics import Topic

@@ -27,9 +27,9 @@ from mount_bringup.replay_input import Column, ControlRun, ReplayError, ReplayIn
 from mount_bringup.replay_ramps import MeasuredGap, Ramp
 from mount_control.controller import TRACE
 from mount_control.node import MountControl
-from mount_control.parameters import SAMPLE_TIME
 from mount_control.sample_watch import SampleCounts
 from mount_init.node import MountInit
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
 from mount_ros.cdr import serialised
 from mount_ros.data_path import DataPath, DataThread

@@ -21,7 +21,7 @@ from mount_bringup.replay_difference import (
     switching_changes,
 )
 from mount_bringup.replay_input import ReplayInput
-from mount_control.parameters import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME
 
 _SHOWN = 8  # switchings in the printed summary
 

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control import band_pass, force_to_current, switching
-from mount_control.parameters import SAMPLE_TIME, ControlParameters, checked_parameters
+from mount_control.parameters import ControlParameters, checked_parameters
 from mount_models.compiled import compiled
 from mount_models.damper import DamperCurve, damper_force
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
 from mount_models.record import record_bytes, record_dtype
+from mount_models.sampling import SAMPLE_TIME
 
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 

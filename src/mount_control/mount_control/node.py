@@ -7,11 +7,12 @@ from mount_control.activation import MeasurementStream, check_belongs
 from mount_control.controller import TRACE, Controller, load_compiled_law
 from mount_control.diagnosis import ControlFigures, verdict
 from mount_control.force_to_current import ForceTableError, resample
-from mount_control.parameters import SAMPLE_TIME, ControlParameters, checked_parameters
+from mount_control.parameters import ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
 from mount_ros.diagnostics import Verdict
 from mount_ros.force_table_message import ForceTable, ForceTableMessageError, from_bytes

@@ -4,6 +4,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.quantity import ParameterError, Quantity, checked
+from mount_models.sampling import SAMPLE_TIME
 
 
 class ControlParameters(NamedTuple):
@@ -57,9 +58,6 @@ class ControlParameters(NamedTuple):
     def period_samples(self) -> int:
         """Samples in one period of the eigenfrequency."""
         return max(1, round(1.0 / (self.eigenfrequency * SAMPLE_TIME)))
-
-
-SAMPLE_TIME = 0.001  # s, chosen: 1 kHz, the electronics' measurement rate
 
 
 def checked_parameters(parameters: ControlParameters) -> ControlParameters:

@@ -7,7 +7,8 @@ import pytest
 from scipy import signal
 
 from mount_control import band_pass
-from mount_control.parameters import SAMPLE_TIME, ControlParameters
+from mount_control.parameters import ControlParameters
+from mount_models.sampling import SAMPLE_TIME
 
 
 def _response(filtered, frequency):

@@ -7,6 +7,7 @@ gap curves, stiffnesses) stands in the specimen and nowhere else.
 from typing import Annotated, NamedTuple
 
 from mount_models.quantity import Quantity
+from mount_models.sampling import SAMPLE_RATE
 
 _WIDE = 'chosen: seven standard deviations or more at 1 % ripple noise'
 
@@ -17,7 +18,7 @@ class InitParameters(NamedTuple):
     sample_rate: Annotated[
         float,
         Quantity('Hz', 'ripple samples per second: turns durations into counts', 100, 10e3),
-    ] = 1000.0
+    ] = SAMPLE_RATE
     rise_duration: Annotated[
         float, Quantity('s', 'smooth rise from 0 A to the rest current, and fall back to 0 A', 0.02, 1.0)
     ] = 0.05

@@ -6,8 +6,9 @@ Names are relative, so that several mounts live in one car under namespaces. SI 
 from dataclasses import dataclass
 from enum import Enum
 
+from mount_models.sampling import SAMPLE_RATE
+
 JOINT_STATE = 'sensor_msgs/msg/JointState'
-SAMPLE_RATE = 1000.0  # Hz, chosen: the electronics' measurement rate
 
 
 class Delivery(Enum):

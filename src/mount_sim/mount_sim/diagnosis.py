@@ -1,8 +1,9 @@
 """The simulator's verdict on itself, from figures alone."""
 
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros.diagnostics import Level, Verdict
 from mount_sim.loop import LoopFigures
-from mount_sim.simulated_mount import SAMPLE_TIME, Run
+from mount_sim.simulated_mount import Run
 
 DRIVING, FINISHED = 'driving', 'finished'
 

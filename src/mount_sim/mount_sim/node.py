@@ -7,6 +7,7 @@ from sensor_msgs.msg import Imu
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
 from mount_ros.diagnostics import Verdict
 from mount_ros.lifecycle import SafeLifecycleNode
@@ -20,7 +21,7 @@ from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
 from mount_sim.plant import TRUTH
 from mount_sim.scenario import build_excitation
-from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
+from mount_sim.simulated_mount import SimulatedMount
 
 _SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
 _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics import Noise, Reading
 from mount_sim.excitation import Excitation
 from mount_sim.plant import Plant, PlantSimulation
-
-SAMPLE_TIME = 0.001  # s, chosen: the electronics' measurement period
 
 
 @dataclass(frozen=True)
