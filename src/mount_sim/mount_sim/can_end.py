@@ -51,14 +51,10 @@ class CanEnd:
         """The newest good setpoint."""
         return self._latest
 
-    def send_measurement(self, number: int, microseconds: int, reading: Reading, enabled: bool) -> None:
-        """Send sample `number`, taken at `microseconds` of the electronics' clock."""
-        self.send_frame(self.measurement_frame(number, microseconds, reading, enabled))
-
     def measurement_frame(
         self, number: int, microseconds: int, reading: Reading, enabled: bool
     ) -> can.Message:
-        """Return the frame of a sample, ready to be sent."""
+        """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock."""
         measurement = Measurement(
             number & _COUNTER_MASK, microseconds & _MICROSECOND_MASK, *reading, enabled=enabled
         )

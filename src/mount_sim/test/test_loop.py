@@ -84,7 +84,8 @@ def _in_thread(target, *arguments):
 
 def test_a_measurement_arrives_as_it_was_sent(ends):
     end, host = ends
-    end.send_measurement(70_000, 2**32 + 5, Reading(1.5e-3, 0.5, 250.0, math.nan), enabled=False)
+    reading = Reading(1.5e-3, 0.5, 250.0, math.nan)
+    end.send_frame(end.measurement_frame(70_000, 2**32 + 5, reading, enabled=False))
     sample = host.receive()
     assert (sample.sample_counter, sample.microseconds, sample.enabled) == (70_000 - 65_536, 5, False)
     assert sample.displacement == pytest.approx(1.5e-3)
