@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from mount_bringup.options import JsonFile
+
 EPILOG = """Exit code: 0 when nothing is known to be lost, 1 on loss, on damage, or when nothing can be read.
 
 Examples:
@@ -23,9 +25,7 @@ neighbouring stamps. The JSON holds for each topic `expected`, `present`, `lost`
 
 def audit(
     recording: Annotated[Path, typer.Argument(help='folder of a recording, or one of its files')],
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='write the figures to this file')
-    ] = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording; exit code 1 if so."""
     import json

@@ -7,6 +7,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from mount_bringup.options import JsonFile
+
 EPILOG = """Examples:
 
 `engine-mount compare bags/before bags/after` - to the bit
@@ -30,9 +32,7 @@ def compare(
         ),
     ] = None,
     common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='write everything to this file')
-    ] = None,
+    json_file: JsonFile = None,
     figure: Annotated[
         Path | None, typer.Option(metavar='FILE', help='draw the most important differences (PNG)')
     ] = None,

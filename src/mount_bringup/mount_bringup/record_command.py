@@ -6,6 +6,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from mount_bringup.options import Domain, Namespace, NewFolder, Snapshot, Split
+
 EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
 loss, when the disk was full, or when nothing could be recorded; 2 for a wrong use of the command.
 
@@ -26,16 +28,9 @@ def record(
     topics: Annotated[
         list[str] | None, typer.Argument(metavar='[TOPIC]...', help='names of the registry; default: all')
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help='folder that the recording creates; default: a new one in bags')
-    ] = None,
-    split: Annotated[
-        list[str] | None,
-        typer.Option(metavar='LIMIT', help='largest or longest file: 500MB, 60s; may be given once for each'),
-    ] = None,
-    snapshot: Annotated[
-        str, typer.Option(metavar='DURATION', help='record only around events, with so much before: 30s')
-    ] = '',
+    out: NewFolder = None,
+    split: Split = None,
+    snapshot: Snapshot = '',
     snapshot_after: Annotated[
         str, typer.Option(metavar='DURATION', help='snapshot: and with so much after an event')
     ] = '10s',
@@ -43,8 +38,8 @@ def record(
     on_full: Annotated[
         str, typer.Option(help='full disk: stop, or continue without recording until the end is asked for')
     ] = 'stop',
-    domain: Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')] = None,
-    namespace: Annotated[str, typer.Option(help='namespace of the mount, such as mount_right')] = '',
+    domain: Domain = None,
+    namespace: Namespace = '',
 ) -> None:
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
     from mount_bags.recorder_parameters import RecorderParameters

@@ -7,6 +7,8 @@ import typer
 import yaml
 from rich.console import Console
 
+from mount_bringup.options import Domain, JsonFile, NewFolder
+
 EPILOG = """Examples:
 
 `engine-mount replay bags/2026-11-20_18-03-11_motorway/recording` - equal to what was recorded?
@@ -57,12 +59,8 @@ def replay(
     offset: Annotated[
         str, typer.Option(help='foreign recording: what is subtracted after --scale, in m, or mean')
     ] = 'mean',
-    out: Annotated[
-        Path | None, typer.Option(help='folder of what comes out; default: a new one in bags')
-    ] = None,
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='write the printed figures to this file')
-    ] = None,
+    out: NewFolder = None,
+    json_file: JsonFile = None,
     rate: Annotated[float, typer.Option(help='live: factor on the speed of time')] = 1.0,
     start: Annotated[float, typer.Option('--from', help='live: where to begin, s')] = 0.0,
     topic_names: Annotated[
@@ -72,7 +70,7 @@ def replay(
         bool,
         typer.Option('--with-control', help='live: mount_control answers, not the recording'),
     ] = False,
-    domain: Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')] = None,
+    domain: Domain = None,
     namespace: Annotated[str, typer.Option(help='live: namespace of the published topics')] = '',
 ) -> None:
     """Replay a recorded displacement through the same controller and tell whether its answers are the same.

@@ -1,0 +1,123 @@
+"""`engine-mount drive`: the simulated car through the whole graph."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+from rich.console import Console
+
+from mount_bringup.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
+
+EPILOG = """Examples:
+
+`engine-mount drive` - a gap in the motorway, in real time
+
+`engine-mount drive --scenario bench --lockstep --duration 10` - 8 Hz, 1 mm, as fast as it goes
+
+`engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
+
+`engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
+
+`engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.damper=viscous_3000`
+"""
+
+
+def drive(
+    scenario: Annotated[str, typer.Option(help='motorway, bench or recorded')] = 'motorway',
+    file: Annotated[
+        Path | None, typer.Option(help='recorded: CSV, NPY, folder of NPY pairs, or MCAP')
+    ] = None,
+    column: Annotated[
+        str, typer.Option(help='recorded: column (CSV), signal.number (NPY) or field of the message (MCAP)')
+    ] = '',
+    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV)')] = '',
+    topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
+    scale: Annotated[
+        float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
+    ] = None,
+    lockstep: Annotated[
+        bool, typer.Option('--lockstep', help='the electronics wait for each answer: deterministic, faster')
+    ] = False,
+    core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
+    duration: Annotated[
+        float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help='seed of noise and road')] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option('--set', metavar='NODE.NAME=VALUE', help='any parameter of any node; may be repeated'),
+    ] = None,
+    out: NewFolder = None,
+    json_file: JsonFile = None,
+    on_full: Annotated[
+        str, typer.Option(help='full disk: stop the run, or continue without recording')
+    ] = 'stop',
+    split: Split = None,
+    snapshot: Snapshot = '',
+    priority: Annotated[
+        int,
+        typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
+    ] = 10,
+    domain: Domain = None,
+    namespace: Namespace = '',
+) -> None:
+    """Drive the simulated car through the whole graph, record it and print what happened."""
+    from mount_bringup import drive as driving
+    from mount_bringup.domain import chosen_domain
+    from mount_bringup.recorder_options import recorder_options
+    from mount_bringup.settings import checked_settings
+    from mount_bringup.summary import write_json
+
+    if lockstep and core:
+        raise typer.BadParameter('choose --lockstep or --core, not both')
+    parameters = _parameters(settings or [])
+    given = {
+        'scenario': scenario,
+        'seed': seed,
+        'timeline.duration': duration,
+        'recorded.file': str(file.absolute()) if file else None,
+        'recorded.column': column or None,
+        'recorded.time_column': time_column or None,
+        'recorded.topic': topic or None,
+        'recorded.scale': scale,
+    }
+    sim = parameters.setdefault('mount_sim', {})
+    sim.update({name: value for name, value in given.items() if value is not None})
+    recorder = recorder_options(split or [], snapshot)
+    if on_full != 'stop':
+        recorder['on_full'] = on_full
+    if recorder:
+        parameters.setdefault('mount_recorder', {}).update(recorder)
+    parameters = checked_settings(parameters)
+    if core and parameters.get('mount_recorder', {}).get('snapshot'):
+        raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
+    mode = 'core' if core else 'lock-step' if lockstep else 'real time'
+    chosen = chosen_domain(domain)
+    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority)
+    console = Console()
+    outcome = driving.drive(order, console)
+    if json_file is not None:
+        write_json(outcome.figures, json_file)
+    if outcome.folder.figure.exists():
+        console.print(f'figure     {outcome.folder.figure}', highlight=False)
+    for place in outcome.recordings:
+        console.print(f'recording  {place}', highlight=False)
+    for complaint in outcome.complaints:
+        console.print(f'[yellow]note[/yellow] {complaint}')
+    if outcome.complaints:
+        raise typer.Exit(1)
+
+
+def _parameters(settings: list[str]) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of the `--set` options."""
+    parameters: dict[str, dict[str, Any]] = {}
+    for setting in settings:
+        name, equals, text = setting.partition('=')
+        node, dot, parameter = name.partition('.')
+        if not (equals and dot and parameter):
+            raise typer.BadParameter(
+                f'--set {setting}: write NODE.NAME=VALUE, as in mount_control.quality=0.7'
+            )
+        parameters.setdefault(node, {})[parameter] = yaml.safe_load(text)
+    return parameters
