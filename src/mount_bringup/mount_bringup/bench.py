@@ -3,7 +3,6 @@
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import cantools
 import numpy as np
@@ -12,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from sensor_msgs.msg import JointState
 
+from mount_bringup.bench_comparison import Comparison, in_turn
 from mount_bringup.bench_storage import ROUNDS as STORAGE_ROUNDS
 from mount_bringup.bench_storage import storage_figures
 from mount_bringup.core_run import run_core
@@ -27,17 +27,8 @@ from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import CONTROL_TRACE
 
 _ROUNDS = 7
+_REPEATS = 2000
 _STAMP = 1_700_000_000_000_000_000
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """What is compared, seconds for one of ours and one of the other."""
-
-    what: str
-    ours: float
-    other_name: str
-    other: float
 
 
 def print_bench(console: Console) -> None:
@@ -61,14 +52,16 @@ def _packing() -> Comparison:
     def general() -> bytes:
         return serialize_message(JointState(name=list(CONTROL_TRACE.names), position=list(numbers)))
 
-    ours, other = _in_turn(lambda: layout.pack(_STAMP, numbers), general, 2000)
+    ours, other = in_turn(lambda: layout.pack(_STAMP, numbers), general, _ROUNDS, _REPEATS)
     return Comparison('pack a control_trace', ours, 'rclpy message', other)
 
 
 def _unpacking() -> Comparison:
     layout = ScalarsLayout(CONTROL_TRACE)
     raw = layout.pack(_STAMP, tuple(float(n) for n in range(len(CONTROL_TRACE.names))))
-    ours, other = _in_turn(lambda: layout.unpack(raw), lambda: deserialize_message(raw, JointState), 2000)
+    ours, other = in_turn(
+        lambda: layout.unpack(raw), lambda: deserialize_message(raw, JointState), _ROUNDS, _REPEATS
+    )
     return Comparison('unpack a control_trace', ours, 'rclpy message', other)
 
 
@@ -78,7 +71,9 @@ def _coding() -> Comparison:
     assert isinstance(database, cantools.database.can.Database)
     message = database.get_message_by_name('MountMeasurement')
     frame = codec.encode_measurement(Measurement(7, 7000, 1e-4, 0.2, 300.0, 110.0), 7)
-    ours, other = _in_turn(lambda: codec.decode_measurement(frame), lambda: message.decode(frame), 2000)
+    ours, other = in_turn(
+        lambda: codec.decode_measurement(frame), lambda: message.decode(frame), _ROUNDS, _REPEATS
+    )
     return Comparison('decode one CAN frame with CRC', ours, 'cantools, no CRC', other)
 
 
@@ -97,18 +92,6 @@ def _closed_loop() -> Comparison:
     samples = run_core(order, lambda *_: None).samples
     ours = _median_time(lambda: run_core(order, lambda *_: None), rounds=3) / samples
     return Comparison('one sample, plant and control', ours, 'real time', SAMPLE_TIME)
-
-
-def _in_turn(ours: Callable[[], object], other: Callable[[], object], repeats: int) -> tuple[float, float]:
-    """Return the median seconds of one call of each, measured A B A B ..."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(_ROUNDS):
-        for place, call in enumerate((ours, other)):
-            begin = time.perf_counter()
-            for _ in range(repeats):
-                call()
-            times[place].append((time.perf_counter() - begin) / repeats)
-    return statistics.median(times[0]), statistics.median(times[1])
 
 
 def _median_time(call: Callable[[], object], rounds: int = _ROUNDS) -> float:

@@ -1,10 +1,6 @@
 """Figures of the storage of recordings: writing and loading, each beside its alternative in the same run."""
 
-import statistics
 import tempfile
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +9,7 @@ from mcap.writer import Writer
 import mount_bags
 from mount_bags.container import CHUNK_SIZE
 from mount_bags.writer import BagWriter
+from mount_bringup.bench_comparison import Comparison, in_turn
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import DISPLACEMENT
@@ -25,24 +22,9 @@ _STAMP = 1_700_000_000_000_000_000  # ns, any time
 _TOPIC = f'/{DISPLACEMENT.name}'
 
 
-@dataclass(frozen=True)
-class StorageFigure:
-    """What is measured, s per message for ours and for the other."""
-
-    what: str
-    ours: float
-    other_name: str
-    other: float
-
-    @property
-    def per_second(self) -> float:
-        """How many messages ours handles in a second."""
-        return 1.0 / self.ours
-
-
 def storage_figures(
     samples: int = _SAMPLES, written: int = _WRITTEN, rounds: int = ROUNDS
-) -> list[StorageFigure]:
+) -> list[Comparison]:
     """Measure and return the figures: medians of `rounds`, ours and the other in turn.
 
     Loading is that of `displacement` from a recording of `samples` (10 minutes at 1 kHz), from opening the
@@ -54,7 +36,7 @@ def storage_figures(
         return figures + ([loading] if loading else [])
 
 
-def _writing(folder: Path, count: int, rounds: int) -> StorageFigure:
+def _writing(folder: Path, count: int, rounds: int) -> Comparison:
     raws = _messages(count)
     places = iter(range(2 * rounds))
 
@@ -72,11 +54,11 @@ def _writing(folder: Path, count: int, rounds: int) -> StorageFigure:
                 writer.add_message(channel, _STAMP + index, raw, _STAMP + index)
             writer.finish()
 
-    first, second = _in_turn(ours, other, rounds)
-    return StorageFigure('write a message to a bag', first / count, 'mcap.writer', second / count)
+    first, second = in_turn(ours, other, rounds)
+    return Comparison('write a message to a bag', first / count, 'mcap.writer', second / count)
 
 
-def _loading(folder: Path, samples: int, rounds: int) -> StorageFigure | None:
+def _loading(folder: Path, samples: int, rounds: int) -> Comparison | None:
     try:
         from rosbags.rosbag2 import Reader
         from rosbags.typesys import Stores, get_typestore
@@ -99,8 +81,8 @@ def _loading(folder: Path, samples: int, rounds: int) -> StorageFigure | None:
                 numbers.append(message.position[0])  # type: ignore[attr-defined]
         _require(np.array(stamps), np.array(numbers), samples)
 
-    first, second = _in_turn(ours, other, rounds)
-    return StorageFigure(f'load displacement of {MINUTES} min', first / samples, 'rosbags', second / samples)
+    first, second = in_turn(ours, other, rounds)
+    return Comparison(f'load displacement of {MINUTES} min', first / samples, 'rosbags', second / samples)
 
 
 def _require(stamps: np.ndarray, numbers: np.ndarray, samples: int) -> None:
@@ -124,14 +106,3 @@ def _write(folder: Path, raws: list[bytes]) -> None:
     for index, raw in enumerate(raws):
         writer.write(_TOPIC, raw, _stamp(index))
     writer.close()
-
-
-def _in_turn(ours: Callable[[], object], other: Callable[[], object], rounds: int) -> tuple[float, float]:
-    """Return the median seconds of each, measured A B A B ..."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(rounds):
-        for place, call in enumerate((ours, other)):
-            begin = time.perf_counter()
-            call()
-            times[place].append(time.perf_counter() - begin)
-    return statistics.median(times[0]), statistics.median(times[1])
