@@ -94,16 +94,9 @@ class _Player:
 
     def _ramp(self, ramp: Ramp, progress: Callable[[int], None]) -> RampAnswers:
         layout = ScalarsLayout(topics.COIL_RIPPLE)
-        rows = zip(
-            ramp.stamps.tolist(),
-            ramp.coil_current.tolist(),
-            ramp.current_rate.tolist(),
-            ramp.flux_rate.tolist(),
-            strict=True,
-        )
         messages = [
             layout.pack(stamp, (current, np.nan), (current_rate, flux_rate))
-            for stamp, current, current_rate, flux_rate in rows
+            for stamp, current, current_rate, flux_rate in ramp.samples()
         ]
         own = {'silence_timeout': PATIENCE}
         with self._node(MountInit, 'mount_init', own) as node, self._path(node) as path:

@@ -1,5 +1,6 @@
 """The initialisations in a recording: their results, and the ramps whose samples are all there."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,6 +37,11 @@ class Ramp:
     coil_current: Column
     current_rate: Column
     flux_rate: Column
+
+    def samples(self) -> Iterator[tuple[int, float, float, float]]:
+        """Return the samples one by one, as an initialisation takes them."""
+        columns = (self.stamps, self.coil_current, self.current_rate, self.flux_rate)
+        return zip(*(column.tolist() for column in columns), strict=True)
 
 
 def measured_gaps(recording: Recording) -> list[MeasuredGap]:
