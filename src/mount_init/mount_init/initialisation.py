@@ -46,6 +46,13 @@ from mount_models.specimen import Specimen
 
 OFF = 0.0  # A: the safe state
 
+_NOT_FOLLOWING = 'is the coil connected, and the supply at its voltage?'
+# From here late setpoints look like a broken cable: mount_driver and the electronics then switch off.
+_GONE = (
+    'it did before: did setpoints come too late, so that mount_driver or the electronics switched off '
+    '(is this machine overloaded?), or did the coil come loose?'
+)
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -96,6 +103,7 @@ class Initialisation:
         self._setpoints: list[float] = self.ramp.setpoints.tolist()
         self._failure: InitialisationError | None = None
         self._deviating = 0
+        self._followed = False
         self._invalid = 0
 
     @property
@@ -155,10 +163,12 @@ class Initialisation:
         self._invalid = 0
         deviates = abs(current - setpoint) > parameters.following_error
         self._deviating = self._deviating + 1 if deviates else 0
+        self._followed |= not deviates and current > parameters.following_error
         if self._deviating > parameters.following_duration * parameters.sample_rate:
+            gone = self._followed and abs(current) <= parameters.following_error
             self._failure = CurrentNotFollowingError(
                 f'coil current ({current:.3f} A) must follow its setpoint ({setpoint:.3f} A) within '
-                f'{parameters.following_error:g} A; is the coil connected, and the supply at its voltage?'
+                f'{parameters.following_error:g} A; {_GONE if gone else _NOT_FOLLOWING}'
             )
 
 

@@ -88,10 +88,19 @@ def test_an_open_coil_is_refused_early(specimen, simulated_actuator, run_ramp):
     assert initialisation.readings.received < 100
 
 
+@pytest.mark.parametrize('since', [200, 1000])
+def test_a_current_that_followed_and_is_gone_hints_at_late_setpoints(refusal, since):
+    error = refusal(distort=lambda n, s: s if n < since else (0.0, s[1], s[2]))
+    assert isinstance(error, CurrentNotFollowingError)
+    assert 'it did before: did setpoints come too late' in str(error)
+    assert 'is the coil connected' not in str(error)
+
+
 def test_a_supply_too_weak_for_the_current_is_refused(refusal, specimen, simulated_actuator, run_ramp):
     error = refusal(supply=6.0)
     assert isinstance(error, CurrentNotFollowingError)
     assert 'coil current (2.400 A) must follow its setpoint (2.' in str(error)
+    assert 'the supply at its voltage' in str(error)
     initialisation = run_ramp(simulated_actuator(supply=6.0), specimen)
     assert initialisation.step(0, 2.4, 1.0, 1.0) == OFF
 
