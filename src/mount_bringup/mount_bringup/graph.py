@@ -6,12 +6,16 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class GraphNode:
-    """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without."""
+    """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without.
+
+    A node that refuses to be activated is asked `activations` times.
+    """
 
     name: str
     package: str
     class_name: str
     needs: tuple[str, ...]
+    activations: int = 1
 
 
 RECORDER = GraphNode('mount_recorder', 'mount_bags', 'MountRecorder', ())
@@ -19,7 +23,13 @@ DRIVER = GraphNode(
     'mount_driver', 'mount_driver', 'MountDriver', ('current_setpoint', 'displacement', 'coil_ripple')
 )
 SIM = GraphNode('mount_sim', 'mount_sim', 'MountSim', ())
-INIT = GraphNode('mount_init', 'mount_init', 'MountInit', ('coil_ripple', 'current_setpoint'))
+INIT = GraphNode(
+    'mount_init',
+    'mount_init',
+    'MountInit',
+    ('coil_ripple', 'current_setpoint'),
+    activations=3,  # chosen: the machine may be too busy for one ramp
+)
 CONTROL = GraphNode(
     'mount_control',
     'mount_control',

@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph import CONTROL, DRIVER, INIT, RECORDER, GraphNode, GraphSettings
+from mount_bringup.graph import CONTROL, DRIVER, RECORDER, GraphNode, GraphSettings
 from mount_bringup.processes import NodeProcess, end_all, start_processes
 from mount_ros.diagnostics import Level
 from mount_ros.qos import publisher_qos, recording_qos
@@ -26,7 +26,6 @@ from mount_ros.topics import DIAGNOSTICS, SESSION
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
-_ACTIVATION_ATTEMPTS = 3  # chosen
 _TRANSITION_LIMIT = 60.0  # s, chosen: activation of mount_init includes its current ramp
 
 
@@ -84,17 +83,16 @@ class Supervisor:
             self._activate(node, say)
 
     def _activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
-        """Activate a node; a ramp that the machine was too busy for is driven again."""
-        for attempt in range(1, _ACTIVATION_ATTEMPTS + 1):
+        """Activate a node; one that refuses is asked as often as the graph declares."""
+        for _ in range(node.activations - 1):
             try:
                 self.transition(node, Transition.TRANSITION_ACTIVATE)
             except GraphError as error:
-                if node is not INIT or attempt == _ACTIVATION_ATTEMPTS:
-                    raise
                 self.notes.append(f'{error}; it was activated again')
                 say(f'activating {node.name} again')
             else:
                 return
+        self.transition(node, Transition.TRANSITION_ACTIVATE)
 
     def figures(self, node: GraphNode) -> dict[str, str]:
         """Return the last diagnostics of a node: its figures, `level` and `sentence`; empty if none came."""
