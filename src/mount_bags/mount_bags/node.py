@@ -15,7 +15,7 @@ from mount_bags.diagnosis import OnFull, RecorderState, judge
 from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time
 from mount_bags.offered_qos import OfferedQos
 from mount_bags.recorder_parameters import RecorderParameters, split_of
-from mount_bags.recording import MEMORY_LIMIT, Recorder
+from mount_bags.recording import Recorder
 from mount_bags.snapshot import Snapshot, SnapshotRule
 from mount_bags.space import SpaceGuard
 from mount_bags.watching import watch_topic
@@ -30,7 +30,6 @@ from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
 NAME = 'mount_recorder'
 _FAMILY = 'mount_record'  # all recorders are called so or something longer
-_LOCKSTEP_MEMORY = 1 << 20  # bytes, chosen: the loop in the same process waits before much is queued
 _PLACES = {
     'uri': ('', 'folder that the recording creates; it must not exist'),
     'topics': ([entry.name for entry in TOPICS], 'names of registered topics to record'),
@@ -76,14 +75,15 @@ class MountRecorder(SafeLifecycleNode):
         self._marks = AutomaticMarks(partial(self._publish_automatic, data_path), kinds)
         self._recorder = Recorder(
             self._sink,
-            memory_limit=_LOCKSTEP_MEMORY if self.lockstep else MEMORY_LIMIT,
-            patient=self.lockstep,
+            threaded=not self.lockstep,
             space=self._space,
             on_loss=self._mark_loss,
         )
         self._announced_failure = ''
         for entry in topics:
             self._record(data_path, entry)
+        if self.lockstep:
+            data_path.attend(self._recorder.poll)
         data_path.start()
 
     def activate(self) -> None:

@@ -1,7 +1,8 @@
-"""The core of the recorder: a queue between the thread that receives and the thread that writes.
+"""The core of the recorder: a queue between the thread that receives and the one that writes.
 
 Receiving is one append. Whatever the disk does, publishers never wait: the queue grows up to a limit
-in bytes, and what does not fit is lost, counted and reported.
+in bytes, and what does not fit is lost, counted and reported. In lock-step one thread does both, in turn:
+no time passes while it writes, and two that take turns in one process cost more than the work.
 """
 
 import threading
@@ -70,11 +71,9 @@ class Recorder:
     """Takes serialised messages of announced topics and writes them from `begin` to `end`.
 
     The functions that `receiver` and `latched_receiver` return are all called by one thread, `begin`
-    and `end` by any other. What `watch` and `observe` take is called by the writing thread, and so is
+    and `end` by any other. The writing is done by a thread of its own, or (`threaded` off) by whoever
+    calls `poll`. What `watch` and `observe` take is called where the writing is done, and so is
     `on_loss`, with the number of messages for which the queue had no room since it was called last.
-
-    Where the queue is full, messages are lost and counted; a `patient` recorder lets whoever brings them
-    wait instead. That is for lock-step, where the publishers wait for it and no time passes.
     """
 
     def __init__(
@@ -82,7 +81,7 @@ class Recorder:
         writer: Sink,
         *,
         memory_limit: int = MEMORY_LIMIT,
-        patient: bool = False,
+        threaded: bool = True,
         space: SpaceGuard | None = None,
         on_loss: Callable[[int], None] = lambda _: None,
     ):
@@ -90,7 +89,6 @@ class Recorder:
         self.begun = False
         self._writer = writer
         self._memory_limit = memory_limit
-        self._patient = patient
         self._space = space
         self._on_loss = on_loss
         self._observers: dict[str, Observe] = {}
@@ -100,10 +98,14 @@ class Recorder:
         self._gate = threading.Lock()
         self._latched: dict[str, _Item] = {}
         self._received_bytes = 0  # changed by the receiving thread alone
-        self._drained_bytes = 0  # changed by the writing thread alone
+        self._drained_bytes = 0  # changed where the writing is done alone
         self._handed = 0  # to the writer, or thrown away after it failed
         self._failure = ''
+        self._turn_end = self._changed = self._looked = 0.0  # steady times, s
+        self._kept_before = self._lost_before = 0
+        self._writing = threading.Lock()
         self._ending = threading.Event()
+        self._threaded = threaded
         self._thread = threading.Thread(target=self._work, name='recorder', daemon=True)
         writer.attach(self._receptions)
 
@@ -149,19 +151,32 @@ class Recorder:
             self.begun = True
             for item in sorted(self._latched.values(), key=lambda item: item[2]):
                 self._taker(item[0])(item)
+            self._changed = self._looked = time.monotonic()
             self._open = True
-        self._thread.start()
+        if self._threaded:
+            self._thread.start()
+
+    def poll(self) -> bool:
+        """Write what is queued, a few times per 0.1 s; for a recorder without a thread. Returns False."""
+        if self._open and time.monotonic() - self._turn_end > _DRAIN_PERIOD:
+            with self._writing:
+                if self._open:
+                    self._take_turn()
+        return False
 
     def end(self) -> None:
         """Wait until no message is under way, write what is queued and close; safe to call twice.
 
         Raises `RecordingError` where the end of the file could not be written.
         """
-        if self._thread.is_alive():
+        if self._open:
             self._settle()
             self._open = False
             self._ending.set()
-            self._thread.join()
+            if self._threaded:
+                self._thread.join()
+            with self._writing:
+                self._guarded(self._write_queued)
         self._note_missing()
         try:
             self._writer.close()
@@ -202,24 +217,13 @@ class Recorder:
         def take(item: _Item) -> None:
             reception.received += 1
             size = len(item[1])
-            if self._is_full(size) and not (self._patient and self._comes_free(size)):
+            if self._received_bytes + size - self._drained_bytes > self._memory_limit:
                 reception.overflowed += 1
                 return
             self._received_bytes += size
             append(item)
 
         return take
-
-    def _is_full(self, size: int) -> bool:
-        return self._received_bytes + size - self._drained_bytes > self._memory_limit
-
-    def _comes_free(self, size: int) -> bool:
-        """Wait until the writing thread has made room for `size` bytes; False if it never will."""
-        while self._is_full(size):
-            if self._failure or not self._thread.is_alive():
-                return False
-            time.sleep(_DRAIN_PERIOD)
-        return True
 
     def _received(self) -> int:
         return sum(entry.received for entry in self._receptions.values())
@@ -244,25 +248,25 @@ class Recorder:
         except IndexError:  # the writing thread was faster
             return 0
 
-    # The writing thread.
+    # The writing.
 
     def _work(self) -> None:
-        kept, changed = 0, time.monotonic()
-        looked, lost = changed, 0
         while not self._ending.wait(_DRAIN_PERIOD):
-            self._guarded(self._write_queued)
-            now = time.monotonic()
-            if self._writer.kept != kept or not self._writer.pending:
-                kept, changed = self._writer.kept, now
-            elif now - changed > _FLUSH_PERIOD:
-                self._guarded(self._writer.flush)
-            if now - looked > _SPACE_PERIOD:
-                looked = now
-                self._guarded(self._look_at_space)
-            if (overflowed := self._overflowed()) > lost:
-                self._on_loss(overflowed - lost)
-                lost = overflowed
+            self._take_turn()
+
+    def _take_turn(self) -> None:
         self._guarded(self._write_queued)
+        now = self._turn_end = time.monotonic()
+        if self._writer.kept != self._kept_before or not self._writer.pending:
+            self._kept_before, self._changed = self._writer.kept, now
+        elif now - self._changed > _FLUSH_PERIOD:
+            self._guarded(self._writer.flush)
+        if now - self._looked > _SPACE_PERIOD:
+            self._looked = now
+            self._guarded(self._look_at_space)
+        if (overflowed := self._overflowed()) > self._lost_before:
+            self._on_loss(overflowed - self._lost_before)
+            self._lost_before = overflowed
 
     def _write_queued(self) -> None:
         rest = len(self._queue)

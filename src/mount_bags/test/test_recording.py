@@ -23,11 +23,11 @@ from mount_ros.topics import DISPLACEMENT
 STRING = 'std_msgs/msg/String'
 
 
-def recorder_of(folder, memory_limit=1 << 20, patient=False, space=None, on_loss=lambda _: None, **options):
+def recorder_of(folder, memory_limit=1 << 20, threaded=True, space=None, on_loss=lambda _: None, **options):
     writer = BagWriter(folder, **options)
     writer.add_topic('/displacement', DISPLACEMENT.type)
     writer.add_topic('/latched', STRING)
-    return Recorder(writer, memory_limit=memory_limit, patient=patient, space=space, on_loss=on_loss)
+    return Recorder(writer, memory_limit=memory_limit, threaded=threaded, space=space, on_loss=on_loss)
 
 
 @pytest.fixture
@@ -151,23 +151,37 @@ def test_full_queue_loses_and_counts_without_waiting(tmp_path, clocked):
     recorder.end()
 
 
-def test_patient_recorder_lets_whoever_brings_messages_wait_and_loses_none(tmp_path, clocked):
-    size = len(sample(DISPLACEMENT, 0))
-    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, patient=True)
+def test_recorder_without_a_thread_writes_when_it_is_polled(tmp_path, clocked):
+    recorder = recorder_of(tmp_path / 'bag', threaded=False)
     receive = clocked(recorder.receiver('/displacement'))
     recorder.begin()
     for index in range(100):
         receive(sample(DISPLACEMENT, index))
+    assert recorder.figures().queued == 100
+    assert recorder.poll() is False
+    assert recorder.figures().queued == 0
+    receive(sample(DISPLACEMENT, 100))
     recorder.end()
     assert recorder.figures().lost == 0
     assert [data for _, data, _ in messages_of(tmp_path / 'bag')] == [
-        sample(DISPLACEMENT, index) for index in range(100)
+        sample(DISPLACEMENT, index) for index in range(101)
     ]
 
 
-def test_patient_recorder_does_not_wait_for_one_that_has_failed(tmp_path, clocked):
-    size = len(sample(DISPLACEMENT, 0))
-    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, patient=True)
+def test_recorder_without_a_thread_ignores_polls_before_and_after_its_time(tmp_path, clocked):
+    recorder = recorder_of(tmp_path / 'bag', threaded=False)
+    receive = clocked(recorder.receiver('/displacement'))
+    recorder.poll()
+    recorder.begin()
+    receive(sample(DISPLACEMENT, 0))
+    recorder.end()
+    size = (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size
+    recorder.poll()
+    assert (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size == size
+
+
+def test_recorder_without_a_thread_says_why_it_has_failed(tmp_path, clocked):
+    recorder = recorder_of(tmp_path / 'bag', threaded=False)
 
     def fail(*_):
         raise RecordingError('no space left')
@@ -177,8 +191,10 @@ def test_patient_recorder_does_not_wait_for_one_that_has_failed(tmp_path, clocke
     recorder.begin()
     for index in range(100):
         receive(sample(DISPLACEMENT, index))
+    recorder.poll()
     recorder.end()
     assert recorder.figures().lost == 100
+    assert recorder.figures().failure == 'no space left'
 
 
 def test_missing_samples_are_seen_while_they_are_recorded(tmp_path, clocked):

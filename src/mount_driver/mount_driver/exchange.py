@@ -14,6 +14,7 @@ import can
 from mount_driver.bus import CanLinkError, may_have_frames, open_bus
 from mount_driver.codec import Measurement, MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.frame import Frame
 from mount_driver.link import Arrival, Link, Refusal
 from mount_driver.parameters import DriverParameters
 
@@ -67,13 +68,7 @@ class Exchange:
         self._ids = (codec.measurement.frame_id, codec.status.frame_id)
         self._bus: can.BusABC | None = None
         self._alive = AliveCounter()
-        self._frame = can.Message(
-            arbitration_id=codec.setpoint.frame_id,
-            is_extended_id=False,
-            is_fd=True,
-            bitrate_switch=True,
-            data=bytes(codec.setpoint.length),
-        )
+        self._frame = Frame(codec.setpoint.frame_id, bytes(codec.setpoint.length))
         self._sending = threading.Lock()  # between setpoints, the watch and the end
         self._accepting = False
         self._ending = threading.Event()

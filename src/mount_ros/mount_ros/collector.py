@@ -13,7 +13,7 @@ from collections.abc import Callable
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from mount_ros.data_path import DataThread, io_node
+from mount_ros.data_path import DataThread, Work, io_node
 from mount_ros.message_types import message_class
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import Topic
@@ -28,14 +28,16 @@ _SHARED_PERIOD = 0.02  # s, chosen: the same where nobody looks at the recording
 class Collector:
     """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first.
 
-    The thread is its own, or the one that also serves the publishers: two that take turns in one
-    process cost more than the work.
+    The thread is its own, or (`thread`) the one that also serves the publishers: two that take turns in one
+    process cost more than the work. Only that one can `attend` to other work too.
     """
 
     def __init__(self, owner: Node, *, thread: DataThread | None = None):
         self.node = io_node(owner)
         self._shared_thread = thread
         self._taken_at = 0.0
+        self._works: list[Work] = [self._take_when_due]
+        self._attended: list[Work] = []
         self._receivers: list[tuple[Subscription, Receive]] = []
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
@@ -57,10 +59,18 @@ class Collector:
         """Return the names of the topics that no publisher has been found for yet."""
         return sorted(s.topic_name for s, _ in self._receivers if s.get_publisher_count() == 0)
 
+    def attend(self, work: Work) -> None:
+        """Let the thread that serves the publishers do `work` too while it serves; `work` must not raise."""
+        if self._shared_thread is None:
+            raise ValueError('a collector with a thread of its own attends to nothing but its messages')
+        self._works.append(work)
+
     def start(self) -> None:
         """Begin to take messages."""
         if self._shared_thread is not None:
-            self._shared_thread.attend(self._take_when_due)
+            for work in self._works:
+                self._shared_thread.attend(work)
+                self._attended.append(work)
             return
         self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
         self._thread.start()
@@ -71,7 +81,8 @@ class Collector:
             return
         self._ending.set()
         if self._shared_thread is not None:
-            self._shared_thread.leave(self._take_when_due)
+            for work in self._attended:
+                self._shared_thread.leave(work)
         if self._thread is not None:
             self._thread.join()
         self.node.destroy_node()

@@ -9,6 +9,7 @@ import can
 from mount_driver.bus import may_have_frames
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
+from mount_driver.frame import Frame
 from mount_sim.electronics import Reading
 
 _COUNTER_MASK = 0xFFFF
@@ -59,12 +60,12 @@ class CanEnd:
             number & _COUNTER_MASK, microseconds & _MICROSECOND_MASK, *reading, enabled=enabled
         )
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
-        return self._frame(self._codec.measurement.frame_id, data)
+        return Frame(self._codec.measurement.frame_id, data)
 
     def send_status(self, status: Status) -> None:
         """Send the slow health message."""
         data = self._codec.encode_status(status, self._status_alive.next())
-        self.send_frame(self._frame(self._codec.status.frame_id, data))
+        self.send_frame(Frame(self._codec.status.frame_id, data))
 
     def send_frame(self, frame: can.Message) -> None:
         """Send a frame as it is."""
@@ -113,9 +114,3 @@ class CanEnd:
             return None
         self._latest = ReceivedSetpoint(setpoint, time.monotonic())
         return self._latest
-
-    @staticmethod
-    def _frame(identifier: int, data: bytearray) -> can.Message:
-        return can.Message(
-            arbitration_id=identifier, data=data, is_fd=True, is_extended_id=False, bitrate_switch=True
-        )
