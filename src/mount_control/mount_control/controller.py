@@ -71,6 +71,15 @@ class Tables(NamedTuple):
     current: NDArray[np.float64]
 
 
+class Memory(NamedTuple):
+    """The first arguments of the compiled `step`: bytes of law and state, tables, window of the magnitude."""
+
+    law: NDArray[np.uint8]
+    tables: Tables
+    state: NDArray[np.uint8]
+    window: NDArray[np.float64]
+
+
 class Controller:
     """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
 
@@ -102,6 +111,11 @@ class Controller:
         self._trace_record = self._trace.view(TRACE)[0]
         self._window = np.zeros(parameters.period_samples)
         self.restart(0.0)
+
+    @property
+    def memory(self) -> Memory:
+        """What the compiled `step` takes before trace and sample, for a compiled loop that calls it."""
+        return Memory(self._law, self._tables, self._state, self._window)
 
     @property
     def trace(self) -> np.void:
