@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 import zstandard
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
@@ -437,6 +437,7 @@ def test_limits_of_this_process_are_untouched():
     split=st.sampled_from([WHOLE, SplitRule(duration=17 * PERIOD), SplitRule(size=200_000)]),
     latched=st.booleans(),
 )
+@example(blocks=[30], widths=[69], chunk_size=500, split=WHOLE, latched=False)  # chunks filled to the byte
 def test_many_messages_at_once_make_the_file_of_messages_one_by_one(
     tmp_path_factory, blocks, widths, chunk_size, split, latched
 ):

@@ -160,7 +160,9 @@ def _changed(given: ReplayInput, changes: Mapping[str, Mapping[str, Any]]) -> di
 
 def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
     """Load or compile the laws, which a process does once."""
-    controller_for(given.controls[0].gap, parameters).run(np.zeros(1))
+    controller = controller_for(given.controls[0].gap, parameters)
+    controller.step(0.0)
+    controller.run(np.zeros(1))
     chosen_specimen(parameters)
 
 

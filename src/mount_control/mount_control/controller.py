@@ -143,9 +143,15 @@ class Controller:
             self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
         )
 
-    def run(self, displacement: NDArray[np.float64]) -> NDArray[np.void]:
-        """Take n displacement samples in m and return n traces; bit-identical to n calls of `step`."""
-        traces = np.zeros(len(displacement), TRACE)
+    def run(
+        self, displacement: NDArray[np.float64], traces: NDArray[np.void] | None = None
+    ) -> NDArray[np.void]:
+        """Take n displacement samples in m and return n traces; bit-identical to n calls of `step`.
+
+        They are written into `traces`, n records `TRACE` in a row, where it is given.
+        """
+        if traces is None:
+            traces = np.zeros(len(displacement), TRACE)
         samples = np.ascontiguousarray(displacement, dtype=float)
         run(self._law, self._tables, self._state, self._window, traces.view(np.uint8), samples)
         return traces
