@@ -1,7 +1,7 @@
 """Opens recordings: those of this project and genuine rosbag2 bags, whole or in part."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -102,8 +102,13 @@ class Recording:
         """Return all messages of a topic; raises `ReadingError` with the known topics."""
         full_name = self.resolve(name)
         if full_name not in self._series:
-            self._series[full_name] = self._load(full_name)
+            self._series |= self._load([full_name])
         return self._series[full_name]
+
+    def load(self, names: Iterable[str]) -> None:
+        """Read several topics in one pass through the files, for later use; raises `ReadingError`."""
+        wanted = dict.fromkeys(self.resolve(name) for name in names)
+        self._series |= self._load([name for name in wanted if name not in self._series])
 
     def latched(self, name: str) -> Any:
         """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
@@ -217,9 +222,14 @@ class Recording:
             self._note_damage(name, len(times))
         return found
 
-    def _load(self, name: str) -> Series:
+    def _load(self, names: Sequence[str]) -> dict[str, Series]:
+        blocks: dict[str, list[Contents]] = {name: [] for name in names}
+        for name, block in self._blocks(names) if names else ():
+            blocks[name].append(block)
+        return {name: self._series_of(name, found) for name, found in blocks.items()}
+
+    def _series_of(self, name: str, blocks: list[Contents]) -> Series:
         definition, sentence = self._definitions[name]
-        blocks = [block for _, block in self._blocks([name])]
         head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, MESSAGE_HEAD)
         self._note_damage(name, len(head))
         return Series(

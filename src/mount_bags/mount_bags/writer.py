@@ -8,6 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mount_bags.container import CHUNK_SIZE
 from mount_bags.metadata import (
     METADATA_NAME,
@@ -140,6 +143,28 @@ class BagWriter:
             self._add_message(self._channels[topic], raw, receive_time, publish_time)
         except KeyError:
             self._write_with_care(topic, raw, receive_time, publish_time)
+        except OSError as error:
+            self._end_early(error)
+
+    def write_columns(
+        self, topics: Sequence[str], columns: Sequence[NDArray[np.uint8]], times: NDArray[np.int64]
+    ) -> None:
+        """Add a message of each topic for each of `times` (ns), receive and publish time in one.
+
+        `columns` are the serialised messages, (times, bytes) for each topic. The recording is the one that
+        `write` would make of them, time by time and in the order of the topics; raises what `write` raises.
+        """
+        place = 0
+        # One by one, where a next file may begin, and topics that are met for the first time or latched.
+        while place < len(times) and (self._split != WHOLE or not self._channels.keys() >= set(topics)):
+            for topic, rows in zip(topics, columns, strict=True):
+                self.write(topic, rows[place].tobytes(), int(times[place]))
+            place += 1
+        if place == len(times):
+            return
+        numbers = [self._channels[topic] for topic in topics]
+        try:
+            self._piece.container.add_columns(numbers, [rows[place:] for rows in columns], times[place:])
         except OSError as error:
             self._end_early(error)
 

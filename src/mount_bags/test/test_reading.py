@@ -73,6 +73,18 @@ def test_single_file_is_read_like_its_folder(drive):
     assert len(recording['displacement']) == 500
 
 
+def test_topics_loaded_in_one_pass_are_those_loaded_alone(drive, monkeypatch):
+    together, alone = mount_bags.open(drive), mount_bags.open(drive)
+    names = ('displacement', 'coil_ripple')
+    together.load(names)
+    monkeypatch.setattr(together, '_blocks', lambda wanted: pytest.fail('read again'))
+    for name in names:
+        assert [*map(bytes, together[name].payloads)] == [*map(bytes, alone[name].payloads)]
+        np.testing.assert_array_equal(together[name].receive_times, alone[name].receive_times)
+    with pytest.raises(ReadingError, match='no topic'):
+        together.load(['nothing'])
+
+
 def test_latched_returns_the_last_message(drive):
     assert mount_bags.open(drive).latched('current_setpoint').position[0] == 499.0
 

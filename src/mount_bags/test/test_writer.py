@@ -9,10 +9,11 @@ import sys
 import textwrap
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 import zstandard
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
@@ -28,6 +29,7 @@ from small_disk import small_disk
 from mount_bags.metadata import read_metadata
 from mount_bags.offered_qos import OfferedQos, QosError, qos_text, read_qos
 from mount_bags.schemas import SchemaError, schema_text, type_hash
+from mount_bags.split import WHOLE, SplitRule
 from mount_bags.writer import BagWriter, RecordingError
 from mount_ros.topics import DISPLACEMENT, TOPICS
 
@@ -425,3 +427,48 @@ def test_skipped_samples_are_really_absent(tmp_path):
 
 def test_limits_of_this_process_are_untouched():
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    blocks=st.lists(st.integers(0, 40), min_size=1, max_size=5),
+    widths=st.lists(st.integers(1, 300), min_size=1, max_size=3),
+    chunk_size=st.sampled_from([1, 500, 4096]),
+    split=st.sampled_from([WHOLE, SplitRule(duration=17 * PERIOD), SplitRule(size=200_000)]),
+    latched=st.booleans(),
+)
+@example(blocks=[30], widths=[69], chunk_size=500, split=WHOLE, latched=False)  # chunks filled to the byte
+def test_many_messages_at_once_make_the_file_of_messages_one_by_one(
+    tmp_path_factory, blocks, widths, chunk_size, split, latched
+):
+    folder = tmp_path_factory.mktemp('columns')
+    topics = [f'/t{place}' for place in range(len(widths))]
+    files = []
+    for at_once in (True, False):
+        place = folder / str(at_once) / 'bag'
+        writer = BagWriter(place, chunk_size=chunk_size, split=split)
+        for topic in topics:
+            writer.add_topic(topic, STRING, latched=latched and topic == topics[0])
+        generator = np.random.default_rng(1)
+        time = START
+        for count in blocks:
+            times = time + PERIOD * np.arange(count)
+            columns = [generator.integers(0, 256, (count, width), np.uint8) for width in widths]
+            if at_once:
+                writer.write_columns(topics, columns, times)
+            else:
+                for number in range(count):
+                    for topic, rows in zip(topics, columns, strict=True):
+                        writer.write(topic, rows[number].tobytes(), int(times[number]))
+            time += PERIOD * count
+        writer.close()
+        files.append({file.name: file.read_bytes() for file in sorted(place.iterdir())})
+    assert files[0] == files[1]
+
+
+def test_a_closed_recording_takes_no_columns(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/t', STRING)
+    writer.close()
+    with pytest.raises(RecordingError, match='is closed'):
+        writer.write_columns(['/t'], [np.zeros((3, 8), np.uint8)], START + np.arange(3))

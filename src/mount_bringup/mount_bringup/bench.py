@@ -1,8 +1,10 @@
 """Performance figures as ratios: ours and its alternative in turn, in one run, medians of several."""
 
 import statistics
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import cantools
 import numpy as np
@@ -11,10 +13,12 @@ from rich.console import Console
 from rich.table import Table
 from sensor_msgs.msg import JointState
 
+from mount_bags.writer import BagWriter
 from mount_bringup.bench_comparison import Comparison, in_turn
 from mount_bringup.bench_storage import ROUNDS as STORAGE_ROUNDS
 from mount_bringup.bench_storage import storage_figures
 from mount_bringup.core_run import run_core
+from mount_bringup.replay import ReplayOrder, replay_without_output
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
 from mount_control.parameters import ControlParameters
@@ -24,10 +28,11 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.scalars import ScalarsLayout
-from mount_ros.topics import CONTROL_TRACE
+from mount_ros.topics import CONTROL_TRACE, TOPICS
 
 _ROUNDS = 7
 _REPEATS = 2000
+_DRIVEN = 20.0  # s
 _STAMP = 1_700_000_000_000_000_000
 
 
@@ -38,7 +43,7 @@ def print_bench(console: Console) -> None:
         table.add_column(title, justify='left' if title in ('what', 'beside') else 'right', no_wrap=True)
     with console.status('measuring'):
         storage = storage_figures()
-        for row in (_packing(), _unpacking(), _coding(), *storage, _control(), _closed_loop()):
+        for row in (_packing(), _unpacking(), _coding(), *storage, _control(), _replay(), _closed_loop()):
             faster = f'{row.other / row.ours:.1f}'
             table.add_row(row.what, _duration(row.ours), row.other_name, _duration(row.other), faster)
     console.print(table)
@@ -88,10 +93,34 @@ def _control() -> Comparison:
 
 
 def _closed_loop() -> Comparison:
-    order = {'mount_sim': {'scenario': 'bench', 'timeline.duration': 2.0}}
-    samples = run_core(order, lambda *_: None).samples
-    ours = _median_time(lambda: run_core(order, lambda *_: None), rounds=3) / samples
-    return Comparison('one sample, plant and control', ours, 'real time', SAMPLE_TIME)
+    """A whole run: initialisation, excitation, every message packed but not stored."""
+    order = {'mount_sim': {'scenario': 'bench', 'timeline.duration': _DRIVEN}}
+
+    def run() -> int:
+        return run_core(order, lambda *_: None, write_columns=lambda *_: None).samples
+
+    samples = run()
+    return Comparison('one sample, plant and control', _median_time(run) / samples, 'real time', SAMPLE_TIME)
+
+
+def _replay() -> Comparison:
+    """A recorded drive: from the messages of displacement in memory to the last setpoint."""
+    order = {'mount_sim': {'scenario': 'bench', 'timeline.duration': _DRIVEN}}
+    with tempfile.TemporaryDirectory() as folder:
+        recording = Path(folder) / 'recording'
+        writer = BagWriter(recording)
+        names = {topic.name: f'/{topic.name.lstrip("/")}' for topic in TOPICS}
+        for topic in TOPICS:
+            writer.add_topic(names[topic.name], topic.type)
+        run_core(order, lambda topic, raw, stamp: writer.write(names[topic.name], raw, stamp))
+        writer.close()
+        times = []
+        for _ in range(_ROUNDS):
+            outcome = replay_without_output(ReplayOrder(recording))
+            assert outcome.difference is not None
+            assert outcome.difference.equal
+            times.append(outcome.computing_time / sum(len(run.stamps) for run in outcome.replayed.runs))
+    return Comparison('replay one sample', statistics.median(times), 'real time', SAMPLE_TIME)
 
 
 def _median_time(call: Callable[[], object], rounds: int = _ROUNDS) -> float:

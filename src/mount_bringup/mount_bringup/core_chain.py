@@ -22,6 +22,8 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import Specimen, default_specimen, load_specimen
 from mount_sim.electronics import Reading
 
+_PERIOD = round(SAMPLE_TIME * 1e9)  # ns
+
 Parameters = Mapping[str, Mapping[str, Any]]
 """{node: {parameter: value}}, as given to the nodes."""
 
@@ -56,14 +58,26 @@ class CoreChain:
         self._watch = SampleWatch(SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range)
         self.result: InitialisationResult | None = None
         self.controller: Controller | None = None
+        self.controlled = False  # whether the controller answered the last sample, if only with 0 A
+        self.traced = False  # whether it made a step for it, so that its trace is of this sample
 
     @property
-    def controlling(self) -> bool:
-        """Whether the last sample was answered by the controller with a trace."""
-        return self.controller is not None
+    def displacement_range(self) -> float:
+        """Displacements (m) up to here are believed."""
+        return self._control.displacement_range
+
+    def expects(self, stamp: int) -> bool:
+        """Whether a believable sample of time `stamp` (ns) just goes on where the last one ended."""
+        return self._watch.last_stamp == stamp - _PERIOD
+
+    def follow(self, last_stamp: int, count: int) -> None:
+        """Note `count` samples that the controller answered elsewhere, the last at `last_stamp` (ns)."""
+        self._watch.follow(last_stamp, count)
 
     def answer(self, stamp: int, reading: Reading) -> float:
         """Return the setpoint (A) for a sample of time `stamp` (ns) as it came over the bus."""
+        self.traced = False
+        self.controlled = self.controller is not None
         if self.controller is not None:
             return self._control_step(self.controller, stamp, reading.displacement)
         setpoint = self._initialisation.step(
@@ -80,6 +94,7 @@ class CoreChain:
             return OFF
         if judgement is Judgement.RESTART:
             controller.restart(displacement)
+        self.traced = True
         return controller.step(displacement, missing)
 
     def _make_controller(self, result: InitialisationResult) -> Controller:

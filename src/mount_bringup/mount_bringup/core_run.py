@@ -1,38 +1,25 @@
 """A simulated drive without middleware; its recording holds the same data topics as that of the graph."""
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from geometry_msgs.msg import WrenchStamped
+import numpy as np
 
+from mount_bringup import core_loop
 from mount_bringup.core_chain import CoreChain, Parameters
-from mount_driver.quantisation import (
-    quantised_coil_current,
-    quantised_current_rate,
-    quantised_displacement,
-    quantised_flux_rate,
-    quantised_setpoint_current,
-)
+from mount_bringup.core_messages import CoreMessages, Samples, Write, WriteColumns
+from mount_control.controller import Controller
+from mount_driver.quantisation import quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
-from mount_ros import topics
-from mount_ros.cdr import serialised
-from mount_ros.force_table_message import to_message
-from mount_ros.scalars import OneNumberLayout, ScalarsLayout
-from mount_ros.topics import Topic
 from mount_sim.electronics import Reading
-from mount_sim.node import level_imu
 from mount_sim.parameters import SimParameters
 from mount_sim.scenario import build_excitation
 from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
 
-Write = Callable[[Topic, bytes, int], None]
-"""Takes (topic, serialised message, stamp ns)."""
-
 _SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
-_PROGRESS_EVERY = 1000  # samples
+_BLOCK = 1000  # samples, chosen: packed and written together
 
 
 @dataclass(frozen=True)
@@ -47,31 +34,38 @@ class CoreOutcome:
 
 
 def run_core(
-    parameters: Parameters, write: Write, progress: Callable[[float], None] = lambda share: None
+    parameters: Parameters,
+    write: Write,
+    progress: Callable[[float], None] = lambda share: None,
+    write_columns: WriteColumns | None = None,
 ) -> CoreOutcome:
-    """Run the scenario in `parameters` to its end and hand every message to `write`."""
+    """Run the scenario in `parameters` to its end and hand every message to `write`.
+
+    With `write_columns` those of the samples go there, many at a time.
+    """
     sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
     mount = SimulatedMount(sim.plant, build_excitation(sim), sim.seed)
     chain = CoreChain(parameters)
-    messages = _Messages(write)
+    messages = CoreMessages(write, write_columns)
+    samples = Samples(_BLOCK)
     pending: float | None = None
     begin = time.monotonic()
     while not mount.finished:
-        stamp = mount.sample * _SAMPLE_NANOSECONDS
-        reading = _over_the_bus(mount.measure())
-        traced = chain.controlling
-        setpoint = chain.answer(stamp, reading)
-        messages.write_sample(stamp, reading, setpoint, mount)
-        if traced and chain.controller is not None and math.isfinite(reading.displacement):
-            messages.write_trace(stamp, chain.controller.trace_bytes)
-        elif chain.controlling and chain.result is not None:
-            messages.write_result(stamp, chain.result)
-        mount.advance(pending)
-        pending = quantised_setpoint_current(setpoint)
-        if mount.sample % _PROGRESS_EVERY == 0:
+        if not samples.room:
+            messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-    if chain.controlling and setpoint != OFF:
-        messages.write_off(stamp)  # as mount_control does when it is deactivated
+        if pending is not None and chain.controller is not None and chain.expects(_stamp(mount)):
+            taken, pending = _take_many(mount, chain, chain.controller, samples, pending)
+            if taken:
+                continue
+        pending = _take_one(mount, chain, samples, pending)
+        if chain.result is not None and not chain.controlled:
+            messages.write_samples(samples)
+            messages.write_result(_stamp(mount) - _SAMPLE_NANOSECONDS, chain.result)
+    setpoint = samples.setpoints[samples.count - 1]
+    messages.write_samples(samples)
+    if chain.controlled and setpoint != OFF:
+        messages.write_off(_stamp(mount) - _SAMPLE_NANOSECONDS)  # as mount_control when it is deactivated
     return CoreOutcome(
         samples=mount.sample,
         excitation_start=mount.run.excitation_start * SAMPLE_TIME,
@@ -81,54 +75,51 @@ def run_core(
     )
 
 
-def _over_the_bus(reading: Reading) -> Reading:
-    current_rate = quantised_current_rate(reading.current_rate)
-    flux_rate = quantised_flux_rate(reading.flux_rate)
-    if math.isnan(current_rate) or math.isnan(flux_rate):
-        current_rate = flux_rate = math.nan  # the two slopes share one validity bit
-    return Reading(
-        quantised_displacement(reading.displacement),
-        quantised_coil_current(reading.coil_current),
-        current_rate,
-        flux_rate,
+def _stamp(mount: SimulatedMount) -> int:
+    return mount.sample * _SAMPLE_NANOSECONDS
+
+
+def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float | None) -> float:
+    """Take one sample and return the setpoint (A) as it arrives for the next."""
+    place, stamp = samples.count, _stamp(mount)
+    reading = Reading(*core_loop.over_the_bus(*mount.measure()))
+    setpoint = chain.answer(stamp, reading)
+    samples.stamps[place] = stamp
+    samples.readings[place] = reading
+    samples.setpoints[place] = setpoint
+    samples.truths[place] = np.frombuffer(mount.truth_bytes, np.uint8)
+    samples.traced[place] = chain.traced
+    if chain.traced and chain.controller is not None:
+        samples.traces[place] = np.frombuffer(chain.controller.trace_bytes, np.uint8)
+    samples.count += 1
+    mount.advance(pending)
+    return quantised_setpoint_current(setpoint)
+
+
+def _take_many(
+    mount: SimulatedMount, chain: CoreChain, controller: Controller, samples: Samples, pending: float
+) -> tuple[int, float]:
+    """Take samples while nothing is doubtful; return how many, and the setpoint (A) for the next."""
+    memory, values, noise = mount.ahead(samples.room)
+    part = slice(samples.count, samples.count + len(values))
+    taken, arrived, last = core_loop.run(
+        memory,
+        values,
+        noise,
+        controller.memory,
+        chain.displacement_range,
+        pending,
+        samples.readings[part],
+        samples.setpoints[part],
+        samples.truths[part],
+        samples.traces[part],
     )
-
-
-class _Messages:
-    """Makes the messages that the nodes would publish."""
-
-    def __init__(self, write: Write):
-        self._write = write
-        self._displacement = ScalarsLayout(topics.DISPLACEMENT)
-        self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
-        self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
-        self._air_gap = ScalarsLayout(topics.AIR_GAP)
-        self._trace = ScalarsLayout(topics.CONTROL_TRACE)
-        self._truth = ScalarsLayout(topics.SIM_TRUTH)
-        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
-        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
-
-    def write_sample(self, stamp: int, reading: Reading, setpoint: float, mount: SimulatedMount) -> None:
-        write, truth = self._write, mount.truth
-        write(topics.DISPLACEMENT, self._displacement.pack(stamp, (reading.displacement,)), stamp)
-        ripple = self._ripple.pack(
-            stamp, (reading.coil_current, math.nan), (reading.current_rate, reading.flux_rate)
-        )
-        write(topics.COIL_RIPPLE, ripple, stamp)
-        write(topics.CURRENT_SETPOINT, self._setpoint.pack(stamp, (setpoint,)), stamp)
-        write(topics.SIM_TRUTH, self._truth.pack_record(stamp, mount.truth_bytes), stamp)
-        acceleration = self._acceleration.pack(stamp, truth['chassis_acceleration'])
-        write(topics.SIM_CHASSIS_ACCELERATION, acceleration, stamp)
-        write(topics.SIM_MOUNT_FORCE, self._force.pack(stamp, truth['mount_force']), stamp)
-
-    def write_off(self, stamp: int) -> None:
-        self._write(topics.CURRENT_SETPOINT, self._setpoint.pack(stamp, (OFF,)), stamp)
-
-    def write_trace(self, stamp: int, trace: bytes) -> None:
-        self._write(topics.CONTROL_TRACE, self._trace.pack_record(stamp, trace), stamp)
-
-    def write_result(self, stamp: int, result: InitialisationResult) -> None:
-        numbers = [getattr(result, name) for name in self._air_gap.names]
-        self._write(topics.AIR_GAP, self._air_gap.pack(stamp, numbers), stamp)
-        table = serialised(to_message(stamp, result.table))
-        self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
+    if taken:
+        stamps = _stamp(mount) + _SAMPLE_NANOSECONDS * np.arange(taken)
+        part = slice(samples.count, samples.count + taken)
+        samples.stamps[part] = stamps
+        samples.traced[part] = True
+        samples.count += taken
+        chain.follow(int(stamps[-1]), taken)
+        mount.skip(taken, last)
+    return taken, arrived

@@ -202,6 +202,9 @@ def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> di
                 order.parameters,
                 lambda topic, raw, stamp: writer.write(names[topic.name], raw, begin + stamp),
                 lambda share: progress.update(task, completed=share),
+                lambda columns, stamps: writer.write_columns(
+                    [names[topic.name] for topic, _ in columns], [rows for _, rows in columns], begin + stamps
+                ),
             )
     finally:
         writer.close()

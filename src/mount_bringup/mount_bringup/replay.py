@@ -47,7 +47,11 @@ class ReplayOrder:
 
 @dataclass
 class ReplayOutcome:
-    """What came of it; `reading_time` (s) is that from the closed file to the displacement in memory."""
+    """What came of it.
+
+    `reading_time` (s) is that from the closed file to the displacement in memory as numbers, `decoding_time`
+    (s) the part of it from the messages in memory; 0 for a foreign recording, where it is not told apart.
+    """
 
     order: ReplayOrder
     given: ReplayInput
@@ -55,12 +59,22 @@ class ReplayOutcome:
     replayed: Replayed
     difference: Difference | None
     reading_time: float
+    decoding_time: float = 0.0
     folder: RunFolder | None = None
 
     @property
     def as_recorded(self) -> bool:
         """Whether nothing was changed, so that the answers should be those recorded."""
         return not self.order.changes and not self.order.table and self.order.foreign is None
+
+    @property
+    def computing_time(self) -> float:
+        """Seconds from the messages of displacement in memory to the last answer of the controller.
+
+        In lock-step from the start of the node, which decodes them itself.
+        """
+        decoding = self.decoding_time if self.order.mode == CORE else 0.0
+        return decoding + self.replayed.control_time
 
     @property
     def held(self) -> bool:
@@ -79,7 +93,7 @@ def replay(order: ReplayOrder, progress: Progress = lambda share: None) -> Repla
 
 def replay_without_output(order: ReplayOrder, progress: Progress = lambda share: None) -> ReplayOutcome:
     """Replay and compare."""
-    given, reading_time = _read(order)
+    given, reading_time, decoding_time = _read(order)
     parameters = _changed(given, order.changes)
     check_parameters(parameters)
     if order.mode == LOCKSTEP:
@@ -89,7 +103,9 @@ def replay_without_output(order: ReplayOrder, progress: Progress = lambda share:
     else:
         _load_compiled_run(given, parameters)
         replayed = replay_in_core(given, parameters)
-    return ReplayOutcome(order, given, parameters, replayed, difference(given, replayed), reading_time)
+    return ReplayOutcome(
+        order, given, parameters, replayed, difference(given, replayed), reading_time, decoding_time
+    )
 
 
 def check_parameters(parameters: Parameters) -> None:
@@ -126,7 +142,8 @@ def parsed_changes(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 # Reading.
 
 
-def _read(order: ReplayOrder) -> tuple[ReplayInput, float]:
+def _read(order: ReplayOrder) -> tuple[ReplayInput, float, float]:
+    """Return the input and the times (s) of reading and of decoding the displacement."""
     if order.foreign is not None:
         begin = time.perf_counter()
         parameters = {node: dict(order.changes.get(node, {})) for node in REPLAYED_NODES}
@@ -134,22 +151,26 @@ def _read(order: ReplayOrder) -> tuple[ReplayInput, float]:
         gap, sentence = chosen_gap(order.table, parameters)
         given = foreign_input(order.recording, order.foreign, parameters, gap)
         given.notes.insert(0, sentence)
-        return given, time.perf_counter() - begin
+        return given, time.perf_counter() - begin, 0.0
     begin = time.perf_counter()
     recording = open_run(order.recording)
-    _load_displacement(recording)
+    decoding_time = _load_displacement(recording)
     reading_time = time.perf_counter() - begin
     gap, sentence = chosen_gap(order.table, {}) if order.table else (None, '')
     given = replay_input(recording, gap)
     given.notes += [*([sentence] if sentence else []), *recording.warnings]
-    return given, reading_time
+    return given, reading_time, decoding_time
 
 
-def _load_displacement(recording: Recording) -> None:
-    if topics.DISPLACEMENT.name in recording:
-        series = recording[topics.DISPLACEMENT.name]
-        if len(series):
-            assert len(series.stamps) == len(series[topics.DISPLACEMENT.names[0]])
+def _load_displacement(recording: Recording) -> float:
+    """Bring stamps and numbers into memory; return the time (s) from messages in memory to numbers."""
+    if topics.DISPLACEMENT.name not in recording:
+        return 0.0
+    series = recording[topics.DISPLACEMENT.name]
+    begin = time.perf_counter()
+    if len(series):
+        assert len(series.stamps) == len(series[topics.DISPLACEMENT.names[0]])
+    return time.perf_counter() - begin
 
 
 def _changed(given: ReplayInput, changes: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -160,7 +181,9 @@ def _changed(given: ReplayInput, changes: Mapping[str, Mapping[str, Any]]) -> di
 
 def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
     """Load or compile the laws, which a process does once."""
-    controller_for(given.controls[0].gap, parameters).run(np.zeros(1))
+    controller = controller_for(given.controls[0].gap, parameters)
+    controller.step(0.0)
+    controller.run(np.zeros(1))
     chosen_specimen(parameters)
 
 

@@ -139,9 +139,8 @@ def run_control(run: ControlRun, gap: MeasuredGap, parameters: Parameters) -> Co
         controller.step(displacement, missing)
         answers.traces[begin] = controller.trace
         if end > begin + 1:
-            answers.traces[begin + 1 : end] = controller.run(run.displacement[begin + 1 : end])
-            watch.last_stamp = int(run.stamps[end - 1])
-            watch.counts.samples += end - begin - 1
+            controller.run(run.displacement[begin + 1 : end], answers.traces[begin + 1 : end])
+            watch.follow(int(run.stamps[end - 1]), end - begin - 1)
             stream.last = watch.last_stamp
         answers.traced[begin:end] = True
     answers.setpoints[answers.traced] = answers.traces['current'][answers.traced]

@@ -30,6 +30,14 @@ Column = NDArray[np.float64]
 SECOND = 1_000_000_000  # ns
 _PERIOD = round(SAMPLE_TIME * SECOND)
 _INPUTS = (topics.DISPLACEMENT, topics.COIL_RIPPLE)
+_READ = (
+    *_INPUTS,
+    topics.CURRENT_SETPOINT,
+    topics.CONTROL_TRACE,
+    topics.AIR_GAP,
+    topics.CURRENT_FORCE_TABLE,
+    topics.SESSION,
+)
 _QUIET_AT_FIRST = ('velocity', 'band_displacement', 'band_velocity', 'bridged_samples')
 _BREAK = SECOND  # ns: after it the controller takes no table from before
 
@@ -118,6 +126,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
 
     With `gap` the controller is activated with that one instead of the recorded ones.
     """
+    recording.load(topic.name for topic in _READ if topic.name in recording)
     displacement = _displacement(recording)
     notes = Notes(_zero(recording))
     session = recorded_session(recording, notes)

@@ -11,7 +11,6 @@ from mount_bags.writer import BagWriter
 from mount_bringup.replay_core import OFF, ControlAnswers, Replayed
 from mount_bringup.replay_input import ReplayInput
 from mount_bringup.supervisor import session_text
-from mount_control.controller import TRACE
 from mount_ros import topics
 from mount_ros.cdr import serialised
 from mount_ros.force_table_message import to_message
@@ -75,8 +74,9 @@ def _gaps(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
 def _answers(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
     setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
     for part in replayed.parts:
-        for stamp, current in zip(part.stamps.tolist(), part.setpoints.tolist(), strict=True):
-            yield stamp + given.log_shift, 1, topics.CURRENT_SETPOINT, setpoint.pack(stamp, (current,))
+        rows = setpoint.pack_rows(part.stamps, part.setpoints[:, None])
+        for stamp, row in zip(part.stamps.tolist(), rows, strict=True):
+            yield stamp + given.log_shift, 1, topics.CURRENT_SETPOINT, row.tobytes()
         if isinstance(part, ControlAnswers):
             yield from _traces(given, part)
             if part.setpoints[-1] != OFF:  # as mount_control does when it is deactivated
@@ -86,8 +86,7 @@ def _answers(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
 
 def _traces(given: ReplayInput, run: ControlAnswers) -> Iterator[_Entry]:
     layout = ScalarsLayout(topics.CONTROL_TRACE)
-    rows = np.ascontiguousarray(run.traces[run.traced]).tobytes()
-    size = TRACE.itemsize
-    for place, stamp in enumerate(run.stamps[run.traced].tolist()):
-        raw = layout.pack_record(stamp, rows[place * size : (place + 1) * size])
-        yield stamp + given.log_shift, 4, topics.CONTROL_TRACE, raw
+    stamps, traces = run.stamps[run.traced], np.ascontiguousarray(run.traces[run.traced])
+    rows = layout.pack_rows(stamps, traces.view(np.float64).reshape(len(traces), len(layout.names)))
+    for stamp, row in zip(stamps.tolist(), rows, strict=True):
+        yield stamp + given.log_shift, 4, topics.CONTROL_TRACE, row.tobytes()

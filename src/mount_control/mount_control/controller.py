@@ -71,6 +71,15 @@ class Tables(NamedTuple):
     current: NDArray[np.float64]
 
 
+class Memory(NamedTuple):
+    """The first arguments of the compiled `step`: bytes of law and state, tables, window of the magnitude."""
+
+    law: NDArray[np.uint8]
+    tables: Tables
+    state: NDArray[np.uint8]
+    window: NDArray[np.float64]
+
+
 class Controller:
     """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
 
@@ -104,6 +113,11 @@ class Controller:
         self.restart(0.0)
 
     @property
+    def memory(self) -> Memory:
+        """What the compiled `step` takes before trace and sample, for a compiled loop that calls it."""
+        return Memory(self._law, self._tables, self._state, self._window)
+
+    @property
     def trace(self) -> np.void:
         """The intermediates of the last step."""
         return self._trace_record
@@ -129,9 +143,15 @@ class Controller:
             self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
         )
 
-    def run(self, displacement: NDArray[np.float64]) -> NDArray[np.void]:
-        """Take n displacement samples in m and return n traces; bit-identical to n calls of `step`."""
-        traces = np.zeros(len(displacement), TRACE)
+    def run(
+        self, displacement: NDArray[np.float64], traces: NDArray[np.void] | None = None
+    ) -> NDArray[np.void]:
+        """Take n displacement samples in m and return n traces; bit-identical to n calls of `step`.
+
+        They are written into `traces`, n records `TRACE` in a row, where it is given.
+        """
+        if traces is None:
+            traces = np.zeros(len(displacement), TRACE)
         samples = np.ascontiguousarray(displacement, dtype=float)
         run(self._law, self._tables, self._state, self._window, traces.view(np.uint8), samples)
         return traces

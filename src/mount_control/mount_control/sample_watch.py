@@ -46,11 +46,15 @@ class SampleWatch:
             self.counts.invalid += 1
             return Judgement.INVALID, 0
         elapsed = self._longest + 1 if self.last_stamp is None else stamp - self.last_stamp
-        self.last_stamp = stamp
-        self.counts.samples += 1
+        self.follow(stamp, 1)
         if elapsed > self._longest:
             self.counts.restarts += 1
             return Judgement.RESTART, 0
         missing = max(0, (elapsed + self._period // 2) // self._period - 1)
         self.counts.bridged += missing
         return Judgement.USE, missing
+
+    def follow(self, last_stamp: int, count: int) -> None:
+        """Note `count` samples that followed each other without a doubt, the last at `last_stamp` (ns)."""
+        self.last_stamp = last_stamp
+        self.counts.samples += count

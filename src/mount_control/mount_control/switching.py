@@ -15,7 +15,15 @@ class Switching(NamedTuple):
     period: int
 
 
-STATE = np.dtype([('place', 'i8'), ('samples_above', 'i8'), ('samples_below', 'i8'), ('active', 'i8')])
+STATE = np.dtype(
+    [
+        ('place', 'i8'),
+        ('magnitude', 'f8'),
+        ('samples_above', 'i8'),
+        ('samples_below', 'i8'),
+        ('active', 'i8'),
+    ]
+)
 
 
 @compiled
@@ -27,9 +35,14 @@ def step(switching, state, window, band_displacement):
     the displacement has stayed below the switch-off level for more than one (section 6).
     """
     distance = abs(band_displacement)
+    leaving = window[state.place]
     window[state.place] = distance
     state.place = (state.place + 1) % switching.period
-    magnitude = window[: switching.period].max()
+    if distance >= state.magnitude:
+        state.magnitude = distance
+    elif leaving == state.magnitude:  # only then the others have to be looked at
+        state.magnitude = window[: switching.period].max()
+    magnitude = state.magnitude
 
     state.samples_above = state.samples_above + 1 if magnitude > switching.on_level else 0
     state.samples_below = state.samples_below + 1 if distance < switching.off_level else 0

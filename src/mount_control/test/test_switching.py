@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mount_control import switching
 
@@ -88,3 +90,11 @@ def test_8_hz_switches_on_one_period_after_the_magnitude_exceeded_the_level(make
     traces = make_controller().run(sine(8.0, 1e-3, 1.0))
     exceeded = int((traces['magnitude'] > 0.0008).argmax())
     assert int(traces['damping_active'].argmax()) == exceeded + 124
+
+
+@given(distances=st.lists(st.sampled_from([0.0, 0.1, -0.2, 0.2, 0.3]), max_size=40), period=st.integers(1, 6))
+@settings(deadline=None)
+def test_magnitude_is_the_highest_value_of_the_last_period(distances, period):
+    magnitude, _ = _run(distances, LAW._replace(period=period))
+    before = np.abs([0.0] * (period - 1) + distances)
+    assert magnitude.tolist() == [before[k : k + period].max() for k in range(len(distances))]

@@ -5,6 +5,7 @@ compiled code. Each field is declared as ``Annotated[float, Quantity(unit, meani
 source)] = default``.
 """
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,6 +32,11 @@ class Quantity:
 def quantities(parameters: type[P] | P) -> dict[str, Quantity]:
     """Return the `Quantity` of every annotated field, by name."""
     kind = parameters if isinstance(parameters, type) else type(parameters)
+    return dict(_quantities(kind))
+
+
+@functools.cache
+def _quantities(kind: type) -> dict[str, Quantity]:
     hints = get_type_hints(kind, include_extras=True)
     return {
         name: note
@@ -42,12 +48,16 @@ def quantities(parameters: type[P] | P) -> dict[str, Quantity]:
 
 def checked(parameters: P) -> P:
     """Return `parameters` with every field in its declared type, or raise `ParameterError`."""
-    hints = get_type_hints(type(parameters))
-    notes = quantities(parameters)
+    hints, notes = _plain_hints(type(parameters)), _quantities(type(parameters))
     values = {}
     for name, value in parameters._asdict().items():
         values[name] = _checked_value(name, value, hints[name], notes.get(name))
     return parameters._replace(**values)
+
+
+@functools.cache
+def _plain_hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind)
 
 
 def with_values(parameters: P, **changes: Any) -> P:

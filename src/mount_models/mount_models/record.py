@@ -5,12 +5,14 @@ parameters that costs more than the law. Bytes cost nothing: compiled code looks
 ``parameters.view(DTYPE)[0]`` and then reads `record.field` as it would read the tuple's.
 """
 
+import functools
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 
+@functools.cache
 def record_dtype(kind: type[NamedTuple]) -> np.dtype:
     """Return the record type of a named tuple of numbers, or of such tuples, from its annotations."""
     return np.dtype([(name, _field_type(hint)) for name, hint in get_type_hints(kind).items()])

@@ -1,8 +1,9 @@
 """Named scalars as the CDR bytes of a `sensor_msgs/JointState`, written and read in place.
 
 On the 1 kHz path the layout of these messages never changes: the same names, the same lengths. So the
-bytes are made once and afterwards only the stamp and the numbers are replaced. A message of another
-layout (a foreign publisher) is read by the general deserialiser, by names.
+bytes are made once and afterwards only the stamp and the numbers are replaced, in one message or, by
+`pack_rows`, in many at once. A message of another layout (a foreign publisher) is read by the general
+deserialiser, by names.
 """
 
 import functools
@@ -11,6 +12,8 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
@@ -21,10 +24,15 @@ _STAMP = struct.Struct('<iI')
 _STAMP_OFFSET = 4  # behind the CDR encapsulation header
 _STAMP_END = _STAMP_OFFSET + _STAMP.size
 _NANOSECONDS = 1_000_000_000
+_LAST_SECOND = 2**31 - 1  # of a stamp: a signed number of 32 bits
+
+Rows = NDArray[np.uint8]
+"""Serialised messages of one length, (messages, bytes)."""
+Numbers = NDArray[np.float64]
 
 
 class ScalarsError(ValueError):
-    """A message lacks a named scalar that its topic declares."""
+    """A message lacks a named scalar that its topic declares, or cannot carry what it shall."""
 
 
 def stamp_of(raw: bytes) -> int:
@@ -65,6 +73,16 @@ class ScalarsLayout:
         _STAMP.pack_into(message, _STAMP_OFFSET, *divmod(stamp, _NANOSECONDS))
         message[self._position_offset : self._position_offset + self._numbers.size] = numbers
         return bytes(message)
+
+    def pack_rows(
+        self, stamps: NDArray[np.int64], positions: Numbers, velocities: Numbers | None = None
+    ) -> Rows:
+        """Return the messages of many `stamps` (ns), numbers (messages, names); the same bytes as `pack`."""
+        rows = _stamped_rows(self._template, stamps)
+        _put_numbers(rows, self._position_offset, positions)
+        if velocities is not None:
+            _put_numbers(rows, self._velocity_offset, velocities)
+        return rows
 
     def unpack(self, raw: bytes) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         """Return (stamp ns, positions, velocities) in the order of the topic's names; velocities may be ().
@@ -112,6 +130,35 @@ class OneNumberLayout:
         _STAMP.pack_into(self._template, _STAMP_OFFSET, *divmod(stamp, _NANOSECONDS))
         self._number.pack_into(self._template, self._offset, number)
         return bytes(self._template)
+
+    def pack_rows(self, stamps: NDArray[np.int64], numbers: Numbers) -> Rows:
+        """Return the messages of many `stamps` (ns) with one number each; the same bytes as `pack`."""
+        rows = _stamped_rows(self._template, stamps)
+        _put_numbers(rows, self._offset, np.reshape(numbers, (-1, 1)))
+        return rows
+
+
+def _stamped_rows(template: bytearray, stamps: NDArray[np.int64]) -> Rows:
+    """Return one copy of the message for each stamp (ns), with the stamp in it."""
+    rows = np.tile(np.frombuffer(template, np.uint8), (len(stamps), 1))
+    seconds, nanoseconds = np.divmod(stamps, _NANOSECONDS)
+    if len(stamps) and not -_LAST_SECOND <= seconds.min() <= seconds.max() <= _LAST_SECOND:
+        raise ScalarsError(f'stamps must lie within {_LAST_SECOND} s around 0, these reach {stamps.max()} ns')
+    middle = _STAMP_OFFSET + 4
+    rows[:, _STAMP_OFFSET:middle] = _as_bytes(seconds, '<i4')
+    rows[:, middle:_STAMP_END] = _as_bytes(nanoseconds, '<u4')
+    return rows
+
+
+def _put_numbers(rows: Rows, offset: int, numbers: Numbers) -> None:
+    raw = _as_bytes(numbers, '<f8')
+    rows[:, offset : offset + raw.shape[1]] = raw
+
+
+def _as_bytes(values: NDArray[Any], kind: str) -> Rows:
+    """Return the bytes of each row of numbers, (rows, bytes)."""
+    encoded = np.ascontiguousarray(values, kind)
+    return encoded.view(np.uint8).reshape(len(encoded), encoded.itemsize * math.prod(encoded.shape[1:]))
 
 
 def _marks(count: int, first: int) -> list[float]:

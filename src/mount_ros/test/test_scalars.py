@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from hypothesis import given
@@ -78,3 +79,26 @@ def test_topic_names_are_unique_and_relative_but_for_diagnostics():
     names = [topic.name for topic in TOPICS]
     assert len(set(names)) == len(names)
     assert [name for name in names if name.startswith('/')] == ['/diagnostics']
+
+
+@given(entries=st.lists(st.tuples(stamps, st.tuples(floats, floats), st.tuples(floats, floats)), max_size=4))
+def test_many_messages_packed_at_once_are_those_packed_one_by_one(entries):
+    layout = ScalarsLayout(COIL_RIPPLE)
+    moments = np.array([stamp for stamp, _, _ in entries], np.int64)
+    positions = np.array([numbers for _, numbers, _ in entries]).reshape(-1, 2)
+    velocities = np.array([slopes for _, _, slopes in entries]).reshape(-1, 2)
+    rows = layout.pack_rows(moments, positions, velocities)
+    assert [row.tobytes() for row in rows] == [layout.pack(*entry) for entry in entries]
+
+
+@given(entries=st.lists(st.tuples(stamps, floats), max_size=4))
+def test_many_messages_with_one_number_are_those_packed_one_by_one(entries):
+    layout = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+    moments = np.array([stamp for stamp, _ in entries], np.int64)
+    rows = layout.pack_rows(moments, np.array([number for _, number in entries]))
+    assert [row.tobytes() for row in rows] == [layout.pack(*entry) for entry in entries]
+
+
+def test_a_stamp_that_no_message_can_carry_is_refused():
+    with pytest.raises(ScalarsError, match='stamps must lie within'):
+        ScalarsLayout(DISPLACEMENT).pack_rows(np.array([0, 2**31 * 10**9]), np.zeros((2, 1)))

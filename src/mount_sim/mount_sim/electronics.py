@@ -59,11 +59,21 @@ class Noise:
 
     def next(self) -> NDArray[np.float64]:
         """Return the four numbers of the next sample."""
-        if self._place >= len(self._numbers):
-            self._numbers = self._generator.standard_normal((self._BLOCK, 4))
+        numbers = self.ahead(1)[0]
+        self.skip(1)
+        return numbers
+
+    def ahead(self, count: int) -> NDArray[np.float64]:
+        """Return the numbers of the next `count` samples, (count, 4); they remain the next."""
+        while len(self._numbers) - self._place < count:
+            drawn = self._generator.standard_normal((self._BLOCK, 4))
+            self._numbers = np.concatenate([self._numbers[self._place :], drawn])
             self._place = 0
-        self._place += 1
-        return self._numbers[self._place - 1]
+        return self._numbers[self._place : self._place + count]
+
+    def skip(self, count: int) -> None:
+        """Go on by `count` samples whose numbers were looked at."""
+        self._place += count
 
 
 _NO_CURRENT = 1e-9  # A: an exponential decay ends here, before it costs time as a denormal number

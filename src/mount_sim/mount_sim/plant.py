@@ -90,6 +90,15 @@ TRUTH = np.dtype(
 """What no sensor sees, SI; the fields of the topic `sim/truth` in its order."""
 
 
+class Memory(NamedTuple):
+    """Bytes of parameters and state, the seat's number, step of the plant in s."""
+
+    plant: NDArray[np.uint8]
+    state: NDArray[np.uint8]
+    seat: int
+    step_time: float
+
+
 class PlantSimulation:
     """The plant with its state; `read` looks at it, `advance` moves it on by some steps."""
 
@@ -103,6 +112,11 @@ class PlantSimulation:
         self._truth = np.zeros(1, TRUTH).view(np.uint8)
         self._truth_record = self._truth.view(TRUTH)[0]
         self._state.view(_STATE)['gap'] = plant.mechanics.rest_gap
+
+    @property
+    def memory(self) -> Memory:
+        """What the compiled `read` and `advance` need, for a compiled loop that calls them."""
+        return Memory(self._plant, self._state, self._seat, self._step_time)
 
     @property
     def truth(self) -> np.void:

@@ -1,6 +1,7 @@
 """Electronics and plant together, sample by sample, without bus or clock."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics import Noise, Reading
 from mount_sim.excitation import Excitation
-from mount_sim.plant import Plant, PlantSimulation
+from mount_sim.plant import Memory, Plant, PlantSimulation
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,14 @@ class Run:
 
     samples: int
     excitation_start: int
+
+
+class Ahead(NamedTuple):
+    """What the next n samples are made of: the plant, excitation (n, steps), numbers for the noise (n, 4)."""
+
+    memory: Memory
+    values: NDArray[np.float64]
+    noise: NDArray[np.float64]
 
 
 class SimulatedMount:
@@ -76,6 +85,20 @@ class SimulatedMount:
         current = self._current if self.enabled else 0.0
         self._plant.advance(self._values[self.sample], current)
         self.sample += 1
+
+    def ahead(self, count: int) -> Ahead:
+        """Return what the next samples, at most `count`, need in a compiled loop; none of them is taken yet.
+
+        The loop does for each what `measure` and `advance` with a setpoint do; `skip` notes how far it came.
+        """
+        values = self._values[self.sample : self.sample + count]
+        return Ahead(self._plant.memory, values, self._noise.ahead(len(values)))
+
+    def skip(self, count: int, setpoint: float) -> None:
+        """Note that a compiled loop took `count` samples and advanced the last one with `setpoint` (A)."""
+        self._noise.skip(count)
+        self._silent, self._current = 0, setpoint
+        self.sample += count
 
 
 def _per_sample(excitation: Excitation, start: int, steps: int) -> NDArray[np.float64]:

@@ -1,0 +1,115 @@
+"""The messages of a run without middleware: those that the nodes would publish, packed many at a time."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from numpy.typing import NDArray
+
+from mount_control.controller import TRACE
+from mount_init.initialisation import OFF, InitialisationResult
+from mount_ros import topics
+from mount_ros.cdr import serialised
+from mount_ros.force_table_message import to_message
+from mount_ros.scalars import OneNumberLayout, Rows, ScalarsLayout
+from mount_ros.topics import Topic
+from mount_sim.node import level_imu
+from mount_sim.plant import TRUTH
+
+Write = Callable[[Topic, bytes, int], None]
+"""Takes (topic, serialised message, stamp ns)."""
+Columns = Sequence[tuple[Topic, Rows]]
+"""For each topic one serialised message per sample, all of one length; in the order within a sample."""
+WriteColumns = Callable[[Columns, NDArray[np.int64]], None]
+"""Takes the messages of some samples and the samples' stamps (ns)."""
+
+
+class Samples:
+    """Answered samples in a row; what stands behind `count` is not valid."""
+
+    def __init__(self, capacity: int):
+        self.count = 0
+        self.stamps = np.zeros(capacity, np.int64)  # ns
+        self.readings = np.zeros((capacity, 4))  # as they arrive: m, A, A/s, T/s
+        self.setpoints = np.zeros(capacity)  # A
+        self.truths = np.zeros((capacity, TRUTH.itemsize), np.uint8)  # records `TRUTH`
+        self.traces = np.zeros((capacity, TRACE.itemsize), np.uint8)  # records `TRACE`, where `traced`
+        self.traced = np.zeros(capacity, bool)
+
+    @property
+    def room(self) -> int:
+        """How many more samples there is room for."""
+        return len(self.stamps) - self.count
+
+
+class CoreMessages:
+    """Packs samples and results and hands them on in the order of the stamps."""
+
+    def __init__(self, write: Write, write_columns: WriteColumns | None = None):
+        """Without `write_columns` every message goes to `write`."""
+        self._write = write
+        self._write_columns = write_columns or self._one_by_one
+        self._displacement = ScalarsLayout(topics.DISPLACEMENT)
+        self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
+        self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
+        self._air_gap = ScalarsLayout(topics.AIR_GAP)
+        self._trace = ScalarsLayout(topics.CONTROL_TRACE)
+        self._truth = ScalarsLayout(topics.SIM_TRUTH)
+        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
+        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+
+    def write_samples(self, samples: Samples) -> None:
+        """Write all samples and empty the block."""
+        for begin, end in _alike(samples.traced[: samples.count]):
+            part = slice(begin, end)
+            self._write_columns(self._columns(samples, part), samples.stamps[part])
+        samples.count = 0
+
+    def write_off(self, stamp: int) -> None:
+        """Write the setpoint of a controller that is switched off."""
+        self._write(topics.CURRENT_SETPOINT, self._setpoint.pack(stamp, (OFF,)), stamp)
+
+    def write_result(self, stamp: int, result: InitialisationResult) -> None:
+        """Write what an initialisation found."""
+        numbers = [getattr(result, name) for name in self._air_gap.names]
+        self._write(topics.AIR_GAP, self._air_gap.pack(stamp, numbers), stamp)
+        table = serialised(to_message(stamp, result.table))
+        self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
+
+    def _columns(self, samples: Samples, part: slice) -> Columns:
+        stamps, readings = samples.stamps[part], samples.readings[part]
+        truth = samples.truths[part].view(TRUTH)[:, 0]
+        unknown = np.full(len(stamps), math.nan)
+        ripple = self._ripple.pack_rows(stamps, np.stack([readings[:, 1], unknown], 1), readings[:, 2:])
+        columns = [
+            (topics.DISPLACEMENT, self._displacement.pack_rows(stamps, readings[:, :1])),
+            (topics.COIL_RIPPLE, ripple),
+            (topics.CURRENT_SETPOINT, self._setpoint.pack_rows(stamps, samples.setpoints[part, None])),
+            (topics.SIM_TRUTH, self._truth.pack_rows(stamps, _numbers(samples.truths[part]))),
+            (
+                topics.SIM_CHASSIS_ACCELERATION,
+                self._acceleration.pack_rows(stamps, truth['chassis_acceleration']),
+            ),
+            (topics.SIM_MOUNT_FORCE, self._force.pack_rows(stamps, truth['mount_force'])),
+        ]
+        if samples.traced[part.start]:
+            traces = self._trace.pack_rows(stamps, _numbers(samples.traces[part]))
+            columns.append((topics.CONTROL_TRACE, traces))
+        return columns
+
+    def _one_by_one(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
+        for place, stamp in enumerate(stamps.tolist()):
+            for topic, rows in columns:
+                self._write(topic, rows[place].tobytes(), stamp)
+
+
+def _numbers(records: NDArray[np.uint8]) -> NDArray[np.float64]:
+    return records.view(np.float64)
+
+
+def _alike(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yield (begin, end) of the stretches of equal flags."""
+    changes = (np.flatnonzero(np.diff(flags)) + 1).tolist()
+    if len(flags):
+        yield from zip([0, *changes], [*changes, len(flags)], strict=True)

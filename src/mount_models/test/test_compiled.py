@@ -1,0 +1,23 @@
+"""The cache of compiled laws follows every source that a law may call."""
+
+from pathlib import Path
+
+from mount_models import compiled
+
+
+def test_packages_that_a_file_imports_belong_to_its_digest(tmp_path, monkeypatch):
+    for package, text in {'mount_far': 'X = 1\n', 'mount_near': 'from mount_far import part\n'}.items():
+        (tmp_path / package).mkdir()
+        (tmp_path / package / '__init__.py').touch()
+        (tmp_path / package / 'part.py').write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    behind = compiled._packages_behind(tmp_path / 'mount_near' / 'part.py')
+    assert set(behind) == {
+        tmp_path / 'mount_near',
+        tmp_path / 'mount_far',
+        Path(compiled.__file__).resolve().parent,
+    }
+    before = compiled._sources_digest(behind)
+    (tmp_path / 'mount_far' / 'part.py').write_text('X = 2\n')
+    compiled._sources_digest.cache_clear()
+    assert compiled._sources_digest(behind) != before

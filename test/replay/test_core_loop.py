@@ -1,0 +1,70 @@
+"""Many samples in one compiled call give the messages of samples taken one by one, byte for byte."""
+
+import numpy as np
+import pytest
+
+from mount_bringup.core_chain import CoreChain
+from mount_bringup.core_run import run_core
+from mount_ros import topics
+from mount_ros.scalars import ScalarsLayout, stamp_of
+
+MOTION = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 1.5, 'bench.amplitude': 0.0015}
+NARROW = 0.0010  # m
+CASES = {
+    'nothing doubtful': ({}, {}),
+    'single samples out of range': ({'electronics.displacement_noise': 3e-4}, {'displacement_range': 0.0018}),
+    'longer than is bridged': ({'bench.frequency': 3.0}, {'displacement_range': NARROW}),
+    'an excitation on the chassis': ({'scenario': 'motorway'}, {}),
+}
+
+
+def messages_of(case):
+    sim, control = CASES[case]
+    found = []
+    outcome = run_core(
+        {'mount_sim': {**MOTION, **sim}, 'mount_control': control},
+        lambda topic, raw, stamp: found.append((topic.name, raw, stamp)),
+    )
+    return outcome, found
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_many_samples_at_once_are_those_taken_one_by_one(case, monkeypatch):
+    _, at_once = messages_of(case)
+    monkeypatch.setattr(CoreChain, 'expects', lambda self, stamp: False)
+    _, one_by_one = messages_of(case)
+    assert at_once == one_by_one
+
+
+def test_only_a_step_of_the_controller_leaves_a_trace():
+    _, found = messages_of('longer than is bridged')
+    displacement = ScalarsLayout(topics.DISPLACEMENT)
+    result = next(stamp for name, _, stamp in found if name == topics.AIR_GAP.name)
+    values = {
+        stamp: displacement.unpack(raw)[1][0] for name, raw, stamp in found if name == displacement.topic.name
+    }
+    believable = [stamp for stamp, value in values.items() if stamp > result and abs(value) <= NARROW]
+    traced = [stamp for name, _, stamp in found if name == topics.CONTROL_TRACE.name]
+    assert traced == believable
+    assert len(believable) < sum(stamp > result for stamp in values)
+
+
+def test_columns_hold_the_messages_that_come_one_by_one():
+    order = {'mount_sim': {**MOTION, 'timeline.duration': 0.3}}
+    one_by_one, in_columns = [], []
+
+    def write(topic, raw, stamp):
+        one_by_one.append((topic.name, raw, stamp))
+
+    def write_columns(columns, stamps):
+        for _, rows in columns:
+            assert [stamp_of(row.tobytes()) for row in rows] == stamps.tolist()
+        in_columns.append(np.hstack([rows for _, rows in columns]).tobytes())
+
+    run_core(order, write)
+    rest = []
+    run_core(order, lambda topic, raw, stamp: rest.append(topic.name), write_columns=write_columns)
+    samples = [raw for name, raw, _ in one_by_one if name not in rest[:2]]
+    off = samples.pop() if rest[2:] else b''
+    assert rest == ['air_gap', 'current_force_table', *(['current_setpoint'] if off else [])]
+    assert b''.join(in_columns) == b''.join(samples)
