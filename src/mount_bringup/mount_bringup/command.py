@@ -1,7 +1,5 @@
 """The `engine-mount` command."""
 
-import sys
-
 import typer
 from rich.console import Console
 
@@ -71,12 +69,17 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command; every refusal is one sentence and a non-zero exit code."""
     prepare_environment()
     from mount_bringup.supervisor import GraphError, Interrupted
+    from mount_ros.leaving import end_process
 
     try:
         app(args=arguments)
+    except SystemExit as end:
+        if not isinstance(end.code, int):
+            raise
+        end_process(end.code)
     except (KeyboardInterrupt, Interrupted):
         Console(stderr=True).print('interrupted; the coil is at 0 A')
-        sys.exit(_INTERRUPTED)
+        end_process(_INTERRUPTED)
     except (ValueError, GraphError, OSError) as error:
         Console(stderr=True).print(f'[red]engine-mount:[/red] {error}', soft_wrap=True, highlight=False)
-        sys.exit(1)
+        end_process(1)

@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 from mount_bringup.graph import CONTROL, DRIVER, RECORDER, GraphNode, GraphSettings
 from mount_bringup.processes import NodeProcess, end_all, start_processes
 from mount_ros.diagnostics import Level
+from mount_ros.leaving import leave_middleware
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, SESSION
 
@@ -141,11 +142,14 @@ class Supervisor:
         for node in reversed(self._nodes):
             self._try_to_deactivate(node)
         complaints = end_all(self._processes)
-        if self._context.ok():
-            self._executor.shutdown()
-            self._node.destroy_node()
-            rclpy.try_shutdown(context=self._context)
+        if self._context.ok() and not leave_middleware(self._take_down):
+            self.notes.append('the middleware of the supervisor did not come to an end and was left behind')
         return complaints
+
+    def _take_down(self) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
 
     def _reason(self, node: GraphNode) -> str:
         process = next(process for process in self._processes if node in process.nodes)

@@ -3,10 +3,10 @@
 import gc
 import os
 import signal
-import sys
 import threading
 import traceback
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -14,6 +14,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from mount_ros.data_path import DataThread
 from mount_ros.environment import prepare_environment
+from mount_ros.leaving import end_process, leave_middleware
 from mount_ros.lifecycle import SafeLifecycleNode
 
 _SPIN_PERIOD = 5.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
@@ -52,10 +53,15 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         service.end()
     for node in reversed(nodes):
         node.close()
+    code = 1 if any(service.failed for service in services) else 0
+    if not leave_middleware(partial(_take_down, nodes)) or code:
+        end_process(code)
+
+
+def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
+    for node in reversed(nodes):
         node.destroy_node()
     rclpy.try_shutdown()
-    if any(service.failed for service in services):
-        sys.exit(1)
 
 
 class _Ending:
