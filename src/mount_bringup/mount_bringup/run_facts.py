@@ -63,7 +63,7 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
     recording = signals.recording
     lacking = [topic.name for topic in _NEEDED if signals.signal(topic.name, topic.names[0]) is None]
     if lacking:
-        return None, f'needs {", ".join(lacking)}, which was not recorded'
+        return None, f'what was not recorded is needed: {", ".join(lacking)}'
     try:
         control, damper = control_parameters(parameters), chosen_damper(parameters)
         drive = load_drive(recording, 0.0)

@@ -17,9 +17,11 @@ from mount_bags.report.figures import Named
 from mount_bags.report.section import Section, Table
 from mount_bags.report.signals import Signal
 from mount_bags.report.subject import Subject
+from mount_bags.report.wording import Sentences
 from mount_bags.session_differences import session_values
 from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, SIM_TRUTH
 
+_COVERING = 0.95  # chosen: this share of the longest counts as all
 _ROWS = 25  # of the table of differences
 _HEAD_OF_SESSION = ('scenario', 'mode', 'started')
 
@@ -28,12 +30,13 @@ def overview(subjects: Sequence[Subject], audits: Sequence[dict[str, TopicAudit]
     """Return the figures that one wants to see first, and what the recordings lack, in words."""
     columns = [_figures(subject, topics) for subject, topics in zip(subjects, audits, strict=True)]
     rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
-    words = []
+    words, said = [], Sentences(subjects)
     for subject in subjects:
         prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
-        words += [f'{prefix}{warning}' for warning in subject.signals.recording.warnings]
+        words += [f'{prefix}{warning}.' for warning in subject.signals.recording.warnings]
         if subject.signals.missing:
-            words.append(f'{prefix}not in this recording: {"; ".join(subject.signals.missing)}.')
+            said.say(subject, f'missing: {"; ".join(subject.signals.missing)}')
+    words += said.told()
     return Section(
         'overview', 'Overview', words, None, [Table(('', *(each.name for each in subjects)), rows)]
     )
@@ -41,14 +44,14 @@ def overview(subjects: Sequence[Subject], audits: Sequence[dict[str, TopicAudit]
 
 def coil(subjects: Sequence[Subject]) -> Section:
     """Return current and heat of the coil."""
-    words, rows = [], []
+    said, rows = Sentences(subjects), []
     for subject in subjects:
         prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
         current, what = _current(subject)
         if current is None:
-            words.append(f'{prefix}no current was recorded.')
+            said.say(subject, 'no current was recorded')
             continue
-        words.append(f'{prefix}{what}; {subject.facts.resistance_remark}.')
+        said.say(subject, f'{what}; {subject.facts.resistance_remark}')
         setpoint = subject.signals.signal(CURRENT_SETPOINT.name, 'coil_current')
         for stretch, inside in _stretches(subject, current):
             load = _load(subject, current, inside, setpoint)
@@ -56,18 +59,19 @@ def coil(subjects: Sequence[Subject]) -> Section:
     head = (
         '', 'time (s)', 'rms current (A)', 'highest (A)', 'heat R i² (W)', 'heat (J)', 'at the limit (%)',
     )  # fmt: skip
-    return Section('coil', 'Current and load of the coil', words, None, [Table(head, rows)] if rows else [])
+    return Section(
+        'coil', 'Current and load of the coil', said.told(), None, [Table(head, rows)] if rows else []
+    )
 
 
 def tracking(subjects: Sequence[Subject]) -> Section:
     """Return the true friction force against the one that the chosen damper would have."""
-    wanted, actual, words = [], [], []
+    wanted, actual, said = [], [], Sentences(subjects)
     damping: list[tuple[float, float]] = []
     for subject in subjects:
-        prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
         found = subject.facts.tracking
         if found is None:
-            words.append(f'{prefix}{subject.facts.tracking_remark}.')
+            said.say(subject, subject.facts.tracking_remark)
             continue
         name = subject.name if len(subjects) > 1 else ''
         wanted.append(Named(name, found.time, found.wanted))
@@ -78,9 +82,10 @@ def tracking(subjects: Sequence[Subject]) -> Section:
             if math.isnan(found.error)
             else f'rms error while damping is on: {100.0 * found.error:.1f} % of the peak wanted force'
         )
-        words.append(f'{prefix}{error}; {subject.facts.tracking_remark}.')
+        said.say(subject, error)
+        said.say(subject, subject.facts.tracking_remark)
     chart = figures.tracking(wanted, actual, damping, _around(damping)) if wanted and damping else None
-    return Section('tracking', 'Tracking error against the truth', words, chart)
+    return Section('tracking', 'Tracking error against the truth', said.told(), chart)
 
 
 def losses(subjects: Sequence[Subject], audits: Sequence[dict[str, TopicAudit]]) -> Section:
@@ -110,9 +115,12 @@ def losses(subjects: Sequence[Subject], audits: Sequence[dict[str, TopicAudit]])
 
 def differences(comparison: Comparison) -> Section:
     """Return in words and figures how B differs from A."""
+    alignment = comparison.alignment
     words = [
-        f'A is {comparison.name_a}, B is {comparison.name_b}; {comparison.alignment.sentence}.',
-        *(f'{sentence[:1].upper()}{sentence[1:]}.' for sentence in comparison_sentences(comparison)),
+        f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment.sentence}.',
+        f'Times here are from the first message of A; its first sample of {alignment.anchor} is at '
+        f'{alignment.anchor_time:.3f} s.',
+        *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
     ]
     ordered = by_importance(comparison)
     rows = [
@@ -211,14 +219,20 @@ def _highest(signal: Signal | None, unit: str) -> str:
 
 
 def _current(subject: Subject) -> tuple[Signal | None, str]:
-    for topic, column, what in (
-        (SIM_TRUTH.name, 'coil_current', 'the true coil current'),
-        (COIL_RIPPLE.name, 'coil_current', 'the measured mean coil current'),
-        (CURRENT_SETPOINT.name, 'coil_current', 'the current setpoint, for no current was recorded'),
-    ):
-        found = subject.signals.signal(topic, column)
-        if found is not None and np.isfinite(found.values).any():
-            return found, what
+    """Return the current that is known for most of the recording, and what it is; the truest of equals."""
+    found = [
+        (signal, what)
+        for topic, what in (
+            (SIM_TRUTH, 'the true coil current'),
+            (COIL_RIPPLE, 'the measured mean coil current'),
+            (CURRENT_SETPOINT, 'the current setpoint, for the current was not recorded throughout'),
+        )
+        if (signal := subject.signals.signal(topic.name, 'coil_current')) is not None
+    ]
+    lengths = [int(np.count_nonzero(np.isfinite(signal.values))) for signal, _ in found]
+    for (signal, what), length in zip(found, lengths, strict=True):
+        if length > 0 and length >= _COVERING * max(lengths):
+            return signal, what
     return None, ''
 
 

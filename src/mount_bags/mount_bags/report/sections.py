@@ -1,6 +1,6 @@
 """The sections of a report that show how the mount moved."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 
 import numpy as np
@@ -15,6 +15,7 @@ from mount_bags.report.signals import Signal
 from mount_bags.report.spectrum import amplitude_density, evenly
 from mount_bags.report.subject import Subject
 from mount_bags.report.sweep import peak_per_band, rms_per_band
+from mount_bags.report.wording import Sentences
 from mount_ros.topics import (
     CURRENT_SETPOINT,
     SAMPLE_RATE,
@@ -22,10 +23,13 @@ from mount_ros.topics import (
     SIM_TRUTH,
 )
 
+OfSubject = Callable[[Subject], Signal | None]
+
 _LOOPS = 4  # periods drawn
 _PERIODS = 32  # evaluated
 _WITHOUT_PERIOD = 0.5  # s, chosen: stretch of a loop where nothing is periodic
 _TOLD = 200  # switchings listed
+_LABEL = 24  # letters
 _LEAST_SAMPLES = 1000  # chosen: of a spectrum
 _LEAST_LOST = 0.0005  # share of made-up samples above which a spectrum says so
 
@@ -43,8 +47,7 @@ def traces(subjects: Sequence[Subject]) -> Section:
         words.append(f'Shaded: damping on in {subjects[0].name}.')
     if levels.switch_on is None:
         words.append(f'The switching levels are not drawn: {subjects[0].facts.levels_remark}.')
-    words += _absent(subjects, lambda subject: subject.displacement(), 'no displacement')
-    words += _absent(subjects, _setpoint, 'no current setpoint')
+    words += _absent(subjects, (Subject.displacement, 'no displacement'), (_setpoint, 'no current setpoint'))
     chart = None
     if moved or currents:
         longest = max(float(series.x[-1]) for series in (*moved, *currents))
@@ -54,13 +57,13 @@ def traces(subjects: Sequence[Subject]) -> Section:
 
 def switching(subjects: Sequence[Subject]) -> Section:
     """Return when damping was switched, what happened meanwhile, and the marks of the recording."""
-    words, tables = [], []
+    said, tables = Sentences(subjects), []
     for subject in subjects:
         spans = subject.signals.damping()
         if spans is None:
-            words.append(f'{_of(subjects, subject)}when damping was switched was not recorded.')
+            said.say(subject, 'when damping was switched was not recorded')
         elif not spans:
-            words.append(f'{_of(subjects, subject)}damping was never switched on.')
+            said.say(subject, 'damping was never switched on')
         else:
             tables.append(_switching_table(subjects, subject, spans))
         if marks := subject.signals.marks():
@@ -68,14 +71,14 @@ def switching(subjects: Sequence[Subject]) -> Section:
                 (_time_cell(subject.signals.seconds(mark)), mark.kind, mark.text) for mark in marks[:_TOLD]
             ]
             tables.append(Table(('time (s)', 'kind', 'text'), rows, f'{_of(subjects, subject)}marks'))
-    return Section('switching', 'Switching and marks', [_sentence(each) for each in words], None, tables)
+    return Section('switching', 'Switching and marks', said.told(), None, tables)
 
 
 def loops(subjects: Sequence[Subject]) -> Section:
     """Return mount force and friction force over displacement."""
     mount: list[Named] = []
     friction: list[Named] = []
-    words = []
+    said = Sentences(subjects)
     for subject in subjects:
         moved = subject.true_displacement() or subject.displacement()
         stretch, how = _loop_stretch(subject)
@@ -87,25 +90,22 @@ def loops(subjects: Sequence[Subject]) -> Section:
             if len(x) > 2:
                 group.append(Named(_name(subjects, subject), x, y))
                 found = True
-        words.append(
-            f'{_of(subjects, subject)}{how}.' if found else f'{_of(subjects, subject)}no force was recorded.'
-        )
+        said.say(subject, how if found else 'no force was recorded')
     chart = figures.hysteresis_loops(mount, friction) if mount or friction else None
-    return Section('hysteresis', 'Loss hysteresis', [_sentence(each) for each in words], chart)
+    return Section('hysteresis', 'Loss hysteresis', said.told(), chart)
 
 
 def harmonic_content(subjects: Sequence[Subject]) -> Section:
     """Return harmonics 1 to 8 of the mount force, its distortion and the work per cycle."""
-    words, bars, rows = [], [], []
+    said = Sentences(subjects)
+    bars, rows = [], []
     for subject in subjects:
         steady, force = subject.steady(), subject.mount_force()
         moved = subject.true_displacement() or subject.displacement()
         if force is None or moved is None:
-            words.append(f'{_of(subjects, subject)}no mount force was recorded.')
+            said.say(subject, 'no mount force was recorded')
         elif steady is None:
-            words.append(
-                f'{_of(subjects, subject)}the displacement is not one sine for long enough: no harmonics.'
-            )
+            said.say(subject, 'the displacement is not one sine for long enough: no harmonics')
         else:
             (begin, end), sine = steady
             x, y, time = _together_timed(moved, force, (begin, end))
@@ -118,27 +118,24 @@ def harmonic_content(subjects: Sequence[Subject]) -> Section:
                 f'{100.0 * distortion(amplitudes):.1f}', *(f'{value:.2f}' for value in amplitudes),
             )  # fmt: skip
             rows.append((subject.name, *figures_))
-            words.append(
-                f'{_of(subjects, subject)}over the last {periods} periods until {time[inside][-1]:.2f} s.'
-            )
+            said.say(subject, f'over the last {periods} periods until {time[inside][-1]:.2f} s')
     head = (
         'recording', 'frequency (Hz)', 'amplitude (mm)', 'work per cycle (J)', 'distortion (%)',
         *(f'h{number} (N)' for number in range(1, 9)),
     )  # fmt: skip
     tables = [Table(head, rows)] if rows else []
     chart = figures.harmonics_bars(bars) if bars else None
-    return Section(
-        'harmonics', 'Harmonics of the mount force', [_sentence(each) for each in words], chart, tables
-    )
+    return Section('harmonics', 'Harmonics of the mount force', said.told(), chart, tables)
 
 
 def spectra(subjects: Sequence[Subject]) -> Section:
     """Return the amplitude spectral densities of displacement, mount force and chassis acceleration."""
     groups: list[tuple[str, list[Named]]] = []
     words = ['From where control was active; Hann windows of 2.048 s that overlap by half.']
+    said = Sentences(subjects)
     for label, factor, of in (
-        ('displacement\n(mm/√Hz)', 1e3, lambda subject: subject.displacement()),
-        ('mount force\n(N/√Hz)', 1.0, lambda subject: subject.mount_force()),
+        ('displacement\n(mm/√Hz)', 1e3, Subject.displacement),
+        ('mount force\n(N/√Hz)', 1.0, Subject.mount_force),
         ('chassis acceleration\n(m/s²/√Hz)', 1.0, _acceleration),
     ):
         group = []
@@ -149,26 +146,27 @@ def spectra(subjects: Sequence[Subject]) -> Section:
                 continue
             frequency, values, made_up = density
             if made_up > _LEAST_LOST:
-                words.append(
-                    f'{_of(subjects, subject)}{label.splitlines()[0]}: {100.0 * made_up:.1f} % of the '
-                    'samples are missing and were replaced by straight lines.'
-                )
+                share = f'{100.0 * made_up:.1f} % of the samples of the {label.splitlines()[0]}'
+                said.say(subject, f'{share} are missing and were replaced by straight lines')
             group.append(Named(_name(subjects, subject), frequency, factor * values))
         if group:
             groups.append((label, group))
-    words += _absent(subjects, lambda subject: subject.mount_force(), 'no mount force')
-    words += _absent(subjects, _acceleration, 'no chassis acceleration')
+    words += said.told()
+    words += _absent(
+        subjects, (Subject.mount_force, 'no mount force'), (_acceleration, 'no chassis acceleration')
+    )
     chart = figures.spectra(groups) if groups else None
-    return Section('spectra', 'Spectra', [_sentence(each) for each in words], chart)
+    return Section('spectra', 'Spectra', words, chart)
 
 
 def sweep_view(subjects: Sequence[Subject]) -> Section | None:
     """Return peak displacement and chassis acceleration by frequency; None where nothing was swept."""
-    peaks, accelerations, words = [], [], []
+    said = Sentences(subjects)
+    peaks, accelerations = [], []
     for subject in subjects:
         sweep, moved, acceleration = subject.sweep(), subject.displacement(), _acceleration(subject)
         if sweep is None or moved is None:
-            words.append(f'{_of(subjects, subject)}the excitation is no sweep.')
+            said.say(subject, 'the excitation is no sweep')
             continue
         peaks.append(Named(_name(subjects, subject), *peak_per_band(sweep.at(moved.time), moved.values)))
         if acceleration is not None:
@@ -183,10 +181,8 @@ def sweep_view(subjects: Sequence[Subject]) -> Section | None:
         for edge in sorted(set(chain.from_iterable(series.x.tolist() for series in peaks)))
     ]
     head = ('band (Hz)', *(f'peak (mm){", " if series.name else ""}{series.name}' for series in peaks))
-    words = ['In bands of 1 Hz, by the frequency of the excitation at that moment.', *words]
-    return Section(
-        'sweep', 'Sweep', [_sentence(each) for each in words], chart, [Table(head, rows, folded=True)]
-    )
+    words = ['In bands of 1 Hz, by the frequency of the excitation at that moment.', *said.told()]
+    return Section('sweep', 'Sweep', words, chart, [Table(head, rows, folded=True)])
 
 
 def plain(subjects: Sequence[Subject], most: int = 6) -> Section | None:
@@ -200,7 +196,7 @@ def plain(subjects: Sequence[Subject], most: int = 6) -> Section | None:
                 groups.setdefault(label, []).append(Named(_name(subjects, subject), *series))
     if not groups:
         return None
-    words = [f'The first {len(groups)} signals that are numbers; their units are not known here.']
+    words = [f'The first {len(groups)} numbers that change; their units are not known here.']
     return Section('signals', 'Recorded signals', words, figures.plain_traces(list(groups.items())))
 
 
@@ -216,8 +212,10 @@ def _foreign(subject: Subject) -> list[tuple[str, tuple[Array, Array]]]:
                 if 'stamp' in column or 'covariance' in column:
                     continue
                 values = series[column]
-                if np.isfinite(values).any():
-                    found.append((f'{topic}\n{column}', (series.time - series.time[0], values)))
+                known = values[np.isfinite(values)]
+                if len(known) and np.ptp(known) > 0.0:
+                    short = column if len(column) <= _LABEL else f'…{column[-_LABEL:]}'
+                    found.append((f'{topic}\n{short}', (series.time - series.time[0], values)))
         except ValueError:  # no columns: strings, images, messages of different shape
             continue
     return found
@@ -251,16 +249,13 @@ def _of(subjects: Sequence[Subject], subject: Subject) -> str:
     return f'{subject.name}: ' if len(subjects) > 1 else ''
 
 
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] if ': ' not in text[:60] else text
-
-
-def _absent(subjects: Sequence[Subject], of, what: str) -> list[str]:
-    return [
-        _sentence(f'{_of(subjects, subject)}{what} was recorded.')
-        for subject in subjects
-        if of(subject) is None
-    ]
+def _absent(subjects: Sequence[Subject], *wanted: tuple[OfSubject, str]) -> list[str]:
+    said = Sentences(subjects)
+    for of, what in wanted:
+        for subject in subjects:
+            if of(subject) is None:
+                said.say(subject, f'{what} was recorded')
+    return said.told()
 
 
 def _switching_table(
