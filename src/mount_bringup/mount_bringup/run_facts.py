@@ -10,6 +10,7 @@ from mount_bags.report.signals import Signals
 from mount_bags.report.subject import RunFacts, Tracking
 from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
 from mount_bringup.evaluation import load_drive, tracking_error, wanted_force
+from mount_bringup.settings import DEFAULT_DAMPER
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
@@ -76,5 +77,5 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
     active = np.interp(drive.true_time, drive.time, drive.damping_active.astype(float)) > 0.5
     shown = np.where(active, wanted, 0.0)
     tracking = Tracking(drive.true_time + shift, shown, drive.friction_force, error)
-    chosen = parameters.get('mount_control', {}).get('damper', 'the default')
-    return tracking, f'wanted is damper {chosen} at the true velocity in the band, without delay'
+    chosen = parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER)
+    return tracking, f'wanted is the force of damper {chosen} at the true velocity in the band, without delay'

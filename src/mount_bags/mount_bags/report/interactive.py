@@ -37,7 +37,8 @@ def plotly_figure(chart: Chart, points: int = POINTS) -> dict[str, Any]:
     data: list[dict[str, Any]] = []
     for place, panel in enumerate(chart.panels):
         axes = {'xaxis': 'x', 'yaxis': _axis('y', place)}
-        data += [{**_line(curve, points), **axes} for curve in panel.curves]
+        named = {'showlegend': len(panel.curves) > 1}  # a single one is named by its axis
+        data += [{**_line(curve, points), **axes, **named} for curve in panel.curves]
         data += [
             {
                 'type': 'bar',

@@ -19,9 +19,10 @@ caption { text-align: left; font-weight: bold; padding: .2em 0; }
 th, td { text-align: left; padding: .15em .9em .15em 0; border-bottom: 1px solid #ddd; vertical-align: top;
          overflow-wrap: break-word; font-variant-numeric: tabular-nums; }
 tr.marked td { background: #fff3cd; } noscript { color: #b03030; }
-@page { size: A4 landscape; margin: 12mm; }
+@page { size: A4; margin: 12mm; }
 @media print {
   body { margin: 0; padding: 0; max-width: none; } nav, .modebar-container { display: none !important; }
+  .figure { zoom: 0.69; }
   .figure, tr { break-inside: avoid; } h2 { break-after: avoid; } .figure, .tables { overflow: visible; }
 }
 """

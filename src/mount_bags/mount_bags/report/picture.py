@@ -63,7 +63,7 @@ def _draw_panel(axes: Axes, panel: Panel, spans: Any, span_name: str) -> None:
             color=colour,
             linestyle=_STYLES[curve.dash],
             linewidth=1.0,
-            label=curve.name,
+            label=curve.name if len(panel.curves) > 1 else None,  # a single one is named by its axis
             drawstyle='steps-post' if curve.steps else 'default',
         )
     for place, bars in enumerate(panel.bars):

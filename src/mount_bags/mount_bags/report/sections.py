@@ -1,6 +1,7 @@
 """The sections of a report that show how the mount moved."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
@@ -9,7 +10,7 @@ from mount_bags.quantity_text import quantity_text
 from mount_bags.report import figures
 from mount_bags.report.chart import Array
 from mount_bags.report.figures import Levels, Named
-from mount_bags.report.periodic import cycle_work, distortion, harmonics, whole_periods
+from mount_bags.report.periodic import Sine, cycle_work, distortion, harmonics, whole_periods
 from mount_bags.report.section import Section, Table
 from mount_bags.report.signals import Signal
 from mount_bags.report.spectrum import amplitude_density, evenly
@@ -100,25 +101,18 @@ def harmonic_content(subjects: Sequence[Subject]) -> Section:
     said = Sentences(subjects)
     bars, rows = [], []
     for subject in subjects:
-        steady, force = subject.steady(), subject.mount_force()
+        steady, force = subject.steady, subject.mount_force()
         moved = subject.true_displacement() or subject.displacement()
         if force is None or moved is None:
             said.say(subject, 'no mount force was recorded')
         elif steady is None:
             said.say(subject, 'the displacement is not one sine for long enough: no harmonics')
+        elif (found := _harmonics_of(moved, force, steady)) is None:
+            said.say(subject, 'the mount force was not recorded for long enough there: no harmonics')
         else:
-            (begin, end), sine = steady
-            x, y, time = _together_timed(moved, force, (begin, end))
-            inside, periods = whole_periods(time, sine.frequency, _PERIODS)
-            amplitudes = harmonics(time[inside], y[inside], sine.frequency)
-            work = cycle_work(x[inside], y[inside], periods)
-            bars.append((_name(subjects, subject), amplitudes))
-            figures_ = (
-                f'{sine.frequency:.3f}', f'{1e3 * sine.amplitude:.3f}', f'{work:.3f}',
-                f'{100.0 * distortion(amplitudes):.1f}', *(f'{value:.2f}' for value in amplitudes),
-            )  # fmt: skip
-            rows.append((subject.name, *figures_))
-            said.say(subject, f'over the last {periods} periods until {time[inside][-1]:.2f} s')
+            bars.append((_name(subjects, subject), found.amplitudes))
+            rows.append((subject.name, *found.cells))
+            said.say(subject, f'over the last {found.periods} periods until {found.end:.2f} s')
     head = (
         'recording', 'frequency (Hz)', 'amplitude (mm)', 'work per cycle (J)', 'distortion (%)',
         *(f'h{number} (N)' for number in range(1, 9)),
@@ -126,6 +120,35 @@ def harmonic_content(subjects: Sequence[Subject]) -> Section:
     tables = [Table(head, rows)] if rows else []
     chart = figures.harmonics_bars(bars) if bars else None
     return Section('harmonics', 'Harmonics of the mount force', said.told(), chart, tables)
+
+
+@dataclass(frozen=True)
+class _Harmonics:
+    """Harmonics (N) over the last whole periods of a stretch, and what the table says of them."""
+
+    amplitudes: Array
+    cells: tuple[str, ...]
+    periods: int
+    end: float
+
+
+def _harmonics_of(
+    moved: Signal, force: Signal, steady: tuple[tuple[float, float], Sine]
+) -> _Harmonics | None:
+    stretch, sine = steady
+    x, y, time = _together_timed(moved, force, stretch)
+    if len(time) < 2 or (time[-1] - time[0]) * sine.frequency < 3.0:
+        return None
+    inside, periods = whole_periods(time, sine.frequency, _PERIODS)
+    amplitudes = harmonics(time[inside], y[inside], sine.frequency)
+    cells = (
+        f'{sine.frequency:.3f}',
+        f'{1e3 * sine.amplitude:.3f}',
+        f'{cycle_work(x[inside], y[inside], periods):.3f}',
+        f'{100.0 * distortion(amplitudes):.1f}',
+        *(f'{value:.2f}' for value in amplitudes),
+    )
+    return _Harmonics(amplitudes, cells, periods, float(time[inside][-1]))
 
 
 def spectra(subjects: Sequence[Subject]) -> Section:
@@ -286,7 +309,7 @@ def _peak_within(signal: Signal | None, begin: float, end: float, unit: str) -> 
 
 def _loop_stretch(subject: Subject) -> tuple[tuple[float, float] | None, str]:
     """Return the stretch (s) of which loops are drawn, and what it is."""
-    steady = subject.steady()
+    steady = subject.steady
     if steady is not None:
         (begin, end), sine = steady
         first = max(begin, end - _LOOPS / sine.frequency)

@@ -1,5 +1,6 @@
 """A recording that a report is about, with what is known of its run, and the stretches worth looking at."""
 
+import functools
 import math
 from dataclasses import dataclass, field
 
@@ -73,6 +74,7 @@ class Subject:
         trace = self.signals.signal(CONTROL_TRACE.name, 'damping_active')
         return float(trace.time[0]) if trace is not None else -math.inf
 
+    @functools.cached_property
     def steady(self) -> tuple[tuple[float, float], Sine] | None:
         """Return a stretch (s) in which the displacement is one sine and this sine, None if there is none.
 
