@@ -92,13 +92,14 @@ def test_a_sweep_is_recognised_with_its_frequency_at_each_time():
     assert np.isnan(sweep.at(np.array([31.0])))[0]
 
 
-@pytest.mark.parametrize('kind', ['sine', 'noise', 'rest', 'falling'])
+@pytest.mark.parametrize('kind', ['sine', 'noise', 'rest', 'falling', 'two sines'])
 def test_what_is_no_sweep_is_not_taken_for_one(kind):
     values = {
         'sine': np.sin(2 * np.pi * 8.0 * TIME),
         'noise': np.random.default_rng(2).normal(size=len(TIME)),
         'rest': np.zeros(len(TIME)),
         'falling': chirp(1.0, 5.0, 4.0)[1][::-1],
+        'two sines': np.sin(2 * np.pi * np.where(TIME < 2.0, 8.0, 40.0) * (TIME - 2.0)),
     }[kind]
     assert find_sweep(TIME, values) is None
 

@@ -33,10 +33,9 @@ def find_sweep(time: Array, excitation: Array) -> Sweep | None:
     if len(crossings) <= _LEAST_PERIODS:
         return None
     middle, frequency = 0.5 * (crossings[1:] + crossings[:-1]), 1.0 / np.diff(crossings)
-    slope, offset = np.polyfit(middle, frequency, 1)
-    line = slope * middle + offset
+    line = np.polyval(np.polyfit(middle, frequency, 1), middle)
     spread = float(np.ptp(line))
-    if slope <= 0.0 or line[0] <= 0.0 or line[-1] < _LEAST_RATIO * line[0]:
+    if line[0] <= 0.0 or line[-1] < _LEAST_RATIO * line[0]:
         return None
     if np.sqrt(np.mean((frequency - line) ** 2)) > _STRAIGHTNESS * spread:
         return None
