@@ -148,8 +148,9 @@ def test_a_long_gap_stays_a_gap_in_the_envelope():
     y = np.ones(10_000)
     y[4000:6000] = np.nan
     x, shown = envelope(np.arange(10_000.0), y, 100)
-    assert np.isnan(shown[(x > 4200) & (x < 5800)]).all()
-    assert len(x) > 2
+    inside = shown[(x > 4200) & (x < 5800)]
+    assert len(inside) > 0
+    assert np.isnan(inside).all()
 
 
 def charts() -> list[Chart]:

@@ -129,12 +129,13 @@ def _evaluate(
 
 def _write_report(folder: RunFolder, recording: Recording, console: Console) -> list[str]:
     """Write the page about the run; what prevents it is a complaint, for the recording is there."""
-    from mount_bags.report.report import ReportError  # after the drive, as above
+    from mount_bags.report.chart import ChartError  # after the drive, as above
+    from mount_bags.report.report import ReportError
     from mount_bringup.report_pages import write_report
 
     try:
         write_report([recording], None, folder.report, None, console)
-    except ReportError as error:
+    except (ReportError, ChartError) as error:
         return [str(error)]
     return []
 

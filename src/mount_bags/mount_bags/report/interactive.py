@@ -12,6 +12,7 @@ from mount_bags.report.chart import (
     SPAN_COLOUR,
     Array,
     Chart,
+    ChartError,
     Curve,
     Panel,
     needs_legend,
@@ -24,10 +25,12 @@ _GAP = 0.05  # of the height, between panels
 
 
 def plotly_script() -> str:
-    """Return the text of plotly.js, which draws the figures in the page."""
-    return (importlib.resources.files('plotly') / 'package_data' / 'plotly.min.js').read_text(
-        encoding='utf-8'
-    )
+    """Return the text of plotly.js, which draws the figures in the page; raises `ChartError`."""
+    try:
+        package = importlib.resources.files('plotly')
+    except ModuleNotFoundError:
+        raise ChartError('the page needs plotly.js from the package plotly; pip install plotly') from None
+    return (package / 'package_data' / 'plotly.min.js').read_text(encoding='utf-8')
 
 
 def plotly_figure(chart: Chart, points: int = POINTS) -> dict[str, Any]:
