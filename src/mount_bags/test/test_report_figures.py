@@ -15,8 +15,10 @@ from mount_bags.report.coil_load import coil_load
 from mount_bags.report.envelope import envelope
 from mount_bags.report.figures import Levels, Named
 from mount_bags.report.interactive import plotly_figure
+from mount_bags.report.page import page
 from mount_bags.report.periodic import cycle_work, distortion, dominant_sine, harmonics, whole_periods
 from mount_bags.report.picture import draw_chart
+from mount_bags.report.section import Section
 from mount_bags.report.spectrum import amplitude_density, band_rms, evenly
 from mount_bags.report.sweep import find_sweep, peak_per_band, rms_per_band
 
@@ -216,3 +218,10 @@ def test_what_does_not_fit_together_is_refused():
     with pytest.raises(ChartError, match='no panel'):
         Chart('c', 'c', 'x', [], [Span(0.0, 1.0)])
     assert Level('l', 1.0).both is False
+
+
+def test_no_text_in_a_chart_ends_the_script_that_holds_it():
+    chart = Chart('c', 'c', '</script>', [Panel('y (N)', [Curve('y', TIME, TIME)])])
+    text = page('t', [Section('c', 'C', chart=chart)])
+    block = text.split('<script type="application/json">')[1].split('</script>')[0]
+    assert json.loads(block)['layout']['xaxis']['title']['text'] == '</script>'
