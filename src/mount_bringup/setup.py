@@ -15,6 +15,7 @@ setup(
         ('share/mount_bringup', ['package.xml', 'README.md']),
         ('share/mount_bringup/launch', glob('launch/*.py')),
         ('share/mount_bringup/config', glob('config/*')),
+        ('share/mount_bringup/layouts', glob('layouts/*')),
     ],
     install_requires=['setuptools'],
     entry_points={'console_scripts': ['engine-mount = mount_bringup.command:main']},

@@ -22,13 +22,18 @@ def session_text(recording: Recording) -> str:
 
 def session_differences(a: str, b: str) -> list[str]:
     """Return a sentence for each difference of two sessions (YAML texts), changed values first."""
-    one, other = _flat(_content(a)), _flat(_content(b))
+    one, other = session_values(a), session_values(b)
     changed = [
         f'{name} is {_shown(one[name])} in A, {_shown(other[name])} in B'
         for name in one
         if name in other and one[name] != other[name] and not _OF_THE_MOMENT.fullmatch(name)
     ]
     return [*changed, *_only('A', one, other), *_only('B', other, one)]
+
+
+def session_values(text: str) -> dict[str, Any]:
+    """Return {name: value} of a session (YAML text); parameters are named as `--set` names them."""
+    return _flat(_content(text))
 
 
 def _content(text: str) -> Any:
@@ -39,7 +44,7 @@ def _content(text: str) -> Any:
 
 
 def _flat(content: Any, prefix: str = '') -> dict[str, Any]:
-    """Return {path: value}; parameters are named as `--set` names them, without their common root."""
+    """Return {path: value}; the common root of all parameters is left out."""
     if not isinstance(content, Mapping):
         return {prefix or 'text': content} if content is not None else {}
     flat: dict[str, Any] = {}

@@ -13,6 +13,7 @@ from mount_bringup import (
     record_command,
     recover_command,
     replay_command,
+    report_command,
 )
 from mount_ros.environment import prepare_environment
 
@@ -60,6 +61,7 @@ app.command(name='record', epilog=record_command.EPILOG)(record_command.record)
 app.command(name='recover', epilog=recover_command.EPILOG)(recover_command.recover)
 app.command(name='replay', epilog=replay_command.EPILOG)(replay_command.replay)
 app.command(name='compare', epilog=compare_command.EPILOG)(compare_command.compare)
+app.command(name='report', epilog=report_command.EPILOG)(report_command.report)
 app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)
 app.command(name='merge', epilog=merge_command.EPILOG)(merge_command.merge)
 app.command(name='accept', epilog=accept_command.EPILOG)(accept_command.accept)

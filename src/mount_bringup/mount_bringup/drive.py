@@ -86,6 +86,7 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
     recording = open_recording(folder.recording)
     complaints += recording.warnings
     figures = _evaluate(order, folder, recording, run, console)
+    complaints += _write_report(folder, recording, console)
     return DriveOutcome(figures, folder, [folder.recording], complaints)
 
 
@@ -124,6 +125,19 @@ def _evaluate(
     print_summary(figures, console)
     console.print(as_table(audit(recording)))
     return figures
+
+
+def _write_report(folder: RunFolder, recording: Recording, console: Console) -> list[str]:
+    """Write the page about the run; what prevents it is a complaint, for the recording is there."""
+    from mount_bags.report.chart import ChartError  # after the drive, as above
+    from mount_bags.report.report import ReportError
+    from mount_bringup.report_pages import write_report
+
+    try:
+        write_report([recording], None, folder.report, None, console)
+    except (ReportError, ChartError) as error:
+        return [str(error)]
+    return []
 
 
 def _drive_graph(

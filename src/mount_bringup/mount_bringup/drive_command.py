@@ -101,6 +101,8 @@ def drive(
         write_json(outcome.figures, json_file)
     if outcome.folder.figure.exists():
         console.print(f'figure     {outcome.folder.figure}', highlight=False)
+    if outcome.folder.report.exists():
+        console.print(f'report     {outcome.folder.report}', highlight=False)
     for place in outcome.recordings:
         console.print(f'recording  {place}', highlight=False)
     for complaint in outcome.complaints:

@@ -82,9 +82,23 @@ def switching(drive: Drive) -> Switching:
 def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCurve) -> float:
     """Return the rms error of the friction force while damping is on, as a share of the peak wanted force.
 
+    NaN if damping was never on.
+    """
+    wanted, places = wanted_force(drive, parameters, damper)
+    on = places[drive.damping_active]
+    if len(on) == 0:
+        return math.nan
+    error = drive.friction_force[on] - wanted[on]
+    return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(wanted[on])))
+
+
+def wanted_force(
+    drive: Drive, parameters: ControlParameters, damper: DamperCurve
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the wanted friction force (N) at the true times, and which of them belongs to each sample.
+
     Wanted is what the selected damper would do at the true velocity of the mount in the band at that very
-    moment, without any delay; so the error holds phase and delay as well as force. NaN if damping was
-    never on.
+    moment, without any delay; so an error against it holds phase and delay as well as force.
     """
     from scipy.signal import lfilter  # here, for it takes longer to load than all the rest
 
@@ -92,11 +106,7 @@ def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCu
     velocity = lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], drive.true_velocity)
     wanted = damper.force(velocity)
     places = np.clip(np.searchsorted(drive.true_time, drive.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1)
-    on = places[drive.damping_active]
-    if len(on) == 0:
-        return math.nan
-    error = drive.friction_force[on] - wanted[on]
-    return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(wanted[on])))
+    return wanted, places
 
 
 def lost_samples(recording: Recording, samples_sent: int) -> int:

@@ -26,6 +26,11 @@ class RunFolder:
         return self.path / 'drive.png'
 
     @property
+    def report(self) -> Path:
+        """The page about the run."""
+        return self.path / 'report.html'
+
+    @property
     def summary(self) -> Path:
         """The figures that were printed, as JSON."""
         return self.path / 'summary.json'

@@ -1,0 +1,68 @@
+"""Writes the page and the pictures of a report, with a progress bar."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from mount_bags.alignment import ComparisonError
+from mount_bags.compare import compare
+from mount_bags.reading import Recording
+from mount_bags.report.report import ReportError, make_report, subjects_of
+from mount_bringup.run_facts import run_facts
+
+PAGE = 'report.html'
+
+
+def default_page(path: Path) -> Path:
+    """Return where the page of the recording or run at `path` goes: into the run's folder, else beside it."""
+    if (path / 'recording').is_dir():
+        return path / PAGE
+    if path.name == 'recording' and path.is_dir():
+        return path.absolute().parent / PAGE
+    return path.absolute().parent / f'{path.absolute().stem}_{PAGE}'
+
+
+def write_report(
+    recordings: Sequence[Recording],
+    other: Recording | None,
+    file: Path,
+    pictures: Path | None,
+    console: Console,
+) -> list[Path]:
+    """Write the page to `file` and its figures into `pictures` unless that is None; return those files.
+
+    With `other`, it shares the figures and its differences from the first recording are told. Raises
+    `ReportError`.
+    """
+    columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task('reading', total=1.0)
+
+        def on_step(what: str, share: float) -> None:
+            progress.update(task, description=what, completed=share)
+
+        together = [*recordings, *([other] if other is not None else [])]
+        subjects = subjects_of(together, run_facts)
+        on_step('comparing', 0.2)
+        comparison = _comparison(recordings[0], other)
+        made = make_report(subjects, comparison, lambda what, share: on_step(what, 0.2 + 0.4 * share))
+        on_step('writing the page', 0.6)
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            made.write_page(file)
+            if pictures is None:
+                return []
+            return made.write_pictures(pictures, lambda what, share: on_step(what, 0.7 + 0.3 * share))
+        except OSError as error:
+            raise ReportError(
+                f'{error.filename or file} cannot be written: {error.strerror}; choose another --out'
+            ) from None
+
+
+def _comparison(first: Recording, other: Recording | None):
+    try:
+        return None if other is None else compare(first, other)
+    except ComparisonError as error:
+        raise ReportError(f'{error}; without --compare both can share a page') from None

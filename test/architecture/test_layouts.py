@@ -1,0 +1,52 @@
+"""The layouts for PlotJuggler and Lichtblick name signals that the topics of a drive have."""
+
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+from mount_ros.topics import JOINT_STATE, TOPICS
+
+LAYOUTS = Path(__file__).resolve().parents[2] / 'src' / 'mount_bringup' / 'layouts'
+OTHERS = {'sim/chassis_acceleration': 'linear_acceleration.z', 'sim/mount_force': 'wrench.force.z'}
+
+
+def signals() -> set[tuple[str, str]]:
+    """Return (topic, name of the scalar or path of the number)."""
+    scalars = {(topic.name, name) for topic in TOPICS if topic.type == JOINT_STATE for name in topic.names}
+    return scalars | set(OTHERS.items())
+
+
+def test_plotjuggler_s_curves_are_signals_of_a_drive():
+    root = ElementTree.parse(LAYOUTS / 'plotjuggler.xml').getroot()
+    names = [curve.attrib['name'] for curve in root.iter('curve')]
+    known = {f'/{topic}/{name}/position' for topic, name in signals()}
+    known |= {f'/{topic}/{path.replace(".", "/")}' for topic, path in OTHERS.items()}
+    assert len(names) >= 10
+    assert set(names) <= known
+    (splitter,) = root.iter('DockSplitter')
+    areas = list(splitter.iter('DockArea'))
+    assert int(splitter.attrib['count']) == len(areas) == len(splitter.attrib['sizes'].split(';'))
+
+
+def test_lichtblick_s_paths_are_the_signals_that_their_labels_name():
+    layout = json.loads((LAYOUTS / 'lichtblick.json').read_text())
+    order = {topic.name: topic.names for topic in TOPICS}
+    drawn = 0
+    for panel in layout['configById'].values():
+        for path in panel['paths']:
+            if re.fullmatch(r'[\d.]+', path['value']):
+                continue  # a level
+            topic, _, name = path['label'].partition(' ')
+            assert (topic, name) in signals()
+            place = f'position[{order[topic].index(name)}]' if order[topic] else name
+            assert path['value'] == f'/{topic}.{place}'
+            assert path['timestampMethod'] == 'headerStamp'  # Lichtblick's default is the time of reception
+            drawn += 1
+    assert drawn >= 10
+
+
+def test_lichtblick_shows_every_panel_once():
+    layout = json.loads((LAYOUTS / 'lichtblick.json').read_text())
+    shown = re.findall(r'"(Plot![^"]+)"', json.dumps(layout['layout']))
+    assert sorted(shown) == sorted(layout['configById'])

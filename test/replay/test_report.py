@@ -1,0 +1,196 @@
+"""`engine-mount report` on drives of the simulated car, on foreign and damaged recordings, in a browser."""
+
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import String
+from typer.testing import CliRunner, Result
+
+from mount_bags.writer import BagWriter
+from mount_bringup.command import app
+from mount_ros.cdr import serialised
+
+REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
+BENCH = ('--scenario', 'bench', '--duration', '2.5', '--set', 'mount_sim.timeline.start=2.8')
+MOST = 10_000_000  # bytes of a page
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+
+
+def command(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+class Page(HTMLParser):
+    """What a page holds: its text, its sections, its figures, and whatever it would load."""
+
+    def __init__(self, file: Path):
+        super().__init__()
+        self.sections: list[str] = []
+        self.figures: list[dict] = []
+        self.loaded: list[str] = []
+        self.words: list[str] = []
+        self._script = ''
+        self.feed(file.read_text(encoding='utf-8'))
+        self.text = ' '.join(' '.join(self.words).split())
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if tag == 'section':
+            self.sections.append(values['id'])
+        self._script = values.get('type', 'code') if tag in ('script', 'style') else ''
+        loads = [values.get(name) or '' for name in ('src', 'srcset', 'data', 'href') if name in values]
+        self.loaded += [each for each in loads if not each.startswith('#')]
+
+    def handle_data(self, data):
+        if self._script == 'application/json':
+            self.figures.append(json.loads(data))
+        elif not self._script:
+            self.words.append(data)
+
+    def handle_endtag(self, tag):
+        if tag in ('script', 'style'):
+            self._script = ''
+
+
+@pytest.fixture(scope='module')
+def bench(tmp_path_factory) -> Path:
+    """Return the folder of a drive on the test rack."""
+    folder = tmp_path_factory.mktemp('drives') / 'rack'
+    result = command('drive', '--core', *BENCH, '--out', folder)
+    assert result.exit_code == 0, result.output
+    assert f'report     {folder / "report.html"}' in result.output.replace('\n', '')
+    return folder
+
+
+@pytest.fixture(scope='module')
+def page(bench) -> Page:
+    """Return the page that the drive itself wrote."""
+    return Page(bench / 'report.html')
+
+
+def test_the_page_of_a_drive_shows_all_that_was_recorded(page, bench):
+    assert page.sections == [
+        'overview', 'traces', 'switching', 'hysteresis', 'harmonics', 'spectra', 'coil', 'tracking',
+        'losses', 'parameters',
+    ]  # fmt: skip
+    assert len(page.figures) == 5
+    assert 'damping switched on once' in page.text
+    assert 'mount_sim.scenario bench' in page.text
+    error = json.loads((bench / 'summary.json').read_text())['tracking_error_rms']
+    assert f'friction force error {100 * error:.1f} % rms' in page.text
+
+
+def test_a_page_needs_nothing_else_and_is_small(page, bench):
+    assert page.loaded == []
+    assert "default-src 'none'" in (bench / 'report.html').read_text(encoding='utf-8')
+    assert (bench / 'report.html').stat().st_size < MOST
+
+
+def test_the_harmonics_are_those_of_the_paper_s_test_rack(page):
+    cells = re.search(r'h8 \(N\) rack ([\d. ]+)', page.text)
+    assert cells is not None
+    frequency, amplitude, work, _, *harmonics = map(float, cells[1].split())
+    assert frequency == pytest.approx(8.0, abs=0.01)
+    assert amplitude == pytest.approx(1.0, abs=0.01)
+    assert work == pytest.approx(0.33, rel=0.03)
+    assert harmonics[0] == pytest.approx(209.5, rel=0.01)
+    assert len(harmonics) == 8
+
+
+def test_pictures_lie_beside_the_page(bench, tmp_path):
+    result = command('report', bench, '--out', tmp_path / 'page.html')
+    assert result.exit_code == 0, result.output
+    names = {file.name for file in (tmp_path / 'page').iterdir()}
+    assert names == {
+        f'{name}.png' for name in ('time_traces', 'hysteresis', 'harmonics', 'spectra', 'tracking')
+    }
+
+
+def test_two_recordings_share_the_figures_and_their_differences_are_told(tmp_path):
+    result = command(
+        'report', REFERENCES / 'gap', '--compare', REFERENCES / 'rough', '--out', tmp_path / 'two.html'
+    )
+    assert result.exit_code == 0, result.output
+    page = Page(tmp_path / 'two.html')
+    names = {trace['name'] for trace in page.figures[0]['data']}
+    assert {'displacement, gap', 'displacement, rough', 'current, gap', 'current, rough'} <= names
+    assert 'differences' in page.sections
+    assert 'mount_sim.motorway.gap_depth is 0.03 in A, 0 in B' in page.text
+    assert 'No mount force was recorded.' in page.text
+    assert 'sim/truth' in page.text
+
+
+def test_a_foreign_recording_gets_a_page_that_says_what_is_missing(tmp_path):
+    writer = BagWriter(tmp_path / 'foreign')
+    writer.add_topic('/chatter', 'std_msgs/msg/String')
+    writer.add_topic('/session', 'std_msgs/msg/String')
+    writer.write('/chatter', serialised(String(data='hello')), 1_000)
+    writer.write('/session', serialised(String(data='note: </script><script>alert(1)</script>')), 2_000)
+    writer.close()
+    result = command('report', tmp_path / 'foreign')
+    assert result.exit_code == 0, result.output
+    page = Page(tmp_path / 'foreign_report.html')
+    assert 'there is no topic displacement' in page.text
+    assert 'When damping was switched was not recorded.' in page.text
+    assert page.figures == []
+    assert 'note </script><script>alert(1)</script>' in page.text  # as text, not as a script
+    assert (tmp_path / 'foreign_report.html').read_text(encoding='utf-8').count('<script') == 1
+
+
+def test_a_damaged_recording_is_reported_as_far_as_it_goes(bench, tmp_path):
+    shutil.copytree(bench / 'recording', tmp_path / 'damaged')
+    (file,) = (tmp_path / 'damaged').glob('*.mcap')
+    raw = file.read_bytes()
+    file.write_bytes(raw[: len(raw) // 3] + bytes(2000) + raw[len(raw) // 3 + 2000 : 3 * len(raw) // 4])
+    result = command('report', tmp_path / 'damaged')
+    assert result.exit_code == 0, result.output
+    text = Page(tmp_path / 'damaged_report.html').text
+    assert 'are damaged and left out' in text
+    assert 'Lost: ' in text
+
+
+def test_what_is_no_recording_is_refused_in_a_sentence(tmp_path):
+    (tmp_path / 'x.mcap').write_bytes(b'hello')
+    result = command('report', tmp_path / 'x.mcap')
+    assert result.exit_code == 1
+    assert 'is no MCAP file' in str(result.exception)
+    result = command('report', *[REFERENCES / 'gap'] * 7)
+    assert '7 recordings in one report are too many' in str(result.exception)
+
+
+@pytest.fixture(scope='module')
+def browser() -> str:
+    """Return a browser without a screen."""
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip(f'no browser: none of {", ".join(BROWSERS)} is installed')
+    return found
+
+
+def test_a_browser_draws_every_figure_and_has_nothing_to_complain_about(browser, bench, page, tmp_path):
+    quiet = (
+        '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+        '--disable-background-networking', '--disable-component-update', '--disable-sync',
+        '--host-resolver-rules=MAP * ~NOTFOUND',  # no network at all
+    )  # fmt: skip
+    shown = subprocess.run(
+        [
+            browser, *quiet, f'--user-data-dir={tmp_path}', '--enable-logging=stderr',
+            '--window-size=1080,3000', '--virtual-time-budget=30000', '--dump-dom',
+            (bench / 'report.html').resolve().as_uri(),
+        ],
+        capture_output=True, text=True, timeout=240, check=True,
+    )  # fmt: skip
+    root = re.search(r'<html[^>]*>', shown.stdout)
+    assert root is not None
+    assert 'data-ready="yes"' in root[0]
+    assert 'data-error' not in root[0]
+    assert f'data-drawn="{len(page.figures)}"' in root[0]
+    # the browser's own console; plotly.js draws curves as paths of this class
+    assert not [line for line in shown.stderr.splitlines() if 'CONSOLE' in line]
+    assert shown.stdout.count('class="js-line"') >= 10
