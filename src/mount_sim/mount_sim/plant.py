@@ -10,6 +10,7 @@ from mount_models.closing import ClosingMechanics, checked_closing, closed_state
 from mount_models.coil.ripple import RippleCoil
 from mount_models.compiled import compiled
 from mount_models.elastomer import branch_step, elastomer_force
+from mount_models.energy import ACCOUNT, book_step, new_account
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_step
@@ -23,6 +24,7 @@ from mount_sim.mounts import Contents, SeatedMount
 
 _PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
 _BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
+_VEHICLE = int(Seat.VEHICLE)
 
 
 class Plant(NamedTuple):
@@ -118,6 +120,7 @@ class PlantSimulation:
         self._truth = np.zeros(1, TRUTH).view(np.uint8)
         self._truth_record = self._truth.view(TRUTH)[0]
         self._state.view(_STATE)['gap'] = plant.mechanics.rest_gap
+        self._account = new_account().view(np.uint8)
 
     @property
     def memory(self) -> Memory:
@@ -146,6 +149,24 @@ class PlantSimulation:
         `engine_forces` (N, upwards) act on the engine in the same steps; a bench holds the engine.
         """
         advance(self._plant, self._state, self._seat, values, engine_forces, wanted_current, self._step_time)
+
+    @property
+    def account(self) -> np.void:
+        """The energy since the first `advance_with_books`, a record of `mount_models.energy.ACCOUNT`."""
+        return self._account.view(ACCOUNT)[0]
+
+    def advance_with_books(
+        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
+    ) -> None:
+        """Advance as `advance` does, to the bit, and keep account of the energy; for a vehicle only."""
+        if self._seat != int(Seat.VEHICLE):
+            raise ValueError(
+                'energy is accounted for in a vehicle only: a rack or a given acceleration has no limit '
+                'to what it gives; choose the scenario motorway or sweep'
+            )
+        advance_with_books(
+            self._plant, self._state, self._account, values, engine_forces, wanted_current, self._step_time
+        )
 
 
 @compiled
@@ -191,6 +212,27 @@ def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
             beside = _force_beside_elastomer(law, now, now.displacement, dt)
             motion = vehicle_step(law.vehicle, now.vehicle, values[index], engine_forces[index], beside, dt)
             _take_motion(law, now, motion, dt)
+
+
+@compiled
+def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
+    """Advance as `advance` does in a vehicle and book each step in `account`, the bytes of its record."""
+    law, books = plant.view(_PLANT)[0], account.view(ACCOUNT)[0]
+    before = state.copy()
+    for k in range(len(values)):
+        before[:] = state
+        advance(plant, state, _VEHICLE, values[k : k + 1], engine_forces[k : k + 1], wanted_current, dt)
+        book_step(
+            books,
+            law.vehicle,
+            law.hydromount,
+            law.contact,
+            before.view(_STATE)[0],
+            state.view(_STATE)[0],
+            values[k],
+            engine_forces[k],
+            dt,
+        )
 
 
 @compiled
