@@ -49,7 +49,7 @@ def test_lockstep_repeats_itself_in_any_namespace_and_equals_the_core_run(comman
     assert topics - {'/diagnostics'} == {name for name in topics if name.startswith('/mount_right/')}
 
 
-@pytest.mark.parametrize('mount', ['hydro', 'friction_always_on', 'friction_off'])
+@pytest.mark.parametrize('mount', ['hydro', 'friction_always_on'])
 def test_lockstep_equals_the_core_run_with_other_mounts_too(command, mount):
     options = (
         '--mount', mount, '--scenario', 'sweep', '--duration', '1', '--set', 'mount_sim.timeline.start=3',
