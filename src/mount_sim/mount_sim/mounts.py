@@ -25,8 +25,8 @@ MOUNTS = {
     'friction': 'the semi-active friction mount',
     'friction_off': 'the friction mount whose coil driver opens when the excitation begins: 0 A from then on',
     'friction_always_on': 'the friction mount, its control told to damp always (`mount_control.switching`)',
-    'hydro': 'the original hydromount; the actuator is there electrically, its pads touch nothing',
-    'elastomer': 'the elastomer alone; the actuator is there electrically, its pads touch nothing',
+    'hydro': 'the original hydromount; the actuator is there electrically, no rod between its pads',
+    'elastomer': 'the elastomer alone; the actuator is there electrically, no rod between its pads',
 }
 """Names of all mounts, and what they are."""
 
