@@ -111,7 +111,7 @@ def test_the_idle_force_acts_on_the_engine_from_the_beginning_of_the_excitation(
         assert np.abs(added).max() > 5e-5
 
 
-def test_without_idle_force_the_vehicle_moves_as_the_law_alone_says(make_mount, drive, parameters):
+def test_road_and_idle_force_move_the_vehicle_as_its_law_alone_says(make_mount, drive, parameters):
     chosen = {'scenario': 'motorway', 'timeline__duration': 0.5, 'idle__amplitude': 150.0}
     _, truth = drive(make_mount(mount='elastomer', **chosen))
     excitation = build_excitation(parameters(**chosen))
