@@ -23,6 +23,7 @@ from mount_models.damper import DegressiveDamper, ProgressiveDamper, ViscousDamp
 from mount_models.elastomer import Elastomer
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.hydromount import Hydromount
 from mount_models.quantity import quantities
 from mount_models.road import Gap, RandomRoad, Sweep
 from mount_models.vehicle import Vehicle
@@ -42,7 +43,8 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
 
 PARAMETER_SETS = (
     ForceLaw, ReluctanceActuator, RippleCoil, ClosingMechanics, FrictionCoefficients, FrictionContact,
-    ViscousDamper, DegressiveDamper, ProgressiveDamper, Elastomer, Vehicle, RandomRoad, Gap, Sweep,
+    ViscousDamper, DegressiveDamper, ProgressiveDamper, Elastomer, Hydromount, Vehicle, RandomRoad,
+    Gap, Sweep,
 )  # fmt: skip
 
 

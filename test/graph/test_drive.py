@@ -49,6 +49,21 @@ def test_lockstep_repeats_itself_in_any_namespace_and_equals_the_core_run(comman
     assert topics - {'/diagnostics'} == {name for name in topics if name.startswith('/mount_right/')}
 
 
+@pytest.mark.parametrize('mount', ['hydro', 'friction_always_on'])
+def test_lockstep_equals_the_core_run_with_other_mounts_too(command, mount):
+    options = (
+        '--mount', mount, '--scenario', 'sweep', '--duration', '1', '--set', 'mount_sim.timeline.start=3',
+        '--set', 'mount_sim.sweep.first_frequency=8', '--set', 'mount_sim.idle.amplitude=200',
+    )  # fmt: skip
+    lockstep, core = command.drive('--lockstep', *options), command.drive('--core', *options)
+    assert lockstep.code == core.code == 0, lockstep.output + core.output
+    for topic in DATA_TOPICS:
+        assert _payloads(lockstep.folder, topic) == _payloads(core.folder, topic), topic
+    active = mount_bags.open(core.folder / 'recording')['control_trace']['damping_active']
+    assert bool(active[:200].all()) is False
+    assert bool(active[200:].all()) is (mount == 'friction_always_on')
+
+
 @pytest.mark.real_time
 def test_real_time_drive_records_every_sample_and_damps_the_gap(command, tmp_path):
     figures_file = tmp_path / 'figures.json'

@@ -59,7 +59,15 @@ def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words)
 @pytest.mark.parametrize(
     ('options', 'words'),
     [
-        (('--scenario', 'race'), ("scenario 'race' is unknown", 'motorway, bench, recorded')),
+        (('--scenario', 'race'), ("scenario 'race' is unknown", 'motorway, bench, sweep, recorded')),
+        (('--mount', 'rubber'), ("mount 'rubber' is unknown", 'friction, friction_off', 'hydro, elastomer')),
+        (
+            ('--mount', 'friction_always_on', '--set', 'mount_control.switching=enabled'),
+            ('mount friction_always_on needs mount_control.switching always', 'received enabled'),
+        ),
+        (('--set', 'mount_control.switching=never'), ("switching 'never' is unknown", 'enabled, always')),
+        (('--scenario', 'sweep', '--duration', '60'), ('duration (60 s)', '(49 s)')),
+        (('--scenario', 'bench', '--set', 'mount_sim.idle.amplitude=200'), ('idle.amplitude (200 N)',)),
         (('--scenario', 'recorded'), ('needs a file',)),
         (('--set', 'mount_control.quality=50'), ('quality (50', '0.3 .. 5')),
         (('--set', 'mount_control.quality=5e1'), ('quality (50', '0.3 .. 5')),

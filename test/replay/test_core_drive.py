@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mount_bringup.core_chain import chosen_damper, control_parameters
 from mount_bringup.core_run import CoreOutcome, run_core
 from mount_bringup.evaluation import Drive, switching, tracking_error
+from mount_bringup.mount_choice import with_control_of_mount
 from mount_ros import topics
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import Topic
@@ -187,6 +188,31 @@ def test_with_damping_off_there_is_no_friction_at_all_after_initialisation():
     assert (truth['friction_force'][~during] == 0.0).all()
     assert (truth['coil_current'][~during] == 0.0).all()
     assert (recorded[topics.CONTROL_TRACE]['current'] == 0.0).all()
+
+
+# The other mounts in the seat, with initialisation and control at work
+
+
+@pytest.mark.parametrize('mount', ['friction_off', 'hydro', 'elastomer'])
+def test_without_pads_or_current_the_control_asks_in_vain(mount):
+    recorded = _run({**BENCH, 'mount': mount, 'timeline.duration': 1.5})
+    assert recorded.outcome.result is not None
+    assert recorded.outcome.result.contact_gap == pytest.approx(349e-6, abs=1e-6)
+    shaken = recorded.drive.true_time > 0.05
+    assert recorded[topics.CURRENT_SETPOINT]['coil_current'].max() > 0.9
+    assert (recorded[topics.SIM_TRUTH]['friction_force'][shaken] == 0.0).all()
+
+
+def test_the_mount_that_is_always_on_damps_without_having_been_shaken():
+    settings = with_control_of_mount({'mount_sim': {**BENCH, 'mount': 'friction_always_on'}})
+    assert settings['mount_control'] == {'switching': 'always'}
+    recorded = _run(settings['mount_sim'], settings['mount_control'])
+    active = recorded[topics.CONTROL_TRACE]['damping_active']
+    assert (active[124:] == 1.0).all()
+    assert recorded.tracking <= 0.02
+    # it damps the very first period, which the switched one lets pass
+    first = (recorded.drive.true_time > 0.06) & (recorded.drive.true_time < 0.125)
+    assert np.abs(recorded[topics.SIM_TRUTH]['friction_force'][first]).max() > 30.0
 
 
 # Initialisation against the truth, through the whole chain

@@ -34,20 +34,19 @@ def over_the_bus(displacement, coil_current, current_rate, flux_rate):
 
 
 @compiled
-def run(mount, values, noise, memory, believable, pending, readings, setpoints, truths, traces):
+def run(ahead, memory, believable, pending, readings, setpoints, truths, traces):
     """Take samples until one displacement is not believable; return (number taken, setpoints in A).
 
     The two setpoints are the one that has arrived for the next sample and the one taken over last.
 
-    `mount` is the `Memory` of the plant with `values` and `noise` for n samples, `memory` that of the
-    controller, `believable` the largest displacement (m), `pending` the setpoint (A) that arrived before
+    `ahead` is what the plant gives for n samples, `memory` that of the controller, `believable` the largest displacement (m), `pending` the setpoint (A) that arrived before
     the first sample. Filled for each sample taken: `readings` (n, 4) as they arrive, `setpoints` (n,) in A
     as they leave, `truths` and `traces` (n, bytes of their records).
     """
-    last = pending
+    last, mount = pending, ahead.memory
     for index in range(len(setpoints)):
         displacement, coil_current, current_rate, flux_rate = plant.read(
-            mount.plant, mount.state, truths[index], noise[index]
+            mount.plant, mount.state, truths[index], ahead.noise[index]
         )
         reading = over_the_bus(displacement, coil_current, current_rate, flux_rate)
         if not abs(reading[0]) <= believable:  # also NaN
@@ -58,6 +57,8 @@ def run(mount, values, noise, memory, believable, pending, readings, setpoints, 
         for place in range(4):
             readings[index, place] = reading[place]
         setpoints[index] = setpoint
-        plant.advance(mount.plant, mount.state, mount.seat, values[index], pending, mount.step_time)
+        current = 0.0 if ahead.driver_open else pending
+        values, forces = ahead.values[index], ahead.engine_forces[index]
+        plant.advance(mount.plant, mount.state, mount.seat, values, forces, current, mount.step_time)
         last, pending = pending, quantised_setpoint_current(setpoint)
     return len(setpoints), pending, last

@@ -100,12 +100,10 @@ def _take_many(
     mount: SimulatedMount, chain: CoreChain, controller: Controller, samples: Samples, pending: float
 ) -> tuple[int, float]:
     """Take samples while nothing is doubtful; return how many, and the setpoint (A) for the next."""
-    memory, values, noise = mount.ahead(samples.room)
-    part = slice(samples.count, samples.count + len(values))
+    ahead = mount.ahead(samples.room)
+    part = slice(samples.count, samples.count + len(ahead.values))
     taken, arrived, last = core_loop.run(
-        memory,
-        values,
-        noise,
+        ahead,
         controller.memory,
         chain.displacement_range,
         pending,

@@ -15,6 +15,8 @@ EPILOG = """Examples:
 
 `engine-mount drive --scenario bench --lockstep --duration 10` - 8 Hz, 1 mm, as fast as it goes
 
+`engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount in the seat
+
 `engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
 
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
@@ -24,7 +26,10 @@ EPILOG = """Examples:
 
 
 def drive(
-    scenario: Annotated[str, typer.Option(help='motorway, bench or recorded')] = 'motorway',
+    scenario: Annotated[str, typer.Option(help='motorway, bench, sweep or recorded')] = 'motorway',
+    mount: Annotated[
+        str, typer.Option(help='friction, friction_off, friction_always_on, hydro or elastomer')
+    ] = '',
     file: Annotated[
         Path | None, typer.Option(help='recorded: CSV, NPY, folder of NPY pairs, or MCAP')
     ] = None,
@@ -65,6 +70,7 @@ def drive(
     """Drive the simulated car through the whole graph, record it and print what happened."""
     from mount_bringup import drive as driving
     from mount_bringup.domain import chosen_domain
+    from mount_bringup.mount_choice import with_control_of_mount
     from mount_bringup.recorder_options import recorder_options
     from mount_bringup.settings import checked_settings
     from mount_bringup.summary import write_json
@@ -74,6 +80,7 @@ def drive(
     parameters = _parameters(settings or [])
     given = {
         'scenario': scenario,
+        'mount': mount or None,
         'seed': seed,
         'timeline.duration': duration,
         'recorded.file': str(file.absolute()) if file else None,
@@ -89,7 +96,7 @@ def drive(
         recorder['on_full'] = on_full
     if recorder:
         parameters.setdefault('mount_recorder', {}).update(recorder)
-    parameters = checked_settings(parameters)
+    parameters = with_control_of_mount(checked_settings(parameters))
     if core and parameters.get('mount_recorder', {}).get('snapshot'):
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'

@@ -2,12 +2,14 @@
 
 from mount_bags.recorder_parameters import RecorderParameters
 from mount_bringup.core_chain import CoreChain, Parameters
+from mount_bringup.mount_choice import check_control_of_mount
 from mount_bringup.recorder_options import checked_recorder
 from mount_driver.parameters import DriverParameters
 from mount_models.closing import checked_closing
 from mount_models.quantity import with_flattened
 from mount_sim.excitation import Excitation
 from mount_sim.faults import Fault
+from mount_sim.mounts import seated_mount
 from mount_sim.parameters import SimParameters
 from mount_sim.scenario import build_excitation
 
@@ -17,6 +19,8 @@ def preflight(parameters: Parameters) -> Excitation:
     sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
     excitation = build_excitation(sim)
     Fault(sim.fault)
+    seated_mount(sim.mount)
+    check_control_of_mount(parameters)
     checked_closing(sim.mechanics, sim.actuator)
     with_flattened(DriverParameters(), parameters.get('mount_driver', {}))
     checked_recorder(RecorderParameters(), parameters.get('mount_recorder', {}))

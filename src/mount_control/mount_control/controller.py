@@ -96,9 +96,7 @@ class Controller:
             band_pass.design(
                 parameters.eigenfrequency, parameters.quality, parameters.lead_time, SAMPLE_TIME
             ),
-            switching.Switching(
-                parameters.switch_on_level, parameters.switch_off_level, parameters.period_samples
-            ),
+            switching.chosen_switching(parameters),
             damper.velocity_step,
             friction,
             contact,

@@ -10,6 +10,7 @@ from mount_models.sampling import SAMPLE_TIME
 class ControlParameters(NamedTuple):
     """Parameters of band-pass, prediction, switching and output."""
 
+    switching: str = 'enabled'
     eigenfrequency: Annotated[
         float,
         Quantity(
@@ -60,9 +61,20 @@ class ControlParameters(NamedTuple):
         return max(1, round(1.0 / (self.eigenfrequency * SAMPLE_TIME)))
 
 
+SWITCHING = {
+    'enabled': 'damping is switched on and off by the magnitude',
+    'always': 'damping goes on one period after activation and never off, whatever the magnitude',
+}
+"""Values of `switching`, and what they mean."""
+
+
 def checked_parameters(parameters: ControlParameters) -> ControlParameters:
     """Return the parameters checked one by one and against each other, or raise `ParameterError`."""
     parameters = checked(parameters)
+    if parameters.switching not in SWITCHING:
+        raise ParameterError(
+            f'switching {parameters.switching!r} is unknown; known are {", ".join(SWITCHING)}'
+        )
     if not parameters.switch_off_level < parameters.switch_on_level:
         raise ParameterError(
             f'switch_off_level ({1e3 * parameters.switch_off_level:g} mm) must lie below switch_on_level '

@@ -12,19 +12,25 @@ def _refusal(**changes):
     return str(caught.value)
 
 
+def _numbers():
+    """The default of each parameter that is a number, by name."""
+    defaults = ControlParameters()._asdict()
+    return {name: default for name, default in defaults.items() if not isinstance(default, str)}
+
+
 def test_defaults_are_accepted():
     assert checked_parameters(ControlParameters()) == ControlParameters()
 
 
 def test_every_parameter_has_unit_meaning_and_a_closed_range_around_its_default():
     notes = quantities(ControlParameters())
-    for name, default in ControlParameters()._asdict().items():
+    for name, default in _numbers().items():
         assert notes[name].unit, name
         assert notes[name].meaning, name
         assert notes[name].low <= default <= notes[name].high, name
 
 
-@pytest.mark.parametrize('name', ControlParameters._fields)
+@pytest.mark.parametrize('name', _numbers())
 def test_each_parameter_is_refused_beyond_both_ends_of_its_range(name):
     note = quantities(ControlParameters())[name]
     width = note.high - note.low
@@ -60,3 +66,8 @@ def test_at_least_one_missing_sample_can_be_bridged():
 )
 def test_a_period_is_counted_in_whole_samples(frequency, samples):
     assert ControlParameters(eigenfrequency=frequency).period_samples == samples
+
+
+def test_another_switching_is_refused_with_the_known_ones():
+    assert checked_parameters(ControlParameters(switching='always')).switching == 'always'
+    assert _refusal(switching='never') == "switching 'never' is unknown; known are enabled, always"

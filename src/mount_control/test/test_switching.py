@@ -98,3 +98,19 @@ def test_magnitude_is_the_highest_value_of_the_last_period(distances, period):
     magnitude, _ = _run(distances, LAW._replace(period=period))
     before = np.abs([0.0] * (period - 1) + distances)
     assert magnitude.tolist() == [before[k : k + period].max() for k in range(len(distances))]
+
+
+def test_told_to_damp_always_it_goes_on_after_one_period_and_never_off(make_controller, sine):
+    still = np.zeros(2000)
+    active = make_controller(switching='always').run(np.r_[still, sine(8.0, 2e-3, 1.0), still])[
+        'damping_active'
+    ]
+    assert active.tolist() == [0] * 124 + [1] * (len(active) - 124)
+    assert not make_controller().run(still)['damping_active'].any()
+
+
+def test_told_to_damp_always_it_damps_as_the_switched_one_does_once_that_is_on(make_controller, sine):
+    shaking = sine(8.0, 2e-3, 4.0)
+    # the creep of the pads still remembers for a while when each of them began
+    always, switched = (make_controller(switching=how).run(shaking) for how in ('always', 'enabled'))
+    np.testing.assert_allclose(always['current'][-1000:], switched['current'][-1000:], atol=5e-5)

@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_models.road import Gap, RandomRoad, gap_in_road, random_road
+from mount_models.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
 
 
 class Seat(IntEnum):
@@ -21,13 +21,14 @@ class Seat(IntEnum):
 class Excitation:
     """Numbers at the plant's step from `start` (s of simulated time) on; before it: rest.
 
-    `values` (n,) in the unit of the seat.
+    `values` (n,) in the unit of the seat; `engine_forces` (n,) in N, upwards on the engine, None for none.
     """
 
     seat: Seat
     values: NDArray[np.float64]
     step_time: float
     start: float
+    engine_forces: NDArray[np.float64] | None = None
 
     @property
     def duration(self) -> float:
@@ -51,3 +52,17 @@ def motorway(motorway: RandomRoad, gap: Gap, duration: float, start: float, step
     time = np.arange(round(duration / step_time)) * step_time
     height = random_road(time, motorway) if motorway.roughness > 0.0 else np.zeros_like(time)
     return Excitation(Seat.VEHICLE, height + gap_in_road(time, gap), step_time, start)
+
+
+def sweep(sweep: Sweep, duration: float, start: float, step_time: float) -> Excitation:
+    """Return the height of a road that shakes the wheel with a rising frequency."""
+    time = np.arange(round(duration / step_time)) * step_time
+    return Excitation(Seat.VEHICLE, sweep_road(time, sweep), step_time, start)
+
+
+def idle_force(
+    amplitude: float, frequency: float, second_share: float, count: int, step_time: float
+) -> NDArray[np.float64]:
+    """Return the force (n,) in N of an idling engine: a sine (N, Hz) and a share of twice its frequency."""
+    phase = 2.0 * np.pi * frequency * np.arange(count) * step_time
+    return np.asarray(amplitude * (np.sin(phase) + second_share * np.sin(2.0 * phase)))

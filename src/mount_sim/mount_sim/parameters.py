@@ -7,35 +7,48 @@ from mount_models.closing import ClosingMechanics
 from mount_models.coil.ripple import RippleCoil
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.hydromount import Hydromount
 from mount_models.quantity import Quantity
 from mount_models.vehicle import Engine, Vehicle
 from mount_sim.electronics import ElectronicsParameters
 from mount_sim.faults import FaultParameters
+from mount_sim.mounts import seated_mount
 from mount_sim.plant import Plant
-from mount_sim.scenario import BenchScenario, MotorwayScenario, RecordedScenario, Timeline
+from mount_sim.scenario import (
+    BenchScenario,
+    IdleForce,
+    MotorwayScenario,
+    RecordedScenario,
+    SweepScenario,
+    Timeline,
+)
 
 
 class SimParameters(NamedTuple):
     """Scenario, truth and faults of one simulated run."""
 
     scenario: str = 'motorway'
+    mount: str = 'friction'
     seed: Annotated[int, Quantity('1', 'seed of noise and road', 0, 2**31 - 1, 'chosen')] = 1
     timeline: Timeline = Timeline()
     bench: BenchScenario = BenchScenario()
     motorway: MotorwayScenario = MotorwayScenario()
+    sweep: SweepScenario = SweepScenario()
     recorded: RecordedScenario = RecordedScenario()
+    idle: IdleForce = IdleForce()
     actuator: ReluctanceActuator = ReluctanceActuator()
     coil: RippleCoil = RippleCoil()
     mechanics: ClosingMechanics = ClosingMechanics()
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
     vehicle: Vehicle = Vehicle()
+    hydromount: Hydromount = Hydromount()
     electronics: ElectronicsParameters = ElectronicsParameters()
     fault: FaultParameters = FaultParameters()
 
     @property
     def plant(self) -> Plant:
-        """The simulated truth."""
+        """The simulated truth; an unknown mount raises `ParameterError`."""
         return Plant(
             actuator=self.actuator,
             coil=self.coil,
@@ -45,4 +58,6 @@ class SimParameters(NamedTuple):
             vehicle=self.vehicle,
             engine=Engine(self.vehicle.engine_mass, self.vehicle.elastomer),
             electronics=self.electronics,
+            hydromount=self.hydromount,
+            mount=seated_mount(self.mount),
         )

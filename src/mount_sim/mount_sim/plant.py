@@ -1,4 +1,4 @@
-"""The simulated truth in one compiled step: coil, actuator, friction contact, and what moves around them."""
+"""The simulated truth in one compiled step: coil, actuator, the mount, and what moves around them."""
 
 from typing import NamedTuple
 
@@ -10,16 +10,21 @@ from mount_models.closing import ClosingMechanics, checked_closing, closed_state
 from mount_models.coil.ripple import RippleCoil
 from mount_models.compiled import compiled
 from mount_models.elastomer import branch_step, elastomer_force
+from mount_models.energy import ACCOUNT, book_step, new_account
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_step
+from mount_models.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_models.quantity import checked
 from mount_models.record import record_bytes, record_dtype
 from mount_models.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
 from mount_sim.electronics import ElectronicsParameters, advance_current, read_sensors
 from mount_sim.excitation import Seat
+from mount_sim.mounts import Contents, SeatedMount
 
+_PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
 _BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
+_VEHICLE = int(Seat.VEHICLE)
 
 
 class Plant(NamedTuple):
@@ -33,6 +38,8 @@ class Plant(NamedTuple):
     vehicle: Vehicle = Vehicle()
     engine: Engine = Engine()
     electronics: ElectronicsParameters = ElectronicsParameters()
+    hydromount: Hydromount = Hydromount()
+    mount: SeatedMount = SeatedMount()
 
 
 _PLANT = record_dtype(Plant)
@@ -41,6 +48,7 @@ _STATE = np.dtype(
     [
         ('vehicle', VEHICLE_STATE),
         ('engine', ENGINE_STATE),
+        ('hydromount', HYDROMOUNT_STATE),
         *(
             (name, 'f8')
             for name in (
@@ -112,6 +120,7 @@ class PlantSimulation:
         self._truth = np.zeros(1, TRUTH).view(np.uint8)
         self._truth_record = self._truth.view(TRUTH)[0]
         self._state.view(_STATE)['gap'] = plant.mechanics.rest_gap
+        self._account = new_account().view(np.uint8)
 
     @property
     def memory(self) -> Memory:
@@ -132,9 +141,32 @@ class PlantSimulation:
         """Return the sensors' readings (displacement, current, di/dt, dB/dt; SI) and note the truth."""
         return read(self._plant, self._state, self._truth, noise)
 
-    def advance(self, values: NDArray[np.float64], wanted_current: float) -> None:
-        """Advance by one step for each of the excitation's `values`, with a current setpoint in A."""
-        advance(self._plant, self._state, self._seat, values, wanted_current, self._step_time)
+    def advance(
+        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
+    ) -> None:
+        """Advance by one step for each of the excitation's `values`, with a current setpoint in A.
+
+        `engine_forces` (N, upwards) act on the engine in the same steps; a bench holds the engine.
+        """
+        advance(self._plant, self._state, self._seat, values, engine_forces, wanted_current, self._step_time)
+
+    @property
+    def account(self) -> np.void:
+        """The energy since the first `advance_with_books`, a record of `mount_models.energy.ACCOUNT`."""
+        return self._account.view(ACCOUNT)[0]
+
+    def advance_with_books(
+        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
+    ) -> None:
+        """Advance as `advance` does, to the bit, and keep account of the energy; for a vehicle only."""
+        if self._seat != int(Seat.VEHICLE):
+            raise ValueError(
+                'energy is accounted for in a vehicle only: a rack or a given acceleration has no limit '
+                'to what it gives; choose the scenario motorway or sweep'
+            )
+        advance_with_books(
+            self._plant, self._state, self._account, values, engine_forces, wanted_current, self._step_time
+        )
 
 
 @compiled
@@ -163,7 +195,7 @@ def read(plant, state, truth, noise):
 
 
 @compiled
-def advance(plant, state, seat, values, wanted_current, dt):
+def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
     """Advance the state by one step of `dt` s for each excitation value; see `PlantSimulation.advance`."""
     law, now = plant.view(_PLANT)[0], state.view(_STATE)[0]
     now.wanted_current = wanted_current
@@ -172,14 +204,35 @@ def advance(plant, state, seat, values, wanted_current, dt):
         if seat == _BENCH:
             _advance_bench(law, now, values[index], dt)
         elif seat == _ACCELERATED_CHASSIS:
-            _rub(law, now, now.displacement, dt)
-            _take_motion(now, engine_step(law.engine, now.engine, values[index], 0.0, now.friction_force, dt))
+            beside = _force_beside_elastomer(law, now, now.displacement, dt)
+            motion = engine_step(law.engine, now.engine, values[index], engine_forces[index], beside, dt)
+            _take_motion(law, now, motion, dt)
         else:
             now.road_height = values[index]
-            _rub(law, now, now.displacement, dt)
-            _take_motion(
-                now, vehicle_step(law.vehicle, now.vehicle, values[index], 0.0, now.friction_force, dt)
-            )
+            beside = _force_beside_elastomer(law, now, now.displacement, dt)
+            motion = vehicle_step(law.vehicle, now.vehicle, values[index], engine_forces[index], beside, dt)
+            _take_motion(law, now, motion, dt)
+
+
+@compiled
+def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
+    """Advance as `advance` does in a vehicle and book each step in `account`, the bytes of its record."""
+    law, books = plant.view(_PLANT)[0], account.view(ACCOUNT)[0]
+    before = state.copy()
+    for k in range(len(values)):
+        before[:] = state
+        advance(plant, state, _VEHICLE, values[k : k + 1], engine_forces[k : k + 1], wanted_current, dt)
+        book_step(
+            books,
+            law.vehicle,
+            law.hydromount,
+            law.contact,
+            before.view(_STATE)[0],
+            state.view(_STATE)[0],
+            values[k],
+            engine_forces[k],
+            dt,
+        )
 
 
 @compiled
@@ -190,6 +243,17 @@ def _advance_magnet(law, now, dt):
     gap, normal_force = closed_state(law.mechanics, law.actuator, now.current, now.gap)
     now.gap = gap
     now.normal_force = normal_force
+
+
+@compiled
+def _force_beside_elastomer(law, now, displacement, dt):
+    """Return the force (N) of what acts in the mount at `displacement` (m) beside its elastomer."""
+    if law.mount.contents == _PADS:
+        _rub(law, now, displacement, dt)
+        return now.friction_force
+    if law.mount.contents == _FLUID:
+        return hydromount_force(law.hydromount, now.hydromount)
+    return 0.0
 
 
 @compiled
@@ -211,13 +275,21 @@ def _advance_bench(law, now, displacement, dt):
     now.slow_force, now.middle_force, now.fast_force = branches
     now.velocity = change / dt
     now.displacement = displacement
-    _rub(law, now, displacement, dt)
-    now.mount_force = elastomer_force(elastomer, displacement, branches) + now.friction_force
+    _pump(law, now, change, dt)
+    beside = _force_beside_elastomer(law, now, displacement, dt)
+    now.mount_force = elastomer_force(elastomer, displacement, branches) + beside
 
 
 @compiled
-def _take_motion(now, motion):
+def _take_motion(law, now, motion, dt):
+    _pump(law, now, motion.displacement - now.displacement, dt)
     now.displacement = motion.displacement
     now.velocity = motion.velocity
     now.mount_force = motion.mount_force
     now.chassis_acceleration = motion.chassis_acceleration
+
+
+@compiled
+def _pump(law, now, displacement_change, dt):
+    if law.mount.contents == _FLUID:
+        hydromount_step(law.hydromount, now.hydromount, displacement_change, dt)

@@ -1,14 +1,15 @@
 """Scenarios of the simulated drive: what can be set, and the excitation that comes of it."""
 
+from dataclasses import replace
 from typing import Annotated, NamedTuple, Protocol
 
 from mount_models.quantity import ParameterError, Quantity
-from mount_models.road import Gap, RandomRoad
+from mount_models.road import Gap, RandomRoad, Sweep
 from mount_sim import excitation
 from mount_sim.excitation import Excitation, Seat
 from mount_sim.recorded import load_signal, resample
 
-SCENARIO_NAMES = ('motorway', 'bench', 'recorded')
+SCENARIO_NAMES = ('motorway', 'bench', 'sweep', 'recorded')
 STEP_TIME = 5e-5  # s, chosen: step of the plant, 20 in each sample
 
 
@@ -21,7 +22,13 @@ class Timeline(NamedTuple):
     ] = 5.0
     duration: Annotated[
         float,
-        Quantity('s', 'length of the excitation; 0: that of the recording, else 15 s', 0.0, 7200.0, 'chosen'),
+        Quantity(
+            's',
+            'length of the excitation; 0: that of the recording or sweep, else 15 s',
+            0.0,
+            7200.0,
+            'chosen',
+        ),
     ] = 0.0
 
 
@@ -47,6 +54,38 @@ class MotorwayScenario(NamedTuple):
         float,
         Quantity('s', 'when the wheel meets the gap; 0: after a third of the drive', 0.0, 3600.0, 'chosen'),
     ] = 0.0
+
+
+class SweepScenario(NamedTuple):
+    """A rack under the front wheels: a sine of rising frequency, its velocity of constant amplitude."""
+
+    velocity_amplitude: Annotated[
+        float, Quantity('m/s', 'V0: largest vertical velocity of the road', 0.0, 1.0, 'chosen')
+    ] = 0.12
+    first_frequency: Annotated[
+        float, Quantity('Hz', 'frequency at the beginning', 0.1, 100.0, 'paper, section 6')
+    ] = 1.0
+    last_frequency: Annotated[
+        float, Quantity('Hz', 'frequency at the end', 0.1, 100.0, 'paper, section 6')
+    ] = 50.0
+    rate: Annotated[float, Quantity('Hz/s', 'rise of the frequency', 0.01, 10.0, 'paper, section 6')] = 1.0
+    ramp_in: Annotated[
+        float, Quantity('s', 'the height grows linearly from zero for so long', 0.0, 10.0, 'chosen')
+    ] = 1.0
+
+
+class IdleForce(NamedTuple):
+    """Force of the idling engine on itself, a sine with its second harmonic; none on a bench."""
+
+    amplitude: Annotated[
+        float, Quantity('N', 'F_i: amplitude of the first harmonic; 0: no idle force', 0.0, 2000.0, 'chosen')
+    ] = 0.0
+    frequency: Annotated[
+        float, Quantity('Hz', 'first harmonic: two for each turn of the crank', 5.0, 200.0, 'chosen')
+    ] = 26.7
+    second_share: Annotated[
+        float, Quantity('1', 'amplitude of the second harmonic over that of the first', 0.0, 2.0, 'chosen')
+    ] = 0.4
 
 
 class RecordedScenario(NamedTuple):
@@ -83,15 +122,38 @@ class Scenarios(Protocol):
     def motorway(self) -> MotorwayScenario: ...
 
     @property
+    def sweep(self) -> SweepScenario: ...
+
+    @property
     def recorded(self) -> RecordedScenario: ...
+
+    @property
+    def idle(self) -> IdleForce: ...
 
 
 def build_excitation(scenarios: Scenarios) -> Excitation:
     """Return the excitation of the chosen scenario, or raise `ValueError` with what is wrong."""
+    shaken, idle = _scenario(scenarios), scenarios.idle
+    if idle.amplitude == 0.0:
+        return shaken
+    if shaken.seat is Seat.BENCH:
+        raise ParameterError(
+            f'idle.amplitude ({idle.amplitude:g} N) has no effect in scenario {scenarios.scenario}, where a '
+            'rack imposes the displacement; set it to 0 or choose another scenario'
+        )
+    forces = excitation.idle_force(
+        idle.amplitude, idle.frequency, idle.second_share, len(shaken.values), shaken.step_time
+    )
+    return replace(shaken, engine_forces=forces)
+
+
+def _scenario(scenarios: Scenarios) -> Excitation:
     if scenarios.scenario == 'bench':
         return _bench(scenarios)
     if scenarios.scenario == 'motorway':
         return _motorway(scenarios)
+    if scenarios.scenario == 'sweep':
+        return _sweep(scenarios)
     if scenarios.scenario == 'recorded':
         return _recorded(scenarios)
     known = ', '.join(SCENARIO_NAMES)
@@ -121,6 +183,24 @@ def _motorway(scenarios: Scenarios) -> Excitation:
         speed=motorway.speed,
     )
     return excitation.motorway(road, gap, duration, timeline.start, STEP_TIME)
+
+
+def _sweep(scenarios: Scenarios) -> Excitation:
+    timeline, chosen = scenarios.timeline, scenarios.sweep
+    if not chosen.last_frequency > chosen.first_frequency:
+        raise ParameterError(
+            f'sweep.last_frequency ({chosen.last_frequency:g} Hz) must lie above sweep.first_frequency '
+            f'({chosen.first_frequency:g} Hz)'
+        )
+    whole = (chosen.last_frequency - chosen.first_frequency) / chosen.rate
+    duration = timeline.duration or whole
+    if duration > whole + STEP_TIME:
+        raise ParameterError(
+            f'duration ({duration:g} s) is longer than the sweep from {chosen.first_frequency:g} to '
+            f'{chosen.last_frequency:g} Hz ({whole:g} s); ask for at most that, or raise sweep.last_frequency'
+        )
+    road = Sweep(chosen.velocity_amplitude, chosen.first_frequency, chosen.rate, chosen.ramp_in)
+    return excitation.sweep(road, duration, timeline.start, STEP_TIME)
 
 
 def _recorded(scenarios: Scenarios) -> Excitation:

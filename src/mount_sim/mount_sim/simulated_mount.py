@@ -21,10 +21,14 @@ class Run:
 
 
 class Ahead(NamedTuple):
-    """What the next n samples are made of: the plant, excitation (n, steps), numbers for the noise (n, 4)."""
+    """What the next n samples are made of: the plant, excitation and force on the engine, both (n, steps),
+    whether the coil's driver is open, and numbers for the noise (n, 4).
+    """
 
     memory: Memory
     values: NDArray[np.float64]
+    engine_forces: NDArray[np.float64]
+    driver_open: bool
     noise: NDArray[np.float64]
 
 
@@ -41,7 +45,12 @@ class SimulatedMount:
         self._steps = round(SAMPLE_TIME / excitation.step_time)
         self._patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
         start = round(excitation.start / SAMPLE_TIME)
-        self._values = _per_sample(excitation, start, self._steps)
+        self._values = _per_sample(excitation.values, start, self._steps)
+        self._engine_forces = None
+        if excitation.engine_forces is not None:
+            self._engine_forces = _per_sample(excitation.engine_forces, start, self._steps)
+        self._no_force = np.zeros(self._steps)
+        self._driver_opens = plant.mount.driver_opens
         self.run = Run(len(self._values), start)
         self.sample = 0
         self._silent = 0
@@ -82,8 +91,9 @@ class SimulatedMount:
             self._silent += 1
         else:
             self._silent, self._current = 0, setpoint
-        current = self._current if self.enabled else 0.0
-        self._plant.advance(self._values[self.sample], current)
+        current = self._current if self.enabled and not self._driver_open else 0.0
+        forces = self._no_force if self._engine_forces is None else self._engine_forces[self.sample]
+        self._plant.advance(self._values[self.sample], forces, current)
         self.sample += 1
 
     def ahead(self, count: int) -> Ahead:
@@ -91,8 +101,13 @@ class SimulatedMount:
 
         The loop does for each what `measure` and `advance` with a setpoint do; `skip` notes how far it came.
         """
-        values = self._values[self.sample : self.sample + count]
-        return Ahead(self._plant.memory, values, self._noise.ahead(len(values)))
+        until_open = self.run.excitation_start - self.sample
+        if self._driver_opens and until_open > 0:
+            count = min(count, until_open)
+        part = slice(self.sample, self.sample + count)
+        values = self._values[part]
+        forces = np.zeros(values.shape) if self._engine_forces is None else self._engine_forces[part]
+        return Ahead(self._plant.memory, values, forces, self._driver_open, self._noise.ahead(len(values)))
 
     def skip(self, count: int, setpoint: float) -> None:
         """Note that a compiled loop took `count` samples and advanced the last one with `setpoint` (A)."""
@@ -100,9 +115,13 @@ class SimulatedMount:
         self._silent, self._current = 0, setpoint
         self.sample += count
 
+    @property
+    def _driver_open(self) -> bool:
+        return self._driver_opens and self.sample >= self.run.excitation_start
 
-def _per_sample(excitation: Excitation, start: int, steps: int) -> NDArray[np.float64]:
+
+def _per_sample(series: NDArray[np.float64], start: int, steps: int) -> NDArray[np.float64]:
     """Return the excitation as one row of values for each sample, with the rest before its start."""
-    whole = len(excitation.values) // steps
-    rows = excitation.values[: whole * steps].reshape(whole, steps)
+    whole = len(series) // steps
+    rows = series[: whole * steps].reshape(whole, steps)
     return np.ascontiguousarray(np.vstack([np.zeros((start, steps)), rows]))

@@ -4,10 +4,11 @@ from pathlib import Path
 
 from mount_models.quantity import quantities
 from mount_sim.faults import FAULTS
+from mount_sim.mounts import MOUNTS
 from mount_sim.parameters import SimParameters
 
 README = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
-OWN = ('timeline', 'bench', 'motorway', 'recorded', 'electronics', 'fault')
+OWN = ('timeline', 'bench', 'motorway', 'sweep', 'recorded', 'idle', 'electronics', 'fault')
 
 
 def rows(parameters, prefix=''):
@@ -32,3 +33,8 @@ def test_every_number_that_can_be_set_is_listed_with_default_unit_range_and_mean
 def test_every_fault_is_listed():
     for kind, meaning in FAULTS.items():
         assert f'| `{kind}` | {meaning} |' in README.splitlines()
+
+
+def test_every_mount_is_listed():
+    for name, meaning in MOUNTS.items():
+        assert f'| `{name}` | {meaning} |' in README.splitlines()

@@ -16,7 +16,7 @@ def _refusal(chosen):
 
 def test_an_unknown_scenario_is_refused_with_the_known_ones(parameters):
     assert _refusal(parameters(scenario='race')) == (
-        "scenario 'race' is unknown; known are motorway, bench, recorded"
+        "scenario 'race' is unknown; known are motorway, bench, sweep, recorded"
     )
 
 
@@ -69,6 +69,59 @@ def test_the_road_belongs_to_the_seed(parameters):
     assert np.abs(road(7) - road(8)).max() > 1e-4
     smooth = build_excitation(parameters(timeline__duration=1.0, motorway__roughness=0.0, seed=7)).values
     assert np.abs(road(7) - smooth).max() > 1e-4
+
+
+def test_the_sweep_shakes_the_wheel_from_1_to_50_hz_in_49_s(parameters):
+    excitation = build_excitation(parameters(scenario='sweep'))
+    assert excitation.seat is Seat.VEHICLE
+    assert excitation.duration == pytest.approx(49.0)
+    times = np.arange(len(excitation.values)) * STEP_TIME
+    phase = 2.0 * np.pi * (times + 0.5 * times**2)
+    height = -0.12 / (2.0 * np.pi * (1.0 + times)) * np.cos(phase) * np.minimum(times, 1.0)
+    np.testing.assert_allclose(excitation.values, height, atol=1e-12)
+
+
+def test_a_sweep_takes_its_own_frequencies_rate_and_amplitude(parameters):
+    chosen = parameters(
+        scenario='sweep', sweep__first_frequency=5.0, sweep__last_frequency=9.0, sweep__rate=2.0,
+        sweep__velocity_amplitude=0.06, sweep__ramp_in=0.0,
+    )  # fmt: skip
+    excitation = build_excitation(chosen)
+    assert excitation.duration == pytest.approx(2.0)
+    velocity = np.diff(excitation.values) / STEP_TIME
+    assert np.abs(velocity).max() == pytest.approx(0.06, rel=0.02)
+    crossings = np.flatnonzero(np.diff(np.sign(excitation.values)))
+    assert len(crossings) == pytest.approx(2.0 * 0.5 * (5.0 + 9.0) * 2.0, abs=1)
+
+
+def test_an_impossible_sweep_is_refused(parameters):
+    down = parameters(scenario='sweep', sweep__first_frequency=20.0, sweep__last_frequency=20.0)
+    assert _refusal(down) == ('sweep.last_frequency (20 Hz) must lie above sweep.first_frequency (20 Hz)')
+    assert build_excitation(parameters(scenario='sweep', timeline__duration=3.0)).duration == pytest.approx(
+        3.0
+    )
+    long = parameters(scenario='sweep', timeline__duration=60.0)
+    assert 'duration (60 s) is longer than the sweep from 1 to 50 Hz (49 s)' in _refusal(long)
+
+
+@pytest.mark.parametrize('scenario', ['motorway', 'sweep', 'recorded'])
+def test_the_idle_force_is_a_sine_with_its_second_harmonic(parameters, recording, scenario):
+    chosen = {'scenario': scenario, 'timeline__duration': 2.0, 'recorded__file': recording}
+    assert build_excitation(parameters(**chosen)).engine_forces is None
+    excitation = build_excitation(parameters(**chosen, idle__amplitude=200.0))
+    times = np.arange(40_000) * STEP_TIME
+    force = 200.0 * (np.sin(2 * np.pi * 26.7 * times) + 0.4 * np.sin(2 * np.pi * 53.4 * times))
+    np.testing.assert_allclose(excitation.engine_forces, force, atol=1e-7)
+    other = build_excitation(
+        parameters(**chosen, idle__amplitude=80.0, idle__frequency=30.0, idle__second_share=0.0)
+    )
+    np.testing.assert_allclose(other.engine_forces, 80.0 * np.sin(2 * np.pi * 30.0 * times), atol=1e-7)
+    np.testing.assert_array_equal(other.values, excitation.values)
+
+
+def test_an_idle_force_on_the_bench_is_refused(parameters):
+    refusal = _refusal(parameters(scenario='bench', idle__amplitude=200.0))
+    assert refusal.startswith('idle.amplitude (200 N) has no effect in scenario bench')
 
 
 @pytest.fixture

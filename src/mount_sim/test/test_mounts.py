@@ -1,0 +1,177 @@
+"""The mounts that can sit in the seat, and the energy in a vehicle with them."""
+
+import numpy as np
+import pytest
+
+from mount_models.elastomer import Elastomer, dynamic_stiffness
+from mount_models.energy import LOSSES, imbalance
+from mount_models.quantity import ParameterError
+from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from mount_sim.excitation import Seat
+from mount_sim.mounts import MOUNTS, seated_mount
+from mount_sim.plant import PlantSimulation
+from mount_sim.scenario import build_excitation
+
+PERIOD = 125  # samples of 8 Hz
+CHASSIS = {'scenario': 'recorded', 'timeline__duration': 1.0}
+
+
+def closed(number):
+    """A setpoint that presses the pads."""
+    return 1.0
+
+
+@pytest.fixture
+def shaken_chassis(tmp_path):
+    times = np.arange(500) / 200.0
+    np.save(tmp_path / 'z_value.npy', 2.0 * np.sin(2 * np.pi * 6.0 * times))
+    np.save(tmp_path / 'z_t.npy', times)
+    return {**CHASSIS, 'recorded__file': str(tmp_path / 'z_value.npy')}
+
+
+def harmonics(truth):
+    """Complex amplitudes (N) of harmonics 1 to 8 of the mount force over the last four periods."""
+    force = truth['mount_force'][-4 * PERIOD :]
+    return np.fft.rfft(force)[4 : 4 * 9 : 4] * 2.0 / len(force)
+
+
+def on_the_bench(make_mount, drive, mount, setpoint=closed, **changes):
+    return drive(make_mount(mount=mount, timeline__duration=2.0, **changes), setpoint)[1]
+
+
+def test_the_hydromount_on_the_bench_has_its_harmonics_whatever_the_coil_does(make_mount, drive):
+    expected = [277.8, 5.03, 13.23, 2.01, 5.36, 1.02, 2.32, 0.50]
+    for setpoint in (closed, lambda number: None):
+        truth = on_the_bench(make_mount, drive, 'hydro', setpoint)
+        np.testing.assert_allclose(np.abs(harmonics(truth)), expected, rtol=0.01, atol=0.03)
+        assert (truth['friction_force'] == 0.0).all()
+
+
+def test_the_elastomer_on_the_bench_is_alone_whatever_the_coil_does(make_mount, drive):
+    truth = on_the_bench(make_mount, drive, 'elastomer')
+    found = np.abs(harmonics(truth))
+    assert found[0] == pytest.approx(abs(dynamic_stiffness(Elastomer(), 8.0)) * 1e-3, rel=1e-3)
+    assert found[1:].max() < 0.05
+    assert (truth['friction_force'] == 0.0).all()
+
+
+@pytest.mark.parametrize('mount', ['hydro', 'elastomer'])
+def test_the_actuator_is_there_electrically_whatever_sits_in_the_seat(make_mount, drive, mount):
+    readings, truth = drive(make_mount(mount=mount), closed)
+    expected, with_pads = drive(make_mount(), closed)
+    np.testing.assert_array_equal(readings[:, 1:], expected[:, 1:])
+    for name in ('coil_current', 'gap', 'flux_density'):
+        np.testing.assert_array_equal(truth[name], with_pads[name])
+
+
+def test_the_driver_of_friction_off_opens_when_the_excitation_begins(make_mount, drive):
+    _, truth = drive(make_mount(mount='friction_off', timeline__start=0.2), closed)
+    assert truth['coil_current'][199] > 0.9  # until then the mount can be initialised
+    assert (truth['current_setpoint'][201:] == 0.0).all()
+    assert (truth['coil_current'][260:] == 0.0).all()
+    assert (truth['friction_force'][260:] == 0.0).all()
+
+
+def test_friction_always_on_is_the_friction_mount(make_mount, drive):
+    _, always = drive(make_mount(mount='friction_always_on'), closed)
+    _, friction = drive(make_mount(), closed)
+    assert always.tobytes() == friction.tobytes()
+
+
+@pytest.mark.parametrize('seat', ['motorway', 'recorded'])
+def test_each_mount_moves_the_engine_in_its_own_way(make_mount, drive, shaken_chassis, seat):
+    chosen = shaken_chassis if seat == 'recorded' else {'scenario': 'motorway', 'timeline__duration': 1.0}
+    peaks = {
+        mount: np.abs(drive(make_mount(**chosen, mount=mount), closed)[1]['displacement']).max()
+        for mount in ('friction', 'friction_off', 'hydro', 'elastomer')
+    }
+    assert peaks['friction'] < peaks['hydro'] < peaks['elastomer']
+    assert peaks['friction_off'] == pytest.approx(peaks['elastomer'], rel=0.02)
+
+
+@pytest.mark.parametrize(('mount', 'peak_mm'), [('friction_off', 3.47), ('elastomer', 3.47), ('hydro', 1.32)])
+def test_the_sweep_has_the_known_resonance_peak(make_mount, drive, mount, peak_mm):
+    _, truth = drive(make_mount(scenario='sweep', mount=mount, timeline__duration=10.0))
+    between_7_and_10_hz = np.abs(truth['displacement'][6000:9000])
+    assert between_7_and_10_hz.max() * 1e3 == pytest.approx(peak_mm, rel=0.01)
+
+
+def test_the_idle_force_acts_on_the_engine_from_the_beginning_of_the_excitation(
+    make_mount, drive, shaken_chassis
+):
+    for chosen in ({'scenario': 'motorway', 'timeline__duration': 1.0}, shaken_chassis):
+        quiet, idling = (
+            drive(make_mount(**chosen, timeline__start=0.1, idle__amplitude=amplitude))[1]
+            for amplitude in (0.0, 200.0)
+        )
+        assert (idling['displacement'][:101] == 0.0).all()
+        added = idling['displacement'][-500:] - quiet['displacement'][-500:]
+        spectrum = np.abs(np.fft.rfft(added * np.hanning(500)))  # 2 Hz to a line
+        assert 2.0 * (8 + np.argmax(spectrum[8:])) == pytest.approx(26.7, abs=1.5)  # above the resonance
+        assert np.abs(added).max() > 5e-5
+
+
+def test_road_and_idle_force_move_the_vehicle_as_its_law_alone_says(make_mount, drive, parameters):
+    chosen = {'scenario': 'motorway', 'timeline__duration': 0.5, 'idle__amplitude': 150.0}
+    _, truth = drive(make_mount(mount='elastomer', **chosen))
+    excitation = build_excitation(parameters(**chosen))
+    displacement, _ = ride_without_friction(
+        Vehicle(), resting_vehicle(), excitation.values, excitation.engine_forces, excitation.step_time
+    )
+    np.testing.assert_array_equal(truth['displacement'][1:], displacement[19::20][:-1])
+
+
+def test_an_unknown_mount_is_refused_with_the_known_ones(parameters):
+    with pytest.raises(ParameterError) as caught:
+        seated_mount('rubber')
+    assert str(caught.value) == f"mount 'rubber' is unknown; known are {', '.join(MOUNTS)}"
+    with pytest.raises(ParameterError, match="mount 'rubber' is unknown"):
+        _ = parameters(mount='rubber').plant
+
+
+# Energy
+
+
+def damped_ride(parameters, mount, **chosen):
+    """The plant after a ride, its current following the speed as a damper would ask it to."""
+    settings = parameters(mount=mount, **chosen)
+    excitation = build_excitation(settings)
+    plant, plain = (PlantSimulation(settings.plant, excitation.seat, excitation.step_time) for _ in range(2))
+    forces = excitation.engine_forces
+    forces = np.zeros_like(excitation.values) if forces is None else forces
+    for first in range(0, len(excitation.values), 20):
+        step = slice(first, first + 20)
+        plant.read(np.zeros(4))
+        plain.read(np.zeros(4))
+        assert plain.truth_bytes == plant.truth_bytes
+        current = min(0.48 + 8.0 * abs(plant.truth['velocity']), 3.0)
+        plant.advance_with_books(excitation.values[step], forces[step], current)
+        plain.advance(excitation.values[step], forces[step], current)
+    return plant
+
+
+@pytest.mark.parametrize('idle', [0.0, 200.0])
+@pytest.mark.parametrize(
+    'chosen',
+    [
+        {'scenario': 'motorway', 'timeline__duration': 6.0, 'motorway__gap_depth': 0.03},
+        {'scenario': 'sweep', 'sweep__first_frequency': 4.0, 'timeline__duration': 8.0},
+    ],
+)
+@pytest.mark.parametrize('mount', ['friction', 'hydro', 'elastomer'])
+def test_what_the_road_puts_in_is_stored_or_dissipated(parameters, mount, chosen, idle):
+    """To a thousandth of what the mount takes, which is a small share of what the suspension does."""
+    account = damped_ride(parameters, mount, idle__amplitude=idle, **chosen).account
+    assert account['road_work'] > 20.0
+    in_the_mount = sum(account[name] for name in LOSSES if name not in ('suspension_loss', 'chassis_loss'))
+    assert in_the_mount > 0.5
+    assert abs(imbalance(account)) <= 1e-3 * in_the_mount
+    assert all(account[name] >= 0.0 for name in LOSSES)
+    sliding, track = account['sliding_loss'] > 0.0, account['track_loss'] > 0.0
+    assert (sliding, track) == (mount == 'friction', mount == 'hydro')
+
+
+def test_books_are_kept_in_a_vehicle_only(parameters):
+    plant = PlantSimulation(parameters().plant, Seat.BENCH, 5e-5)
+    with pytest.raises(ValueError, match='energy is accounted for in a vehicle only'):
+        plant.advance_with_books(np.zeros(20), np.zeros(20), 0.0)
