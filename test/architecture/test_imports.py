@@ -54,6 +54,8 @@ def test_the_controller_never_sees_the_truth():
         'mount_models.actuator.reluctance',
         'mount_models.closing',
         'mount_models.coil.ripple',
+        'mount_models.coil.plate_field',
+        'mount_models.coil.plate_finite_elements',
         'mount_sim',
     }
     for package in ('mount_control', 'mount_init', 'mount_driver'):
