@@ -118,20 +118,17 @@ def _draw_section(cases: list[AtCurrent], file: Path) -> Path:
     figure = new_figure('Change of flux density from switching to the sample, 18 us later (Fig. 3, below)')
     left, middle, right = figure.subplots(1, 3, width_ratios=(3, 3, 2.4))
     for case, colour in zip(cases, family(len(cases)), strict=True):
-        for axes in (left, middle):
-            axes.plot(1e6 * case.depth, 1e3 * case.change, color=colour, label=f'{case.current:g} A')
-            axes.plot(1e6 * case.field.depth, 1e3 * case.field.change, '.', color=colour, markersize=5)
-    left.set_yscale('log')
-    top = 1e3 * max(case.change[0] for case in cases)
-    left.set_ylim(1e-3 * top, 1.5 * top)
+        for axes, factor in ((left, 1.0 / case.change[0]), (middle, 1e3)):
+            axes.plot(1e6 * case.depth, factor * case.change, color=colour, label=f'{case.current:g} A')
+            axes.plot(1e6 * case.field.depth, factor * case.field.change, '.', color=colour, markersize=5)
     left.set_xlim(0.0, 1e6 * cases[0].depth[-1])
     middle.set_xlim(0.0, 300.0)
-    middle.set_ylim(0.0, None)
     left.plot([], [], '.', color='black', label='finite elements')
     left.plot([], [], color='black', label='diffusion, one dimension')
     for axes in (left, middle):
         axes.set_xlabel('depth from the surface (um)')
-        axes.set_ylabel('change of flux density (mT)')
+    left.set_ylabel('change over its value at the surface (1)')
+    middle.set_ylabel('change of flux density (mT)')
     left.set_title('half a plate', fontsize='medium')
     middle.set_title('near the surface', fontsize='medium')
     current = [case.current for case in cases]
@@ -146,6 +143,8 @@ def _draw_section(cases: list[AtCurrent], file: Path) -> Path:
         label='finite elements',
     )
     right.set_yscale('log')
+    right.yaxis.set_major_formatter('{x:g}')
+    right.yaxis.set_minor_formatter('{x:g}')
     right.set_xlabel('mean current (A)')
     right.set_ylabel('equivalent depth (um)')
     right.legend(fontsize='small')

@@ -1,10 +1,10 @@
 """The ripple's field in a plate with its air gap by two-dimensional finite elements: checks `plate_field`.
 
 Planar, one plate by itself, a quarter of the circuit: half a plate, half a gap, a quarter of the path.
-Unknown is the vector potential A with B = (-dA/dy, dA/dx); x runs from the middle of the plate outwards, y from the
-middle of the gap along the plate. First the nonlinear steady field of the mean current, then the small
-alternating field about it, with the slope of the magnetisation curve where it stands, eddy currents in
-the iron. Imposed is the mean flux density in the middle of the plate, the same triangle as in `plate_field`,
+Unknown is the vector potential A with B = (-dA/dy, dA/dx); x runs from the middle of the plate outwards, y
+from the middle of the gap along the plate. First the nonlinear steady field of the mean current, then the
+small alternating field about it, with the slope of the magnetisation curve where it stands and eddy currents
+in the iron. Imposed is the mean flux density in the middle of the plate, the same triangle as in `plate_field`,
 so that both answer the same question; the current follows. With the linkage of the winding imposed instead,
 the air beside the plate would take its share, which depends on the winding that is chosen here.
 """
@@ -107,7 +107,7 @@ class _Plate:
         if np.ptp(self.mesh.mapping().F(line)[0, 0]) < 0.1 * (x[1] - x[0]):
             line = line[::-1]  # the elements' own first direction is y
         self.line = Basis(self.mesh, element, quadrature=(line, np.array([0.5, 0.5])))
-        self.points = np.asarray(self.line.global_coordinates().value[0])
+        self.points = np.asarray(self.line.global_coordinates()[0])
         self.centre = Basis(self.mesh, element, quadrature=(np.array([[0.5], [0.5]]), np.array([1.0])))
         self.fixed = self.basis.get_dofs(lambda p: p[0] < 1e-12).all()
         winding = _load.assemble(self.basis, inside=self._per_point(wound.astype(float)))
