@@ -81,6 +81,7 @@ def test_the_list_names_every_experiment():
         (['sawtooth', '--set', 'sawtooth.amplitud=1'], 'did you mean amplitude'),
         (['sawtooth', '--set', 'sawtooth.amplitude=1'], 'must lie within 0.0005 .. 0.01 m'),
         (['sawtooth', '--set', 'mount_sim.seed=1'], "'mount_sim' is no owner of parameters here"),
+        (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
         (['sawtooth', '--set', 'amplitude=1'], 'write NODE.NAME=VALUE'),
     ],
 )
@@ -90,7 +91,7 @@ def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, t
     assert refused.exit_code != 0
     assert isinstance(refused.exception, ValueError)
     assert sentence in str(refused.exception)
-    assert not out.exists()
+    assert not (out.exists() and any(out.iterdir()))
 
 
 def test_a_folder_that_holds_something_is_refused(tmp_path):
@@ -191,7 +192,8 @@ def test_the_saw_tooth_is_recorded_in_the_topics_of_a_drive_and_nothing_is_lost(
     check(outcome)
     recording = mount_bags.open(outcome.recordings[0])
     assert set(recording.topics) == {'/session', '/displacement', '/sim/mount_force', '/sim/clamp_force'}
-    assert not any(topic.missing for name, topic in audit(recording).items() if name != '/session')
+    lost = {name: topic.lost for name, topic in audit(recording).items() if name != '/session'}
+    assert set(lost.values()) == {0}
     assert recording['sim/clamp_force']['wrench.force.z'].min() == 100.0
     session = yaml.safe_load(recording.latched('session').data)
     assert session['scenario'] == 'sawtooth'
@@ -201,10 +203,11 @@ def test_the_saw_tooth_is_recorded_in_the_topics_of_a_drive_and_nothing_is_lost(
 def test_the_saw_tooth_gives_back_the_coefficients_of_its_pads(tmp_path):
     outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH, force_noise=0.0, displacement_noise=0.0)
     assert outcome.figures['strokes'] == 4
-    assert outcome.figures['a_rms_error'] < 1e-3
-    assert outcome.figures['b_rms_error_per_mm'] < 0.2
+    assert outcome.figures['a_rms_error'] < 3e-3
+    assert outcome.figures['b_rms_error_per_mm'] < 0.5
     assert outcome.figures['simplified_error_macroslip'] < 0.01
     assert outcome.figures['simplified_error_microslip'] > 0.2
+    assert outcome.figures['simplified_error_slow_macroslip'] is None  # no stroke was so slow
 
 
 def test_other_pads_change_what_holds(tmp_path):

@@ -4,13 +4,13 @@ Planar, one plate by itself, a quarter of the circuit: half a plate, half a gap,
 Unknown is the vector potential A with B = (-dA/dy, dA/dx); x runs from the middle of the plate outwards, y
 from the middle of the gap along the plate. First the nonlinear steady field of the mean current, then the
 small alternating field about it, with the slope of the magnetisation curve where it stands and eddy currents
-in the iron. Imposed is the mean flux density in the middle of the plate, the same triangle as in `plate_field`,
-so that both answer the same question; the current follows. With the linkage of the winding imposed instead,
-the air beside the plate would take its share, which depends on the winding that is chosen here.
+in the iron. Imposed is the mean flux density in the middle of the plate, the same triangle as in
+`plate_field`, so that both answer the same question; the current follows. With the linkage of the winding
+imposed instead, the air beside the plate would take its share, which depends on the winding chosen here.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, conde
 
 from mount_models.actuator.reluctance import MU_0, ReluctanceActuator, core_flux_density
 from mount_models.coil.ripple import RippleCoil, duty
+from mount_models.quantity import Quantity
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -29,13 +30,13 @@ class FieldError(ValueError):
 
 
 class PlateSurroundings(NamedTuple):
-    """What is chosen about the air and the winding beside the plate, all in m."""
+    """Air and winding beside the plate, and the mesh."""
 
-    air_width: float = 10e-3
-    winding_distance: float = 0.5e-3
-    winding_thickness: float = 3e-3
-    winding_start: float = 8e-3
-    finest: float = 4e-6
+    air_width: Annotated[float, Quantity('m', 'width of the air beside the plate', 5e-3, 0.1)] = 10e-3
+    winding_distance: Annotated[float, Quantity('m', 'from the plate to the winding', 0.0, 5e-3)] = 0.5e-3
+    winding_thickness: Annotated[float, Quantity('m', 'thickness of the winding', 1e-4, 5e-3)] = 3e-3
+    winding_start: Annotated[float, Quantity('m', 'from the gap to the winding', 0.0, 2e-2)] = 8e-3
+    finest: Annotated[float, Quantity('m', 'width of the elements at the surface', 1e-6, 1e-4)] = 4e-6
 
 
 @dataclass(frozen=True)
