@@ -277,8 +277,10 @@ def _statement_on_models(results: dict[str, Any]) -> Statement:
         'simplified one far off.',
         f'Difference to the recorded force, as a share of its rms (the noise alone is '
         f'{told(results["force_noise_share"])}): simplified {told(macro)} in macroslip and {told(micro)} in '
-        f'microslip, full {told(results["full_error_macroslip"])} and {told(results["full_error_microslip"])}. '
-        f'Below 2.5 mm/s the simplified model is off by {told(slow)} in macroslip too: there it fades friction '
+        f'microslip, full {told(results["full_error_macroslip"])} and '
+        f'{told(results["full_error_microslip"])}. '
+        f'Below 2.5 mm/s the simplified model is off by {told(slow)} in macroslip too: there it fades '
+        'friction '
         'out, as the paper asks for. The rack is the full model, so its own agreement proves nothing about '
         'pads; that of the simplified model shows what leaving out c_Re costs.',
         holds,
