@@ -9,7 +9,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 DRIVE_OPTIONS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test bench lint format setup setup-dev clean
+.PHONY: help drive test experiments bench lint format setup setup-dev clean
 
 help: ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
@@ -20,6 +20,9 @@ drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and 
 test: $(VENV)/.ready-dev ## pass all tests
 	@$(BIN)/python -m pytest -m 'not real_time' -n auto --maxprocesses 4 --dist worksteal
 	@$(BIN)/python -m pytest -m real_time
+
+experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/experiments.md and docs/figures
+	@$(BIN)/engine-mount experiment all --page docs/experiments.md
 
 bench: $(VENV)/.ready-dev ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench

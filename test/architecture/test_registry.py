@@ -29,7 +29,16 @@ from mount_models.road import Gap, RandomRoad, Sweep
 from mount_models.vehicle import Vehicle
 from mount_ros import topics
 from mount_ros.qos import publisher_qos
-from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, SESSION, SIM_TRUTH, TOPICS, Delivery, Topic
+from mount_ros.topics import (
+    CONTROL_TRACE,
+    DIAGNOSTICS,
+    RACK_TOPICS,
+    SESSION,
+    SIM_TRUTH,
+    TOPICS,
+    Delivery,
+    Topic,
+)
 from mount_sim.plant import TRUTH
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -48,10 +57,11 @@ PARAMETER_SETS = (
 )  # fmt: skip
 
 
-def test_interface_lists_every_topic_and_no_other():
-    listed = {row['topic']: row for row in table('Topics')}
-    assert set(listed) == {topic.name for topic in TOPICS}
-    for topic in TOPICS:
+@pytest.mark.parametrize(('heading', 'registry'), [('Topics', TOPICS), ('Topics of the rack', RACK_TOPICS)])
+def test_interface_lists_every_topic_and_no_other(heading, registry):
+    listed = {row['topic']: row for row in table(heading)}
+    assert set(listed) == {topic.name for topic in registry}
+    for topic in registry:
         row = listed[topic.name]
         assert row['type'] == topic.type.replace('/msg/', '/')
         assert row['delivery'] == topic.delivery.value
@@ -84,6 +94,12 @@ def test_interface_names_publishers_and_subscribers_as_the_nodes_have_them():
             continue  # of every node; of the supervisor
         assert names(row['published by']) == ends_of_nodes('sender', name), f'publishers of {name}'
         assert names(row['taken by']) == ends_of_nodes('subscribe', name), f'subscribers of {name}'
+
+
+def test_only_experiments_use_the_topics_of_the_rack():
+    of_rack = {constant for constant, value in vars(topics).items() if value in RACK_TOPICS}
+    using = {file.parent.name for file in python_files() if of_rack & set(topics_used_in(file))}
+    assert using == {'experiments'}
 
 
 def test_control_traces_what_the_registry_declares():
@@ -229,4 +245,4 @@ def topics_used_in(file: Path) -> Iterator[str]:
 
 
 def registered(constant: str) -> bool:
-    return getattr(topics, constant) in TOPICS
+    return getattr(topics, constant) in TOPICS + RACK_TOPICS

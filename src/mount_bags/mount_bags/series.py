@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mount_bags.decoding import decode
 from mount_bags.definitions import Definition, installed_class, installed_definition
 from mount_bags.layout import Layout, LayoutError, layout_of
-from mount_ros.topics import JOINT_STATE, TOPICS, Scalar, Topic
+from mount_ros.topics import JOINT_STATE, RACK_TOPICS, TOPICS, Scalar, Topic
 
 Column = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -261,7 +261,8 @@ class Series:
 
 def registered_topic(name: str) -> Topic | None:
     """Return the registered topic behind a full name with any namespace, None if there is none."""
-    fitting = [topic for topic in TOPICS if f'/{name}'.endswith('/' + topic.name.lstrip('/'))]
+    known = TOPICS + RACK_TOPICS
+    fitting = [topic for topic in known if f'/{name}'.endswith('/' + topic.name.lstrip('/'))]
     return max(fitting, key=lambda topic: len(topic.name), default=None)
 
 

@@ -9,6 +9,7 @@ from mount_bringup import (
     compare_command,
     cut_command,
     drive_command,
+    experiment_command,
     merge_command,
     record_command,
     recover_command,
@@ -64,6 +65,7 @@ app.command(name='compare', epilog=compare_command.EPILOG)(compare_command.compa
 app.command(name='report', epilog=report_command.EPILOG)(report_command.report)
 app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)
 app.command(name='merge', epilog=merge_command.EPILOG)(merge_command.merge)
+app.command(name='experiment', epilog=experiment_command.EPILOG)(experiment_command.experiment)
 app.command(name='accept', epilog=accept_command.EPILOG)(accept_command.accept)
 
 

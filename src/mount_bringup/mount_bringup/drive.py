@@ -3,7 +3,6 @@
 import contextlib
 import math
 import platform
-import time
 import zlib
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -13,16 +12,14 @@ from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from std_msgs.msg import String
 
 from mount_bags.audit import audit
 from mount_bags.audit_report import as_table, sentences
 from mount_bags.reading import Recording, open_recording
 from mount_bags.recorder_parameters import RecorderParameters, split_of
 from mount_bags.snapshot import saved_snapshots
-from mount_bags.writer import BagWriter
 from mount_bringup.core_chain import Parameters, control_parameters
-from mount_bringup.core_run import run_core
+from mount_bringup.core_recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.ending_signals import ending_signals
 from mount_bringup.evaluation import load_drive
@@ -39,8 +36,6 @@ from mount_bringup.summary import (
 )
 from mount_bringup.supervisor import Supervisor, session_text
 from mount_models.quantity import with_flattened
-from mount_ros.cdr import serialised
-from mount_ros.topics import SESSION, TOPICS, Delivery, Topic
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
 
@@ -181,7 +176,7 @@ def _drive_graph(
 def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, console: Console) -> None:
     # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
     keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
-    with keyboard as keys, _progress(console) as progress:
+    with keyboard as keys, progress_bar(console) as progress:
         set_mark = supervisor.mark_setter(lambda answer: console.print(answer, highlight=False))
         hint = '; m or space: mark' if keys is not None and keys.present else ''
         task = progress.add_task(f'driving ({order.scenario}{hint})', total=1.0)
@@ -201,27 +196,16 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
 
 
 def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> dict[str, Any]:
-    writer = BagWriter(folder.recording, split=split_of(_recorder_parameters(order)))
-    prefix = f'/{order.namespace.strip("/")}/' if order.namespace else '/'
-    for topic in TOPICS:
-        writer.add_topic(_full_name(topic, prefix), topic.type, latched=topic.delivery is Delivery.LATCHED)
-    names = {topic.name: _full_name(topic, prefix) for topic in TOPICS}
-    session = serialised(String(data=_session(order, order.parameters)))
-    begin = time.time_ns()
-    try:
-        writer.write(names[SESSION.name], session, begin)
-        with _progress(console) as progress:
-            task = progress.add_task(f'driving ({order.scenario})', total=1.0)
-            outcome = run_core(
-                order.parameters,
-                lambda topic, raw, stamp: writer.write(names[topic.name], raw, begin + stamp),
-                lambda share: progress.update(task, completed=share),
-                lambda columns, stamps: writer.write_columns(
-                    [names[topic.name] for topic, _ in columns], [rows for _, rows in columns], begin + stamps
-                ),
-            )
-    finally:
-        writer.close()
+    with progress_bar(console) as progress:
+        task = progress.add_task(f'driving ({order.scenario})', total=1.0)
+        outcome = record_core(
+            folder.recording,
+            order.parameters,
+            _session(order, order.parameters),
+            lambda share: progress.update(task, completed=share),
+            namespace=order.namespace,
+            split=split_of(_recorder_parameters(order)),
+        )
     return {
         'scenario': order.scenario,
         'mode': order.mode,
@@ -233,7 +217,8 @@ def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> di
     }
 
 
-def _progress(console: Console) -> Progress:
+def progress_bar(console: Console) -> Progress:
+    """Return the bar that shows how far a run has come."""
     columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     return Progress(*columns, console=console)
 
@@ -285,7 +270,3 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             found[name] = 'unknown'  # installed from Debian packages without metadata
     return found
-
-
-def _full_name(topic: Topic, prefix: str) -> str:
-    return topic.name if topic.name.startswith('/') else prefix + topic.name

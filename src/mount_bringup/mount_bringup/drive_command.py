@@ -1,10 +1,9 @@
 """`engine-mount drive`: the simulated car through the whole graph."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-import yaml
 from rich.console import Console
 
 from mount_bringup.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
@@ -72,12 +71,15 @@ def drive(
     from mount_bringup.domain import chosen_domain
     from mount_bringup.mount_choice import with_control_of_mount
     from mount_bringup.recorder_options import recorder_options
-    from mount_bringup.settings import checked_settings
+    from mount_bringup.settings import checked_settings, settings_of_options
     from mount_bringup.summary import write_json
 
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
-    parameters = _parameters(settings or [])
+    try:
+        parameters = settings_of_options(settings or [])
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
     given = {
         'scenario': scenario,
         'mount': mount or None,
@@ -116,17 +118,3 @@ def drive(
         console.print(f'[yellow]note[/yellow] {complaint}')
     if outcome.complaints:
         raise typer.Exit(1)
-
-
-def _parameters(settings: list[str]) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of the `--set` options."""
-    parameters: dict[str, dict[str, Any]] = {}
-    for setting in settings:
-        name, equals, text = setting.partition('=')
-        node, dot, parameter = name.partition('.')
-        if not (equals and dot and parameter):
-            raise typer.BadParameter(
-                f'--set {setting}: write NODE.NAME=VALUE, as in mount_control.quality=0.7'
-            )
-        parameters.setdefault(node, {})[parameter] = yaml.safe_load(text)
-    return parameters

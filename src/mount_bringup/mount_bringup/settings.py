@@ -2,8 +2,10 @@
 
 import contextlib
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import yaml
 
 from mount_bags.recorder_parameters import RecorderParameters
 from mount_control.parameters import ControlParameters
@@ -33,16 +35,34 @@ def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     }
 
 
-def checked_settings(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+def settings_of_options(options: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of options NODE.NAME=VALUE; raises `ParameterError`."""
+    parameters: dict[str, dict[str, Any]] = {}
+    for option in options:
+        name, equals, text = option.partition('=')
+        node, dot, parameter = name.partition('.')
+        if not (equals and dot and parameter):
+            raise ParameterError(f'--set {option}: write NODE.NAME=VALUE, as in mount_control.quality=0.7')
+        parameters.setdefault(node, {})[parameter] = yaml.safe_load(text)
+    return parameters
+
+
+def checked_settings(
+    settings: Mapping[str, Mapping[str, Any]],
+    known: Mapping[str, Mapping[str, Any]] | None = None,
+    owner: str = 'node of the graph',
+) -> dict[str, dict[str, Any]]:
     """Return the settings in the types that the nodes declare; unknown names raise `ParameterError`.
 
-    ROS itself takes an unknown parameter without a word.
+    ROS itself takes an unknown parameter without a word. `known` is {node: {parameter: default}} where others
+    than nodes of the graph have parameters; `owner` is what those are called in the refusal.
     """
-    known = defaults_of_nodes()
+    if known is None:
+        known = defaults_of_nodes()
     checked: dict[str, dict[str, Any]] = {}
     for node, values in settings.items():
         if node not in known:
-            raise ParameterError(f'{node!r} is no node of the graph; known are {", ".join(known)}')
+            raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
         checked[node] = {
             name: _typed(f'{node}.{name}', value, known[node][_known_name(node, name, known[node])])
             for name, value in values.items()

@@ -184,6 +184,14 @@ SIM_MOUNT_FORCE = Topic(
     "the test rack's load cell: wrench.force.z, force of the mount on the chassis, N",
 )
 
+SIM_CLAMP_FORCE = Topic(
+    'sim/clamp_force',
+    'geometry_msgs/msg/WrenchStamped',
+    Delivery.STREAM,
+    SAMPLE_RATE,
+    "the friction rack's load cell in the clamp: wrench.force.z, normal force on the pads, N",
+)
+
 TOPICS: tuple[Topic, ...] = (
     DISPLACEMENT,
     COIL_RIPPLE,
@@ -198,10 +206,14 @@ TOPICS: tuple[Topic, ...] = (
     SIM_CHASSIS_ACCELERATION,
     SIM_MOUNT_FORCE,
 )
+"""What the graph publishes and its recorder takes."""
+
+RACK_TOPICS: tuple[Topic, ...] = (SIM_CLAMP_FORCE,)
+"""What no node publishes: only recordings of experiments on a simulated rack have it."""
 
 
 def topic(name: str) -> Topic:
-    """Return the topic of this relative name, or raise `KeyError` with the known names."""
+    """Return the topic of the graph of this relative name, or raise `KeyError` with the known names."""
     for candidate in TOPICS:
         if candidate.name == name:
             return candidate

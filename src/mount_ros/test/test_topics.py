@@ -5,14 +5,19 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
 from mount_ros.message_types import message_class
 from mount_ros.qos import CONTROL_DEPTH, control_qos, publisher_qos, recording_qos
-from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, TOPICS, Delivery, topic
+from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, RACK_TOPICS, TOPICS, Delivery, topic
 
-each_topic = pytest.mark.parametrize('entry', TOPICS, ids=lambda entry: entry.name)
+each_topic = pytest.mark.parametrize('entry', TOPICS + RACK_TOPICS, ids=lambda entry: entry.name)
+each_topic_of_the_graph = pytest.mark.parametrize('entry', TOPICS, ids=lambda entry: entry.name)
 
 
-@each_topic
+@each_topic_of_the_graph
 def test_topics_are_found_by_name(entry):
     assert topic(entry.name) is entry
+
+
+def test_topics_of_the_rack_are_none_of_the_graph():
+    assert not {entry.name for entry in RACK_TOPICS} & {entry.name for entry in TOPICS}
 
 
 def test_an_unknown_topic_is_refused_with_the_known_ones():

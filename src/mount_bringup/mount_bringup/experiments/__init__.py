@@ -1,0 +1,1 @@
+"""The paper's experiments: one file for each, behind the contract of `contract`, listed in `registry`."""

@@ -1,0 +1,95 @@
+"""What an experiment is: it takes an order and returns figures, pictures, recordings and statements."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from mount_models.quantity import flattened, with_flattened
+
+P = TypeVar('P', bound=NamedTuple)
+
+Progress = Callable[[float, str], None]
+"""Takes the share that is done, 0 .. 1, and what is being done."""
+
+
+class ExperimentError(ValueError):
+    """An experiment cannot be run as ordered; the text says why and the remedy."""
+
+
+class Holds(Enum):
+    """Whether what the paper says came out."""
+
+    YES = 'yes'
+    PARTLY = 'partly'
+    NO = 'no'
+    NOT_COMPARABLE = 'not comparable'
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One thing that the paper says, and what came out.
+
+    `reference` is where the paper says it, `paper` what it says, in our words, `found` what came out, with
+    numbers.
+    """
+
+    reference: str
+    paper: str
+    found: str
+    holds: Holds
+
+
+@dataclass(frozen=True)
+class Order:
+    """What the user wants: a folder for what is made, {owner: {parameter: value}}, and the real nodes or not.
+
+    The owner of a parameter is a node or the experiment itself.
+    """
+
+    out: Path
+    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    graph: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of it; `figures` is what `--json` writes, so it holds plain numbers, texts, lists, "
+    "mappings."""
+
+    figures: dict[str, Any]
+    pictures: list[Path] = field(default_factory=list)
+    recordings: list[Path] = field(default_factory=list)
+    statements: list[Statement] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment; `defaults` is the parameter set that `--set NAME.PARAMETER=VALUE` changes.
+
+    `reference` is what it repeats of the paper, `summary` one paragraph on how. `closed_loop`: it drives
+    through controller and plant, so parameters of the nodes can be set too and `--graph` makes sense.
+    """
+
+    name: str
+    title: str
+    reference: str
+    summary: str
+    defaults: NamedTuple
+    run: Callable[[Order, Progress], Outcome]
+    closed_loop: bool = False
+
+    def known_settings(self) -> dict[str, dict[str, Any]]:
+        """Return {name: {parameter: default}} of the experiment's own parameters."""
+        return {self.name: flattened(self.defaults)}
+
+
+def parameters_of(order: Order, name: str, defaults: P) -> P:
+    """Return the checked parameters of the experiment `name` as ordered; raises `ParameterError`."""
+    return with_flattened(defaults, order.settings.get(name, {}))
+
+
+def part_of(progress: Progress, first: float, last: float) -> Progress:
+    """Return a progress whose 0 .. 1 is `first` .. `last` of `progress`."""
+    return lambda share, what: progress(first + (last - first) * share, what)

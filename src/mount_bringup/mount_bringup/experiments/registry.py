@@ -1,0 +1,35 @@
+"""All experiments by name, in the order of the paper's figures."""
+
+from mount_bringup.experiments import (
+    field_penetration,
+    force_characteristic,
+    inductance_map,
+    ramp_and_hold,
+    sawtooth,
+)
+from mount_bringup.experiments.contract import Experiment, ExperimentError
+
+ALL = 'all'
+
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment
+    for experiment in (
+        force_characteristic.EXPERIMENT,
+        field_penetration.EXPERIMENT,
+        inductance_map.EXPERIMENT,
+        ramp_and_hold.EXPERIMENT,
+        sawtooth.EXPERIMENT,
+    )
+}
+
+
+def experiments_named(names: list[str]) -> list[Experiment]:
+    """Return the experiments of these names, or all for `all`; raises `ExperimentError` for an unknown "
+    "one."""
+    if ALL in names:
+        return list(EXPERIMENTS.values())
+    unknown = [name for name in names if name not in EXPERIMENTS]
+    if unknown:
+        known = ', '.join((*EXPERIMENTS, ALL))
+        raise ExperimentError(f'{unknown[0]!r} is no experiment; known are {known}')
+    return [EXPERIMENTS[name] for name in names]

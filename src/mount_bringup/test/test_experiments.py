@@ -1,0 +1,240 @@
+"""The contract of the experiments, and each of them on a short version."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+import mount_bags
+from mount_bags.audit import audit
+from mount_bringup.command import app
+from mount_bringup.experiments import (
+    force_characteristic,
+    inductance_map,
+    page,
+    ramp_and_hold,
+    sawtooth,
+)
+from mount_bringup.experiments.contract import Experiment, Holds, Order, Outcome, Statement
+from mount_bringup.experiments.friction_rack import move, sawtooth_corners
+from mount_bringup.experiments.ramp_and_hold import (
+    fit_relaxation,
+    linear_parameters,
+    printed_parameters,
+)
+from mount_bringup.experiments.registry import EXPERIMENTS
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+
+PNG = b'\x89PNG'
+SHORT_SAWTOOTH = {
+    'amplitude': 5e-4,
+    'lowest_speed': 3e-3,
+    'highest_speed': 5e-3,
+    'speed_step': 2e-3,
+    'lowest_normal_force': 100.0,
+    'highest_normal_force': 100.0,
+}
+
+
+def run(module, folder, **settings) -> Outcome:
+    order = Order(folder, {module.NAME: settings})
+    return module.EXPERIMENT.run(order, lambda share, what: None)
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, ['experiment', *arguments])
+
+
+def check(outcome):
+    json.dumps(outcome.figures, allow_nan=False)
+    assert all(picture.read_bytes().startswith(PNG) for picture in outcome.pictures)
+    assert outcome.pictures
+    assert outcome.statements
+
+
+# Contract and command.
+
+
+def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats():
+    for name, experiment in EXPERIMENTS.items():
+        assert experiment.name == name
+        assert experiment.title
+        assert experiment.reference.startswith('Fig')
+        assert list(experiment.known_settings()) == [name]
+
+
+def test_the_list_names_every_experiment():
+    shown = command('--list')
+    assert shown.exit_code == 0
+    assert [line.split()[0] for line in shown.output.splitlines()] == list(EXPERIMENTS)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        (['sawtooh'], "'sawtooh' is no experiment; known are force_characteristic"),
+        (['sawtooth', '--graph'], 'sawtooth has no graph to run through'),
+        (['sawtooth', '--set', 'sawtooth.amplitud=1'], 'did you mean amplitude'),
+        (['sawtooth', '--set', 'sawtooth.amplitude=1'], 'must lie within 0.0005 .. 0.01 m'),
+        (['sawtooth', '--set', 'mount_sim.seed=1'], "'mount_sim' is no owner of parameters here"),
+        (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
+        (['sawtooth', '--set', 'amplitude=1'], 'write NODE.NAME=VALUE'),
+    ],
+)
+def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, tmp_path):
+    out = tmp_path / 'out'
+    refused = command(*arguments, '--out', str(out))
+    assert refused.exit_code != 0
+    assert isinstance(refused.exception, ValueError)
+    assert sentence in str(refused.exception)
+    assert not (out.exists() and any(out.iterdir()))
+
+
+def test_a_folder_that_holds_something_is_refused(tmp_path):
+    (tmp_path / 'precious').touch()
+    refused = command('ramp_and_hold', '--out', str(tmp_path))
+    assert 'is not empty; choose another folder' in str(refused.exception)
+
+
+def test_the_command_writes_figures_page_and_pictures(tmp_path):
+    out, figures, written = tmp_path / 'out', tmp_path / 'r.json', tmp_path / 'docs' / 'e.md'
+    done = command(
+        'ramp_and_hold', '--out', str(out), '--json', str(figures), '--page', str(written),
+        '--set', 'ramp_and_hold.hold_time=2',
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert json.loads(figures.read_text())['time_constant_s'] > 0.0
+    assert '![Ramp and hold of the sticking contact](figures/ramp_and_hold.png)' in written.read_text()
+    assert (tmp_path / 'docs' / 'figures' / 'ramp_and_hold.png').read_bytes().startswith(PNG)
+
+
+def test_the_page_puts_pictures_beside_statements_and_counts_the_answers(tmp_path):
+    picture = tmp_path / 'a.png'
+    picture.write_bytes(PNG)
+    told = [
+        Statement('Fig. 1', 'it is so', 'it was not', Holds.NO),
+        Statement('Fig. 2', 'so too', 'it was', Holds.YES),
+    ]
+    experiment = Experiment('a', 'A thing', 'Fig. 1', 'How.', FrictionContact(), run)
+    page.write_page([(experiment, Outcome({}, [picture], [], told))], tmp_path / 'docs' / 'page.md')
+    text = (tmp_path / 'docs' / 'page.md').read_text()
+    assert '| [A thing](#a) | Fig. 1 | 1 |  | 1 |  |' in text
+    assert '| Fig. 1 | it is so | it was not | no |' in text
+    assert (tmp_path / 'docs' / 'figures' / 'a.png').exists()
+
+
+# The rack.
+
+
+def test_the_saw_tooth_grows_faster_after_every_second_turning_point():
+    times, positions, speeds = sawtooth_corners(2.5e-3, 1e-3, 3e-3, 1e-3)
+    assert speeds == pytest.approx([1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])
+    assert np.abs(np.diff(positions)) == pytest.approx(speeds * np.diff(times))
+    assert positions[1:] == pytest.approx([-2.5e-3, 2.5e-3] * 3 + [-2.5e-3])
+
+
+def test_a_motor_that_gives_way_leaves_its_share_of_the_way():
+    contact, coefs = FrictionContact(), FrictionCoefficients()
+    stiff = move(contact, coefs, [0.0, 0.01, 0.1], [0.0, 1e-6, 1e-6], 100.0)
+    soft = move(contact, coefs, [0.0, 0.01, 0.1], [0.0, 1e-6, 1e-6], 100.0, motor_stiffness=2e6)
+    assert stiff.displacement[-1] == pytest.approx(1e-6, rel=1e-12)
+    assert soft.friction_force[-1] == pytest.approx(2e6 * (1e-6 - soft.displacement[-1]), rel=1e-9)
+    assert soft.friction_force[-1] < 0.6 * stiff.friction_force[-1]
+
+
+# The identification of the linear part: published example.
+
+
+def test_step_one_recovers_the_published_example_exactly():
+    found = linear_parameters(2.857142857e6, 2e6, 1.0 - 0.19047619, 0.4411764706)
+    assert found['contact_stiffness'] == pytest.approx(4.0e6, rel=1e-6)
+    assert found['tangential_stiffness'] == pytest.approx(1.0e7, rel=1e-6)
+    assert found['tangential_damping'] == pytest.approx(5.0e6, rel=1e-6)
+
+
+def test_the_printed_formulas_give_the_published_wrong_answers():
+    series = 1.0 / (1.0 / 4e6 + 1.0 / 1e7 + 1.0 / 2e6)
+    first_over_last = (1.0 / (1.0 / 4e6 + 1.0 / 2e6)) / series
+    found = printed_parameters(series, 2e6, first_over_last, 0.4411764706)
+    assert found['contact_stiffness'] == pytest.approx(4.0e6, rel=1e-6)
+    assert found['tangential_stiffness'] == pytest.approx(1.67e6, abs=5e3)
+    assert pytest.approx(4.41e6, abs=5e3) == 1e7 * 0.4411764706
+
+
+def test_without_noise_the_ramp_gives_the_true_parameters(tmp_path):
+    outcome = run(ramp_and_hold, tmp_path, force_noise=0.0, displacement_noise=0.0)
+    check(outcome)
+    assert outcome.figures['time_constant_s'] == pytest.approx(0.44118, abs=2e-4)
+    assert max(map(abs, outcome.figures['errors'].values())) < 5e-3
+    assert abs(outcome.figures['errors_without_ramp_correction']['tangential_stiffness']) > 0.1
+    # raw amplitude of the published example
+    assert fit_relaxation(
+        np.arange(0.0, 5.0, 1e-3), 1e-6 * (1 - 0.24099 * np.exp(-np.arange(0.0, 5.0, 1e-3) / 0.44118)), 1.0
+    ).amplitude == pytest.approx(0.24099e-6, rel=1e-5)
+
+
+def test_sliding_pads_are_told(tmp_path):
+    outcome = run(ramp_and_hold, tmp_path, normal_force=60.0, hold_time=2.0)
+    microslip = outcome.statements[0]
+    assert 'microslip' in microslip.paper
+    assert microslip.holds is Holds.NO
+
+
+# Each experiment.
+
+
+def test_the_saw_tooth_is_recorded_in_the_topics_of_a_drive_and_nothing_is_lost(tmp_path):
+    outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH)
+    check(outcome)
+    recording = mount_bags.open(outcome.recordings[0])
+    assert set(recording.topics) == {'/session', '/displacement', '/sim/mount_force', '/sim/clamp_force'}
+    lost = {name: topic.lost for name, topic in audit(recording).items() if name != '/session'}
+    assert set(lost.values()) == {0}
+    assert recording['sim/clamp_force']['wrench.force.z'].min() == 100.0
+    session = yaml.safe_load(recording.latched('session').data)
+    assert session['scenario'] == 'sawtooth'
+    assert session['parameters']['sawtooth']['amplitude'] == 5e-4
+
+
+def test_the_saw_tooth_gives_back_the_coefficients_of_its_pads(tmp_path):
+    outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH, force_noise=0.0, displacement_noise=0.0)
+    assert outcome.figures['strokes'] == 4
+    assert outcome.figures['a_rms_error'] < 3e-3
+    assert outcome.figures['b_rms_error_per_mm'] < 0.5
+    assert outcome.figures['simplified_error_macroslip'] < 0.01
+    assert outcome.figures['simplified_error_microslip'] > 0.2
+    assert outcome.figures['simplified_error_slow_macroslip'] is None  # no stroke was so slow
+
+
+def test_other_pads_change_what_holds(tmp_path):
+    light = {**SHORT_SAWTOOTH, 'lowest_normal_force': 40.0, 'highest_normal_force': 40.0, 'force_noise': 0.1}
+    law = 1
+    printed = run(sawtooth, tmp_path / 'printed', **light).statements[law]
+    negative = run(sawtooth, tmp_path / 'negative', **light, **{'friction.b_offset': -14.0}).statements[law]
+    assert (printed.reference, printed.holds) == ('Sec. 4, Eq (12)', Holds.PARTLY)
+    assert negative.holds is Holds.YES
+
+
+def test_the_force_characteristic_meets_the_published_accuracy_of_the_fit(tmp_path):
+    outcome = run(force_characteristic, tmp_path)
+    check(outcome)
+    assert outcome.figures['law_relative_rms'] < 0.005
+    assert outcome.figures['law_relative_worst'] < 0.01
+    assert outcome.figures['force_at_1_a_n']['349 um'] == pytest.approx(96.12, abs=0.01)
+
+
+def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
+    outcome = run(inductance_map, tmp_path)
+    check(outcome)
+    figures = outcome.figures
+    assert figures['ramp_gap_at_rest_m'] == pytest.approx(492e-6, abs=4e-6)
+    assert figures['ramp_gap_at_crossing_m'] == pytest.approx(341.2e-6, abs=2e-6)
+    assert figures['initialisation']['contact_gap'] == pytest.approx(349e-6, abs=2e-6)
+    assert any(low <= 0.9 <= high for low, high in figures['ambiguous_currents_a'])
+    assert any(low <= 0.2 <= high for low, high in figures['unique_currents_a'])
+    recording = mount_bags.open(Path(outcome.recordings[0]))
+    assert {'/coil_ripple', '/air_gap', '/session'} <= set(recording.topics)
