@@ -39,9 +39,10 @@ def run(ahead, memory, believable, pending, readings, setpoints, truths, traces)
 
     The two setpoints are the one that has arrived for the next sample and the one taken over last.
 
-    `ahead` is what the plant gives for n samples, `memory` that of the controller, `believable` the largest displacement (m), `pending` the setpoint (A) that arrived before
-    the first sample. Filled for each sample taken: `readings` (n, 4) as they arrive, `setpoints` (n,) in A
-    as they leave, `truths` and `traces` (n, bytes of their records).
+    `ahead` is what the plant gives for n samples, `memory` that of the controller, `believable` the largest
+    displacement (m), `pending` the setpoint (A) that arrived before the first sample. Filled for each sample
+    taken: `readings` (n, 4) as they arrive, `setpoints` (n,) in A as they leave, `truths` and `traces`
+    (n, bytes of their records).
     """
     last, mount = pending, ahead.memory
     for index in range(len(setpoints)):
