@@ -12,6 +12,7 @@ import mount_bags
 from mount_bags.audit import audit
 from mount_bringup.command import app
 from mount_bringup.experiments import (
+    field_penetration,
     force_characteristic,
     inductance_map,
     page,
@@ -238,3 +239,11 @@ def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
     assert any(low <= 0.2 <= high for low, high in figures['unique_currents_a'])
     recording = mount_bags.open(Path(outcome.recordings[0]))
     assert {'/coil_ripple', '/air_gap', '/session'} <= set(recording.topics)
+
+
+def test_both_computations_of_the_penetration_agree_at_rest(tmp_path):
+    outcome = run(field_penetration, tmp_path, highest_current=0.1, current_step=0.2)
+    check(outcome)
+    assert outcome.figures['currents_a'] == [0.0]
+    assert outcome.figures['equivalent_depth_m'][0] == pytest.approx(16.15e-6, abs=0.02e-6)
+    assert abs(outcome.figures['difference_in_middle'][0]) < 0.01

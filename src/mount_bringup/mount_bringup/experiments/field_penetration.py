@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,9 +25,11 @@ from mount_models.actuator.reluctance import (
     differential_permeability,
 )
 from mount_models.coil.plate_field import equivalent_depth, flux_density_change
-from mount_models.coil.plate_finite_elements import PlateField, plate_field
 from mount_models.coil.ripple import RippleCoil, penetration_depth
 from mount_models.quantity import Quantity
+
+if TYPE_CHECKING:
+    from mount_models.coil.plate_finite_elements import PlateField
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -56,7 +58,7 @@ class AtCurrent:
     equivalent_depth: float
     characteristic_depth: float
     permeability: float
-    field: PlateField
+    field: 'PlateField'
 
 
 def run(order: Order, progress: Progress) -> Outcome:
@@ -78,6 +80,8 @@ def run(order: Order, progress: Progress) -> Outcome:
 
 
 def _at_current(current: float, parameters: PenetrationParameters) -> AtCurrent:
+    from mount_models.coil.plate_finite_elements import plate_field  # the only one who needs scikit-fem
+
     actuator, coil = parameters.actuator, parameters.coil
     permeability = differential_permeability(actuator, core_field(actuator, current, parameters.gap))
     depth = np.linspace(0.0, coil.plate_half_thickness, _POINTS)
