@@ -56,7 +56,9 @@ def test_the_default_specimen_covers_the_gaps_of_new_and_worn_pads():
 
 
 def test_saving_and_loading_changes_nothing(tmp_path):
-    specimen = replace(DEFAULT, name='left', friction={'mu': 0.1 + 0.2}, provenance={'note': 'bench, May'})
+    specimen = replace(
+        DEFAULT, name='left', friction={'b_offset': 0.1 + 0.2}, provenance={'note': 'bench, May'}
+    )
     save_specimen(specimen, tmp_path / 'left.yaml')
     assert load_specimen(tmp_path / 'left.yaml') == specimen
 
@@ -107,7 +109,7 @@ def test_a_specimen_cannot_be_changed_by_accident():
         ('name', 7, 'name must be a text'),
         ('name', '', 'name must be a text'),
         ('friction', [1.0], 'friction must be a mapping'),
-        ('friction', {'mu': 'high'}, 'friction.mu must be a finite number'),
+        ('friction', {'a_p1': 'high'}, 'friction.a_p1 must be a finite number'),
         ('provenance', 'bench', 'provenance must be a mapping'),
     ],
 )
@@ -142,7 +144,7 @@ def test_a_whole_number_is_taken_as_a_number():
 
 
 def test_friction_parameters_pass_through():
-    assert specimen_from_mapping(changed('friction', {'a': 1})).friction == {'a': 1.0}
+    assert specimen_from_mapping(changed('friction', {'a_p1': 1})).friction == {'a_p1': 1.0}
     assert checked_specimen(DEFAULT).friction == {}
 
 
