@@ -8,6 +8,7 @@ from rich.console import Console
 from mount_bringup import (
     accept_command,
     audit_command,
+    calibrate_command,
     compare_command,
     cut_command,
     drive_command,
@@ -65,6 +66,7 @@ app.command(name='compare', epilog=compare_command.EPILOG)(compare_command.compa
 app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)
 app.command(name='merge', epilog=merge_command.EPILOG)(merge_command.merge)
 app.command(name='accept', epilog=accept_command.EPILOG)(accept_command.accept)
+app.add_typer(calibrate_command.app)
 
 
 def main(arguments: list[str] | None = None) -> None:
