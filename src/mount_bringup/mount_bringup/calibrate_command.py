@@ -187,7 +187,7 @@ def inductance(
     from mount_bringup.calibrate_figure import draw_gap_curves
     from mount_bringup.calibrate_inductance import GapOrder, calibrate_inductance
     from mount_bringup.calibrated_specimen import check_targets, foreign_parts, with_gap_curves
-    from mount_bringup.rack_recordings import GivenValues, read_ripple
+    from mount_bringup.rack_recordings import read_ripple
     from mount_bringup.summary import write_json
     from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
     from mount_models.specimen import chosen_specimen, save_specimen

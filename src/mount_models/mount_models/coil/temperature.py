@@ -58,6 +58,8 @@ def inductance_at_calibration(
     Raises `OutsideCurveError` for a temperature that is not compensated.
     """
     share = _checked_share(compensation, celsius)
+    if share == 0.0:
+        return inductance
 
     def reluctance(gap: float) -> float:
         at_gap = 1.0 / float(evaluate(curves.inductance_of_gap, gap))
@@ -75,6 +77,8 @@ def crossing_at_calibration(
     Raises `OutsideCurveError` for a temperature that is not compensated.
     """
     share = _checked_share(compensation, celsius)
+    if share == 0.0:
+        return current
 
     def crossing(gap: float) -> float:
         at_gap = float(evaluate(curves.crossing_current_of_gap, gap))
