@@ -146,14 +146,15 @@ def calibrate_inductance(
             f'curves shall be fitted to'
         )
     own = max(by_temperature, key=lambda celsius: (len(by_temperature[celsius]), -abs(celsius - 20.0)))
-    calibration = calibrate_gap_curves(by_temperature[own])
+    used = [each for each, point in zip(recordings, points, strict=True) if point in by_temperature[own]]
+    region = unique_region(used)
+    found = warnings(region, order.rest_current, order.crossing_inductance)
+    try:
+        calibration = calibrate_gap_curves(by_temperature[own])
+    except GapCurvesRefusedError as error:
+        raise GapCurvesRefusedError('; '.join([str(error), *found])) from error
     celsius = float(np.mean([point.celsius for point in by_temperature[own]]))
     others = {key: group for key, group in by_temperature.items() if key != own}
-    found: list[str] = []
-    region = unique_region(
-        [each for each, p in zip(recordings, points, strict=True) if p in by_temperature[own]]
-    )
-    found += warnings(region, order.rest_current, order.crossing_inductance)
 
     def of_coefficient(value: float) -> TemperatureCompensation:
         if others:

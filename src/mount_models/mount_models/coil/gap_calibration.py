@@ -143,7 +143,7 @@ _FEWEST_AT_REST = 20  # chosen
 _REST_HALF_WIDTH = 0.02  # A, chosen: there the inductance is straight over the current
 _FEWEST_GAPS = 6  # chosen: a cubic and two to judge it
 _CONTRADICTION = 3e-6  # m, chosen: below it a point is as good as its gap could be set
-_FAR = 6.0  # standard deviations
+_FAR = 10.0  # standard deviations, chosen: few points tell their scatter badly
 _NEARLY = 1.1  # chosen
 _INVERSE_ERROR = 0.05e-6  # m
 
@@ -189,15 +189,15 @@ def _fit(
     z = (gaps - centre) / scale
     floor = 1e-6 * float(np.median(np.abs(values)))
     weights = 1.0 / np.hypot(np.hypot(stds, np.median(stds)), floor)
+    _check_agreement(what, points, z, values, weights)
     trials = []
     for degree in range(2, min(highest_degree, gaps.size - 3) + 1):
         coefficients, left_out, unscaled = _weighted(z, values, weights, degree)
-        trials.append((float(np.sqrt(np.mean((left_out * weights) ** 2))), coefficients, left_out, unscaled))
+        trials.append((float(np.sqrt(np.mean((left_out * weights) ** 2))), coefficients, unscaled))
     best = min(trial[0] for trial in trials)
-    _, coefficients, left_out, unscaled = next(trial for trial in trials if trial[0] <= _NEARLY * best)
+    _, coefficients, unscaled = next(trial for trial in trials if trial[0] <= _NEARLY * best)
     polynomial = ScaledPolynomial(centre, scale, tuple(float(value) for value in coefficients), low, high)
     steepness = np.abs(slope(polynomial, gaps))
-    _check_agreement(what, points, left_out / np.maximum(steepness, 1e-12))
     errors = (evaluate(polynomial, gaps) - values) / np.maximum(steepness, 1e-12)
     freedom = gaps.size - coefficients.size
     scatter = float(np.sum(((evaluate(polynomial, gaps) - values) * weights) ** 2)) / freedom
@@ -226,17 +226,32 @@ def _weighted(
     return coefficients, (values - powers @ coefficients) / (1.0 - own_weight), inverse @ inverse.T
 
 
-def _check_agreement(what: str, points: Sequence[GapPoint], gap_errors: FloatArray) -> None:
-    """Raise unless every point lies where the others say; inner points only, for ends are extrapolated."""
-    scatter = 1.4826 * float(np.median(np.abs(gap_errors)))
-    worst = 1 + int(np.argmax(np.abs(gap_errors[1:-1])))
-    if abs(gap_errors[worst]) > max(_FAR * scatter, _CONTRADICTION):
-        point = points[worst]
+def _check_agreement(
+    what: str, points: Sequence[GapPoint], z: FloatArray, values: FloatArray, weights: FloatArray
+) -> None:
+    """Raise unless every inner point lies where the curve through the others says; ends are extrapolated."""
+    degree = min(3, z.size - 4)
+    judged = []
+    for place in range(1, z.size - 1):
+        others = np.arange(z.size) != place
+        coefficients, _, _ = _weighted(z[others], values[others], weights[others], degree)
+        error = (values - np.polynomial.polynomial.polyval(z, coefficients)) * weights
+        scatter = float(np.sqrt(np.sum(error[others] ** 2) / (z.size - degree - 2)))
+        steepness = abs(float(np.polynomial.polynomial.polyval(z[place], _derived(coefficients))))
+        as_gap = 0.5 * (points[-1].gap - points[0].gap) / (weights[place] * max(steepness, 1e-12))
+        judged.append((abs(error[place]) / scatter, place, abs(error[place]) * as_gap, scatter * as_gap))
+    times, place, off, scatter = max(judged)
+    if times > _FAR and off > _CONTRADICTION:
+        point = points[place]
         raise GapCurvesRefusedError(
-            f'{point.name}: the {what} says that its gap is {abs(gap_errors[worst]) * 1e6:.1f} um off the given '
+            f'{point.name}: the {what} says that its gap is {off * 1e6:.1f} um off the given '
             f'{point.gap * 1e6:.1f} um, judged by the other recordings, which agree within '
             f'{scatter * 1e6:.1f} um; is the gap of this file right? Correct it, or leave the file out'
         )
+
+
+def _derived(coefficients: FloatArray) -> FloatArray:
+    return np.asarray(np.polynomial.polynomial.polyder(coefficients))
 
 
 def _inverse(what: str, polynomial: ScaledPolynomial) -> ScaledPolynomial:
