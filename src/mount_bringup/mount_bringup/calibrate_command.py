@@ -36,7 +36,8 @@ _INDUCTANCE_EPILOG = """Examples:
 
 `engine-mount calibrate inductance cold/*.csv warm/*.csv` - two temperatures: compensation is measured
 
-CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and `flux_rate_t_per_s`;
+CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
+`flux_rate_t_per_s`;
 `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`) tells them.
 """
 _RACK_EPILOG = """Example:
@@ -79,8 +80,8 @@ def actuator(
 ) -> None:
     """Fit the force law, Eqs (3) and (4), to measured points of gap, current and force.
 
-    Refused are outliers, too few gaps or currents, and a law that is not positive, rising with the current and
-    falling with the gap within the measured range. Then no file is written.
+    Refused are outliers, too few gaps or currents, and a law that is not positive, rising with the current
+    and falling with the gap within the measured range. Then no file is written.
     """
     from mount_bringup.calibrate_figure import draw_force_law
     from mount_bringup.calibrated_specimen import check_targets, foreign_parts, with_force_law
@@ -118,7 +119,8 @@ def actuator(
     console.print(table)
     _say(
         console,
-        f'{fit.points} points; error rms {fit.relative_rms:.2%} of the force above 20 N, worst {fit.worst:.2%}; '
+        f'{fit.points} points; error rms {fit.relative_rms:.2%} of the force above 20 N, worst '
+        f'{fit.worst:.2%}; '
         f'rms {fit.rms_error:.2f} N, largest {fit.largest_error:.2f} N',
     )
     _say(
@@ -378,6 +380,7 @@ def _note_foreign(console: Console, parts: list[str], name: str) -> None:
         console.print('[yellow]note[/yellow]', end=' ')
         _say(
             console,
-            f'{part} is not yet that of {name!r} but of its base; run engine-mount calibrate {command[part]} with '
+            f'{part} is not yet that of {name!r} but of its base; run engine-mount calibrate '
+            f'{command[part]} with '
             f'this file as --base',
         )

@@ -34,7 +34,7 @@ class GapOrder:
 
 @dataclass(frozen=True)
 class InductanceResult:
-    """Curves, their compensation and how it came about, what is unique, what is left at other temperatures."""
+    """Curves, their compensation and how it came about, what is unique, and what temperature leaves."""
 
     calibration: GapCalibration
     compensation: TemperatureCompensation | None
@@ -52,10 +52,12 @@ class InductanceResult:
         inductance, crossing = self.calibration.inductance, self.calibration.crossing
         curve = inductance.polynomial
         return [
-            f'valid within {curve.low * 1e6:.1f} .. {curve.high * 1e6:.1f} um; largest standard deviation of a '
+            f'valid within {curve.low * 1e6:.1f} .. {curve.high * 1e6:.1f} um; largest standard '
+            'deviation of a '
             f'gap by the curve alone {inductance.largest_gap_std * 1e6:.2f} um at rest, '
             f'{crossing.largest_gap_std * 1e6:.2f} um at contact',
-            f'the inductance tells the gap at {_intervals(self.region.falling, 1.0)} A (falls with the gap) and '
+            f'the inductance tells the gap at {_intervals(self.region.falling, 1.0)} A (falls with the '
+            'gap) and '
             f'{_intervals(self.region.rising, 1.0)} A (rises), and by its current at '
             f'{_intervals(self.region.levels, 1e3)} mH; elsewhere it is ambiguous or unknown',
             f'temperature compensation: {self.compensated_by}',
@@ -200,11 +202,13 @@ def _how(measured_at_two: bool, compensation: TemperatureCompensation) -> str:
     coefficient = f'{compensation.conductivity_coefficient:g} 1/K'
     if measured_at_two:
         return (
-            f'measured at {compensation.calibration_celsius:.0f} and {compensation.reference_celsius:.0f} degC, in '
+            f'measured at {compensation.calibration_celsius:.0f} and '
+            f'{compensation.reference_celsius:.0f} degC, in '
             f'between by the coefficient of the core, {coefficient}'
         )
     return (
-        f'stated: coefficient of the core {coefficient}, share of the core from the force law; recordings at a '
+        f'stated: coefficient of the core {coefficient}, share of the core from the force law; '
+        'recordings at a '
         f'second temperature would measure it'
     )
 
@@ -226,8 +230,10 @@ def _inside(law: ForceLaw, points: Sequence[GapPoint]) -> list[GapPoint]:
     found = [point for point in points if law.gap_low <= point.gap <= law.gap_high]
     if len(found) < 4:
         raise GapCurvesRefusedError(
-            f'the force law of the base holds for {law.gap_low * 1e6:.0f} .. {law.gap_high * 1e6:.0f} um, where '
-            f'only {len(found)} recordings are, 4 are needed; calibrate the actuator first and give it as --base'
+            f'the force law of the base holds for {law.gap_low * 1e6:.0f} .. {law.gap_high * 1e6:.0f} '
+            'um, where '
+            f'only {len(found)} recordings are, 4 are needed; calibrate the actuator first and give it '
+            'as --base'
         )
     return found
 

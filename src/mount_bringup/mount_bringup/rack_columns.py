@@ -19,7 +19,7 @@ class RackRecordingError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One measured quantity: its units with factor and offset to SI, and between what its largest value lies."""
+    """One measured quantity: units with factor and offset to SI, and the range of its largest value."""
 
     name: str
     units: Mapping[str, tuple[float, float]]
@@ -44,8 +44,8 @@ def read_columns(
 ) -> dict[str, FloatArray]:
     """Return the channels of a CSV `file` in SI units (temperatures in degC), by name.
 
-    A channel is the column `<name>_<unit>`, or the one `chosen` for it, by its header or as HEADER:UNIT. Raises
-    `RackRecordingError` or `RecordedInputError`.
+    A channel is the column `<name>_<unit>`, or the one `chosen` for it, by its header or as HEADER:UNIT.
+    Raises `RackRecordingError` or `RecordedInputError`.
     """
     table = read_table(file)
     found = {}
@@ -56,7 +56,8 @@ def read_columns(
         elif channel in channels:
             names = ' or '.join(f'{channel.name}_{unit}' for unit in channel.units)
             raise RackRecordingError(
-                f'{file} has no column {names}; its columns are {", ".join(table.header)}: rename one, or choose '
+                f'{file} has no column {names}; its columns are {", ".join(table.header)}: rename one, '
+                'or choose '
                 f'it with --column {channel.name}=HEADER:UNIT'
             )
     places = [place for place, _ in found.values()]
@@ -81,7 +82,8 @@ def check_alive(file: Path, name: str, unit: str, values: FloatArray, driven: Fl
     if longest > _LONGEST_STUCK:
         start = int(ends[np.argmax(np.diff(ends))])
         raise RackRecordingError(
-            f'{file}: {name} stayed at {values[start]:g} {unit} for {longest} rows from row {start + 1} on while '
+            f'{file}: {name} stayed at {values[start]:g} {unit} for {longest} rows from row {start + 1} '
+            'on while '
             f'the current changed, more than {_LONGEST_STUCK}; the sensor is stuck: leave these rows out'
         )
 
@@ -139,7 +141,8 @@ def _in_si(table: CsvTable, channel: Channel, header: str, unit: str, values: Fl
         told = f'they look like {guess}' if guess else f'they fit none of {", ".join(channel.units)}'
         raise RackRecordingError(
             f'{table.path}: column {header!r} names no unit; its values are {reach}, {told}: rename it to '
-            f'{channel.name}_{guess or next(iter(channel.units))}, or choose --column {channel.name}={header}:UNIT'
+            f'{channel.name}_{guess or next(iter(channel.units))}, or choose --column '
+            f'{channel.name}={header}:UNIT'
         )
     factor, offset = channel.units[unit]
     converted = values * factor + offset

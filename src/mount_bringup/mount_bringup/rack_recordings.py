@@ -143,7 +143,8 @@ def _gap_of(file: Path, given: Mapping[Path, float]) -> float:
     named = _GAP_IN_NAME.search(file.stem)
     if named is None:
         raise RackRecordingError(
-            f'{file}: its air gap is not known; add --gap {file.name}=UM, a column gap_um, or the gap to its name, '
+            f'{file}: its air gap is not known; add --gap {file.name}=UM, a column gap_um, or the gap '
+            'to its name, '
             f'as in ripple_349um{file.suffix}'
         )
     return float(named[1]) * 1e-6
@@ -248,7 +249,8 @@ def _force_from_bag(
     both = np.isfinite(matched) & np.isfinite(current) & (current >= 0.0)
     if both.sum() < _FEWEST:
         raise RackRecordingError(
-            f'{file}: {topic} and {COIL_RIPPLE.name} have {int(both.sum())} samples of the same time, needed are '
+            f'{file}: {topic} and {COIL_RIPPLE.name} have {int(both.sum())} samples of the same time, '
+            'needed are '
             f'{_FEWEST}; are they of one recording?'
         )
     current, matched = current[both], matched[both]
@@ -261,7 +263,8 @@ def _force_from_bag(
 def _topic(recording: Recording, name: str) -> Any:
     if name not in recording:
         raise RackRecordingError(
-            f'{recording.path} has no topic {name}; it holds {", ".join(sorted(recording)) or "none"}: is it a '
+            f'{recording.path} has no topic {name}; it holds {", ".join(sorted(recording)) or "none"}: '
+            'is it a '
             f'recording of the rack?'
         )
     return recording[name]

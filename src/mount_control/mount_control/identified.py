@@ -27,7 +27,7 @@ def identified(specimen: Specimen, parameters: P) -> P:
 
 
 def check_fits(settings: ControlParameters, specimen: Specimen) -> None:
-    """Raise `SpecimenError` if the controller might ask for more current than the specimen was calibrated for."""
+    """Raise `SpecimenError` if the controller may ask for more current than was calibrated."""
     if settings.highest_current > specimen.current_limit:
         raise SpecimenError(
             f'highest_current ({settings.highest_current:.3f} A) must not exceed current_limit '

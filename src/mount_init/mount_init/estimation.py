@@ -130,7 +130,7 @@ def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsi
 def contact_gap(
     specimen: Specimen, rest: RestGap, current: float, current_std: float, celsius: float
 ) -> ContactGap:
-    """Return the gap at which the pads just touch, from the current (A) of the crossing at a temperature (degC).
+    """Return the gap at which the pads just touch, from the crossing current (A) at a temperature (degC).
 
     At the crossing the pads are compressed by F_N = F(i, d) - k_s (d_rest - d), so d_c = d + F_N / k_p.
     Raises `OutsideCalibrationError`. A negative F_N is returned as it is, for `plausibility` to judge.

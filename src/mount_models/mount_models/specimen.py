@@ -91,7 +91,8 @@ def load_specimen(path: str | Path, name: str = '') -> Specimen:
         raise SpecimenError(f'specimen file {path}: {error}') from error
     if name and specimen.name != name:
         raise SpecimenError(
-            f'specimen file {path} is for the specimen {specimen.name!r}, {name!r} is asked for; give the file '
+            f'specimen file {path} is for the specimen {specimen.name!r}, {name!r} is asked for; give '
+            'the file '
             f'of {name!r}, or ask for {specimen.name!r}'
         )
     return specimen
@@ -110,7 +111,7 @@ def chosen_specimen(parameters_file: str, name: str = '') -> Specimen:
 
 
 def save_specimen(specimen: Specimen, path: str | Path) -> None:
-    """Write the checked `specimen` to `path` as YAML, without loss of digits; the file is whole or not there."""
+    """Write the checked `specimen` to `path` as YAML without loss of digits, whole or not at all."""
     text = yaml.safe_dump(
         specimen_to_mapping(checked_specimen(specimen)), sort_keys=False, default_flow_style=None, width=110
     )
@@ -180,7 +181,8 @@ def _check_version(content: Any) -> None:
     version = content.get('schema_version') if isinstance(content, Mapping) else SCHEMA_VERSION
     if version != SCHEMA_VERSION or isinstance(version, bool):
         raise SpecimenError(
-            f'schema_version ({_told(version)}) must be {SCHEMA_VERSION}; the file is of another version of this '
+            f'schema_version ({_told(version)}) must be {SCHEMA_VERSION}; the file is of another '
+            'version of this '
             f'software, or none of its specimens: calibrate again'
         )
 

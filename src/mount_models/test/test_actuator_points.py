@@ -92,7 +92,7 @@ def test_noise_alone_is_no_outlier():
 
 def test_forces_of_no_such_actuator_are_refused_as_a_whole(noisy):
     mixed = np.random.default_rng(0).permutation(noisy[1].ravel()).reshape(noisy[1].shape)
-    with pytest.raises(ForceLawRefusedError, match='must|of the same actuator'):
+    with pytest.raises(ForceLawRefusedError, match=r'must|of the same actuator'):
         fit_force_law(GAPS, CURRENTS, mixed)
 
 

@@ -1,4 +1,4 @@
-"""Gap curves from noisy ripple at known gaps: how near to the truth, where unique, and what temperature leaves."""
+"""Gap curves from noisy ripple at known gaps: how near to the truth, and what temperature leaves."""
 
 import functools
 from dataclasses import replace

@@ -34,8 +34,8 @@ class RackError(ValueError):
 class RackTemperature:
     """How the parts of the simulated rack change from 20 degC on: resistivity per kelvin (1/K), relative.
 
-    The core is of iron (chosen: 8 % less conductivity after 20 K), the coil of copper. Both are the rack's own
-    truth; a calibration may well assume something else.
+    The core is of iron (chosen: 8 % less conductivity after 20 K), the coil of copper. Both are the rack's
+    own truth; a calibration may well assume something else.
     """
 
     core: float = 0.0043

@@ -1,4 +1,4 @@
-"""The simulated rack: what it records is the actuator's, with noise of the stated size, and nothing hidden."""
+"""The simulated rack: what it records is the actuator's, with noise of the stated size."""
 
 import numpy as np
 import pytest

@@ -12,7 +12,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from mount_models.actuator.fit_start import starts
 from mount_models.actuator.law import ForceLaw, checked_force, coefficients
-from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
+from mount_models.actuator.law_check import check_force_law
 from mount_models.actuator.points import Orders, check_outliers, checked_points, far_points, gap_groups
 from mount_models.compiled import compiled
 
@@ -100,7 +100,7 @@ def _best(
     forces: FloatArray,
     progress: Callable[[int, int], None],
 ) -> OptimizeResult:
-    """Return the end of the best of several searches; outliers pull it little, for they count by root only."""
+    """Return the end of the best of several searches; outliers pull the first ones little."""
 
     def search(start: FloatArray, steps: int, scale: float, loss: str) -> OptimizeResult:
         return least_squares(
@@ -133,7 +133,7 @@ def _best(
 
 
 def _bounds(orders: Orders, currents: FloatArray, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return bounds of the coefficients in the mapped gap, from the size of the measured forces and currents."""
+    """Return bounds of the coefficients in the mapped gap, by the size of forces and currents."""
     force, current = float(forces.max()), float(currents.max())
     scales = (force, force / current, 1.0 / current, current, force / current**2)
     low, high = [], []

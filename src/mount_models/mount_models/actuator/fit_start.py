@@ -28,7 +28,7 @@ def starts(
     `domain` holds the gaps (um) of -1 and 1. Table 1 is one of them where it can be.
     """
     highest = float(current.max())
-    found = []
+    found: list[tuple[float, FloatArray]] = []
     for knee, lean, sharpness in itertools.product(_KNEES, _LEANS, _SHARPNESSES):
         sharp = _padded([sharpness / highest], orders[2])
         at = _padded([knee * highest, lean * knee * highest], orders[3])
@@ -57,8 +57,8 @@ def _completed(
     at: FloatArray,
 ) -> tuple[float, FloatArray]:
     """Return misfit and all coefficients for given polynomials a3 and a4."""
-    sharpness = np.polynomial.polynomial.polyval(mapped_gap, sharp)
-    knee = np.polynomial.polynomial.polyval(mapped_gap, at)
+    sharpness = np.asarray(np.polynomial.polynomial.polyval(mapped_gap, sharp), np.float64)
+    knee = np.asarray(np.polynomial.polynomial.polyval(mapped_gap, at), np.float64)
     lines, parabolas = _shapes(current, sharpness, knee)
     columns = [
         (shape / tolerance)[:, np.newaxis] * mapped_gap[:, np.newaxis] ** np.arange(order)

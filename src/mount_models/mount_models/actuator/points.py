@@ -64,7 +64,8 @@ def check_outliers(
     if far.size > _MANY * force.size:
         raise ForceLawRefusedError(
             f'{far.size} of {force.size} points lie far from any law of this form, the worst at '
-            f'{_point(gap, current, force, expected, far[np.argmax(misfit[far])])}: are gap, current and force '
+            f'{_point(gap, current, force, expected, far[np.argmax(misfit[far])])}: are gap, current '
+            'and force '
             f'of the same actuator, in the units of their columns, and taken at the same time?'
         )
     worst = far[np.argsort(-misfit[far], kind='stable')][:_NAMED]
@@ -116,7 +117,8 @@ def _check_span(gaps: FloatArray, currents: FloatArray, highest_order: int) -> N
         if different < _FEWEST_CURRENTS:
             raise ForceLawRefusedError(
                 f'each air gap must be measured at {_FEWEST_CURRENTS} currents or more; at '
-                f'{gaps[group].mean() * 1e6:.1f} um there are {different}: measure more, or leave this gap out'
+                f'{gaps[group].mean() * 1e6:.1f} um there are {different}: measure more, or leave this '
+                'gap out'
             )
 
 
@@ -124,6 +126,7 @@ def _point(
     gap: FloatArray, current: FloatArray, force: FloatArray, expected: FloatArray, place: int | np.intp
 ) -> str:
     return (
-        f'{gap[place] * 1e6:.1f} um, {current[place]:.3f} A: {force[place]:.1f} N, where {expected[place]:.1f} N '
+        f'{gap[place] * 1e6:.1f} um, {current[place]:.3f} A: {force[place]:.1f} N, where '
+        f'{expected[place]:.1f} N '
         f'would fit'
     )

@@ -155,7 +155,8 @@ def _rest_inductance(
     near = np.abs(current - rest_current) <= _REST_HALF_WIDTH
     if near.sum() < _FEWEST_AT_REST:
         raise GapCurvesRefusedError(
-            f'{name}: samples within {_REST_HALF_WIDTH:.2f} A of the rest current ({rest_current:.2f} A) must '
+            f'{name}: samples within {_REST_HALF_WIDTH:.2f} A of the rest current ({rest_current:.2f} '
+            'A) must '
             f'be at least {_FEWEST_AT_REST}, {int(near.sum())} are; hold that current for longer'
         )
     z, values = (current[near] - rest_current) / _REST_HALF_WIDTH, inductance[near]

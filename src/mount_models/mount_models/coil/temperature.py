@@ -110,7 +110,8 @@ def check_compensation(compensation: TemperatureCompensation, curves: GapCurves)
             )
     if not 1.0 + c.conductivity_coefficient * (c.lowest_celsius - c.calibration_celsius) > 0.1:
         raise CompensationError(
-            f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a resistivity '
+            f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a '
+            'resistivity '
             f'at {c.lowest_celsius:g} degC; lower it, or raise lowest_celsius'
         )
     curve = curves.inductance_of_gap
@@ -151,7 +152,7 @@ def _shift(shift: ScaledPolynomial, gap: float) -> float:
 
 
 def _gap_at(rising: Callable[[float], float], value: float, curve: ScaledPolynomial) -> float:
-    """Return the gap (m) of the curve's range at which a `rising` function reaches `value`, or its nearer end."""
+    """Return the gap (m) of the curve at which a `rising` function reaches `value`, or the nearer end."""
     low, high = curve.low, curve.high
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

@@ -1,9 +1,9 @@
 """The temperature compensation of the gap curves: measured at two temperatures, or stated from one.
 
-Stated means: the depth of the skin from an assumed conductivity and from the duty that the copper's resistance
-then asks of the bridge, and what of the reluctance is not in the core from how the force law falls with the gap
-(F = i^2/2 |dL/d gap|, without saturation). Leakage then counts as if it were gap, so a measured compensation is the
-better one.
+Stated means: the depth of the skin from an assumed conductivity and from the duty that the copper's
+resistance then asks of the bridge, and what of the reluctance is not in the core from how the force law falls
+with the gap (F = i^2/2 |dL/d gap|, without saturation). Leakage then counts as if it were gap, so a measured
+compensation is the better one.
 """
 
 import math
@@ -45,7 +45,8 @@ def measured_compensation(
     if len(inside) < _FEWEST_GAPS:
         raise GapCurvesRefusedError(
             f'a temperature compensation needs recordings at {_FEWEST_GAPS} or more gaps within '
-            f'{curves.inductance_of_gap.low * 1e6:.0f} .. {curves.inductance_of_gap.high * 1e6:.0f} um at the '
+            f'{curves.inductance_of_gap.low * 1e6:.0f} .. {curves.inductance_of_gap.high * 1e6:.0f} um '
+            'at the '
             f'other temperature; {len(inside)} given: record more, or leave that temperature out'
         )
     gaps = np.array([point.gap for point in inside])
@@ -117,7 +118,7 @@ _UNSATURATED = 0.25  # chosen: share of the largest current at which force still
 
 
 def _core_change(bridge: RippleCoil, current: float, coefficient: float) -> float:
-    """Return the factor on the core's share of the reluctance after `_STATED_DIFFERENCE`, at a current (A)."""
+    """Return the factor on the core's reluctance after `_STATED_DIFFERENCE`, at a current (A)."""
     resistance = bridge.resistance * (1.0 + COPPER_COEFFICIENT * _STATED_DIFFERENCE)
     thick = _THICK * bridge.pwm_period
     cold = skin_factor(bridge, thick, duty(bridge, current))

@@ -32,11 +32,11 @@ class UniqueRegion:
 
 
 def unique_region(recordings: Sequence[RippleRecording]) -> UniqueRegion:
-    """Return where ripple at one temperature is unique; at least 4 gaps are needed, else nothing is unique."""
+    """Return where ripple at one temperature is unique; of less than 4 gaps nothing is."""
     recordings = sorted(recordings, key=lambda recording: recording.gap)
     gaps = np.array([recording.gap for recording in recordings])
     width = max(float(np.nanmax(recording.current)) for recording in recordings) / _BINS
-    edges = np.arange(_BINS + 1) * width
+    edges = np.asarray(np.arange(_BINS + 1) * width, np.float64)
     currents = 0.5 * (edges[1:] + edges[:-1])
     mean, std = (np.full((gaps.size, _BINS), np.nan) for _ in range(2))
     for row, recording in enumerate(recordings):
@@ -62,7 +62,8 @@ def warnings(region: UniqueRegion, rest_current: float, crossing_inductance: flo
         )
     if not _inside(region.levels, crossing_inductance):
         found.append(
-            f'crossing_inductance ({crossing_inductance * 1e3:.1f} mH) must be one whose current tells the gap '
+            f'crossing_inductance ({crossing_inductance * 1e3:.1f} mH) must be one whose current tells '
+            'the gap '
             f'without ambiguity: {_told(region.levels, 1e3, "mH")}; choose an inductance from there'
         )
     return found
