@@ -20,7 +20,12 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument('interface', default_value='socketcan', description='python-can interface'),
         DeclareLaunchArgument('channel', default_value='can0', description='channel of the interface'),
         DeclareLaunchArgument(
-            'specimen', default_value='', description='calibration of this actuator; empty: the shipped one'
+            'parameters_file',
+            default_value='',
+            description='specimen file of this mount; empty: the shipped one',
+        ),
+        DeclareLaunchArgument(
+            'specimen', default_value='', description='name that the specimen file must bear; empty: any'
         ),
         DeclareLaunchArgument('damper', default_value='viscous_2000', description='damper characteristic'),
     ]
@@ -30,7 +35,13 @@ def generate_launch_description() -> LaunchDescription:
     parameters['mount_driver'].append(
         {'interface': LaunchConfiguration('interface'), 'channel': LaunchConfiguration('channel')}
     )
-    parameters['mount_init'].append({'specimen': LaunchConfiguration('specimen')})
+    for node in ('mount_init', 'mount_control'):
+        parameters[node].append(
+            {
+                'parameters_file': LaunchConfiguration('parameters_file'),
+                'specimen': LaunchConfiguration('specimen'),
+            }
+        )
     parameters['mount_control'].append({'damper': LaunchConfiguration('damper')})
     graph = launch_graph(VEHICLE, LaunchConfiguration('namespace'), parameters)
     return LaunchDescription([*arguments, *graph])

@@ -6,6 +6,7 @@ from rich.console import Console
 from mount_bringup import (
     accept_command,
     audit_command,
+    calibrate_command,
     compare_command,
     cut_command,
     drive_command,
@@ -67,6 +68,7 @@ app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)
 app.command(name='merge', epilog=merge_command.EPILOG)(merge_command.merge)
 app.command(name='experiment', epilog=experiment_command.EPILOG)(experiment_command.experiment)
 app.command(name='accept', epilog=accept_command.EPILOG)(accept_command.accept)
+app.add_typer(calibrate_command.app)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
+from mount_control.identified import check_fits, identified
 from mount_control.parameters import ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_init.initialisation import OFF, Initialisation, InitialisationResult
@@ -19,7 +20,8 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
-from mount_models.specimen import Specimen, default_specimen, load_specimen
+from mount_models.specimen import Specimen
+from mount_models.specimen import chosen_specimen as specimen_of
 from mount_sim.electronics import Reading
 
 _PERIOD = round(SAMPLE_TIME * 1e9)  # ns
@@ -38,10 +40,20 @@ def chosen_damper(parameters: Parameters) -> DamperCurve:
     return damper_curve(parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER))
 
 
-def chosen_specimen(parameters: Parameters) -> Specimen:
-    """Return the specimen of a run."""
-    path = parameters.get('mount_init', {}).get('specimen', '')
-    return load_specimen(path) if path else default_specimen()
+def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specimen:
+    """Return the specimen of a run, as `node` loads it."""
+    values = parameters.get(node, {})
+    return specimen_of(values.get('parameters_file', ''), values.get('specimen', ''))
+
+
+def friction_model(parameters: Parameters) -> tuple[FrictionCoefficients, FrictionContact]:
+    """Return what the controller of a run assumes of the friction; raises `SpecimenError`."""
+    specimen, control = chosen_specimen(parameters, 'mount_control'), parameters.get('mount_control', {})
+    check_fits(control_parameters(parameters), specimen)
+    return (
+        identified(specimen, with_flattened(FrictionCoefficients(), control, 'friction')),
+        identified(specimen, with_flattened(FrictionContact(), control, 'contact')),
+    )
 
 
 class CoreChain:
@@ -50,11 +62,9 @@ class CoreChain:
     def __init__(self, parameters: Parameters):
         init_parameters = with_flattened(InitParameters(), parameters.get('mount_init', {}))
         self._initialisation = Initialisation(chosen_specimen(parameters), init_parameters)
-        control = parameters.get('mount_control', {})
         self._control = control_parameters(parameters)
         self._damper = chosen_damper(parameters)
-        self._friction = with_flattened(FrictionCoefficients(), control, 'friction')
-        self._contact = with_flattened(FrictionContact(), control, 'contact')
+        self._friction, self._contact = friction_model(parameters)
         self._watch = SampleWatch(SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range)
         self.result: InitialisationResult | None = None
         self.controller: Controller | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
+from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters, friction_model
 from mount_bringup.replay_input import Column, ControlRun, ReplayError, ReplayInput, Times
 from mount_bringup.replay_ramps import MeasuredGap, Ramp, initialisation
 from mount_control.activation import MeasurementStream
@@ -16,9 +16,6 @@ from mount_control.force_to_current import resample
 from mount_control.parameters import SAMPLE_TIME, ControlParameters
 from mount_control.sample_watch import Judgement, SampleCounts, SampleWatch
 from mount_init.errors import InitialisationError
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
-from mount_models.quantity import with_flattened
 from mount_ros import topics
 from mount_ros.force_table_message import ForceTable
 
@@ -149,14 +146,11 @@ def run_control(run: ControlRun, gap: MeasuredGap, parameters: Parameters) -> Co
 
 def controller_for(gap: MeasuredGap, parameters: Parameters) -> Controller:
     """Return the controller that mount_control makes when it is activated with `gap`."""
-    control = parameters.get('mount_control', {})
     settings = control_parameters(parameters)
     table = resample(
         gap.table.current, gap.table.normal_force, gap.numbers['offset_current'], settings.highest_current
     )
-    friction = with_flattened(FrictionCoefficients(), control, 'friction')
-    contact = with_flattened(FrictionContact(), control, 'contact')
-    return Controller(settings, chosen_damper(parameters), friction, contact, table)
+    return Controller(settings, chosen_damper(parameters), *friction_model(parameters), table)
 
 
 def _follows(run: ControlRun, settings: ControlParameters) -> NDArray[np.bool_]:

@@ -24,12 +24,14 @@ def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     return {
         'mount_driver': flattened(DriverParameters()),
         'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0},
-        'mount_init': {**flattened(InitParameters()), 'specimen': ''},
+        'mount_init': {**flattened(InitParameters()), 'parameters_file': '', 'specimen': ''},
         'mount_control': {
             **flattened(ControlParameters()),
             **flattened(FrictionCoefficients(), 'friction'),
             **flattened(FrictionContact(), 'contact'),
             'damper': DEFAULT_DAMPER,
+            'parameters_file': '',
+            'specimen': '',
         },
         'mount_recorder': flattened(RecorderParameters()),
     }

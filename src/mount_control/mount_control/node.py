@@ -7,12 +7,14 @@ from mount_control.activation import MeasurementStream, check_belongs
 from mount_control.controller import TRACE, Controller, load_compiled_law
 from mount_control.diagnosis import ControlFigures, verdict
 from mount_control.force_to_current import ForceTableError, resample
+from mount_control.identified import check_fits, identified
 from mount_control.parameters import ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.sampling import SAMPLE_TIME
+from mount_models.specimen import chosen_specimen
 from mount_ros import topics
 from mount_ros.diagnostics import Verdict
 from mount_ros.force_table_message import ForceTable, ForceTableMessageError, from_bytes
@@ -35,6 +37,8 @@ class MountControl(SafeLifecycleNode):
         declare(self, FrictionCoefficients(), 'friction')
         declare(self, FrictionContact(), 'contact')
         self.declare_parameter('damper', 'viscous_2000')
+        self.declare_parameter('parameters_file', '')
+        self.declare_parameter('specimen', '')
         self._controller: Controller | None = None
         self._table: ForceTable | None = None
         self._air_gap: tuple[int, tuple[float, ...]] | None = None
@@ -46,8 +50,12 @@ class MountControl(SafeLifecycleNode):
 
     def configure(self) -> None:
         self._settings = checked_parameters(read(self, ControlParameters()))
-        self._friction = read(self, FrictionCoefficients(), 'friction')
-        self._contact = read(self, FrictionContact(), 'contact')
+        specimen = chosen_specimen(
+            str(self.get_parameter('parameters_file').value), str(self.get_parameter('specimen').value)
+        )
+        check_fits(self._settings, specimen)
+        self._friction = identified(specimen, read(self, FrictionCoefficients(), 'friction'))
+        self._contact = identified(specimen, read(self, FrictionContact(), 'contact'))
         self._damper = damper_curve(self.get_parameter('damper').value)
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)

@@ -21,6 +21,7 @@ from mount_models.coil.gap import (
     gap_per_inductance,
     rest_gap_from_inductance,
 )
+from mount_models.coil.temperature import crossing_at_calibration, inductance_at_calibration
 from mount_models.force_table import zero_current_rest_gap
 from mount_models.specimen import Specimen
 
@@ -102,12 +103,17 @@ def inductance_crossing(
         raise AmbiguousCurveError(str(error)) from error
 
 
-def rest_gap(specimen: Specimen, inductance: float, inductance_std: float) -> RestGap:
+def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsius: float) -> RestGap:
     """Return the gap at 0 A from the inductance (H) at the rest current; raises `OutsideCalibrationError`.
 
-    The magnet already closes the halves a little at the rest current: d_rest = d + F(i, d) / k_s.
+    The inductance is carried back from the coil temperature (degC) to that of the curves. The magnet already
+    closes the halves a little at the rest current: d_rest = d + F(i, d) / k_s.
     """
     try:
+        if specimen.temperature is not None:
+            inductance = inductance_at_calibration(
+                specimen.temperature, specimen.gap_curves, inductance, celsius
+            )
         at_rest = float(rest_gap_from_inductance(specimen.gap_curves, inductance))
         gap_slope = float(gap_per_inductance(specimen.gap_curves, inductance))
         gap = zero_current_rest_gap(
@@ -121,16 +127,21 @@ def rest_gap(specimen: Specimen, inductance: float, inductance_std: float) -> Re
     return RestGap(at_rest, gap, abs(gap_slope * (1.0 + closing)) * inductance_std)
 
 
-def contact_gap(specimen: Specimen, rest: RestGap, current: float, current_std: float) -> ContactGap:
-    """Return the gap at which the pads just touch, from the current (A) of the crossing.
+def contact_gap(
+    specimen: Specimen, rest: RestGap, current: float, current_std: float, celsius: float
+) -> ContactGap:
+    """Return the gap at which the pads just touch, from the crossing current (A) at a temperature (degC).
 
     At the crossing the pads are compressed by F_N = F(i, d) - k_s (d_rest - d), so d_c = d + F_N / k_p.
     Raises `OutsideCalibrationError`. A negative F_N is returned as it is, for `plausibility` to judge.
     """
     spring, pads = specimen.spring_stiffness, specimen.pad_stiffness
     try:
-        gap = float(gap_from_crossing_current(specimen.gap_curves, current))
-        gap_slope = float(gap_per_crossing_current(specimen.gap_curves, current))
+        at_curves = current
+        if specimen.temperature is not None:
+            at_curves = crossing_at_calibration(specimen.temperature, specimen.gap_curves, current, celsius)
+        gap = float(gap_from_crossing_current(specimen.gap_curves, at_curves))
+        gap_slope = float(gap_per_crossing_current(specimen.gap_curves, at_curves))
         force = float(checked_force(specimen.force_law, current, gap))
     except (OutsideCurveError, OutsideLawError) as error:
         raise OutsideCalibrationError(

@@ -189,9 +189,11 @@ def _estimate(specimen: Specimen, parameters: InitParameters, ramp: Ramp, readin
     ]
     for dwell in dwells:
         check_rest_current(specimen, dwell, parameters)
-    before, after = (rest_gap(specimen, dwell.inductance, dwell.inductance_std) for dwell in dwells)
+    celsius = parameters.coil_temperature_celsius
+    before, after = (rest_gap(specimen, dwell.inductance, dwell.inductance_std, celsius) for dwell in dwells)
     check_same_rest_gap(before, after, parameters)
-    rest = rest_gap(specimen, *_mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells]))
+    mean = _mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells])
+    rest = rest_gap(specimen, *mean, celsius)
 
     curve = inductance_curve(current, inductance, ramp.up, ramp.down, parameters.peak_current)
     check_single_crossing(curve, level, specimen.rest_current)
@@ -199,10 +201,12 @@ def _estimate(specimen: Specimen, parameters: InitParameters, ramp: Ramp, readin
         inductance_crossing(current[part], inductance[part], level, parameters)
         for part in (ramp.up, ramp.down)
     ]
-    up, down = (contact_gap(specimen, rest, crossing.current, crossing.current_std) for crossing in crossings)
+    up, down = (
+        contact_gap(specimen, rest, crossing.current, crossing.current_std, celsius) for crossing in crossings
+    )
     check_same_crossing(up.at_crossing, down.at_crossing, parameters)
     crossing_current, crossing_std = _mean([(c.current, c.current_std) for c in crossings])
-    contact = contact_gap(specimen, rest, crossing_current, crossing_std)
+    contact = contact_gap(specimen, rest, crossing_current, crossing_std, celsius)
 
     check_steady_fall(curve, level, specimen.rest_current, parameters)
     check_contact(specimen, rest, contact, crossing_current, parameters)

@@ -6,7 +6,7 @@ from mount_init.diagnosis import InitFigures, verdict
 from mount_init.dialogue import CoilDialogue
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
-from mount_models.specimen import default_specimen, load_specimen
+from mount_models.specimen import chosen_specimen
 from mount_ros import topics
 from mount_ros.cdr import serialised
 from mount_ros.data_path import DataPath
@@ -24,14 +24,16 @@ class MountInit(SafeLifecycleNode):
     def __init__(self, **arguments):
         super().__init__('mount_init', **arguments)
         declare(self, InitParameters())
+        self.declare_parameter('parameters_file', '')
         self.declare_parameter('specimen', '')
         self._dialogue: CoilDialogue | None = None
         self._result: tuple[int, InitialisationResult] | None = None
 
     def configure(self) -> None:
         self._init_parameters = read(self, InitParameters())
-        path_of_specimen = str(self.get_parameter('specimen').value)
-        self._specimen = load_specimen(path_of_specimen) if path_of_specimen else default_specimen()
+        self._specimen = chosen_specimen(
+            str(self.get_parameter('parameters_file').value), str(self.get_parameter('specimen').value)
+        )
         Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
         load_compiled_laws(self._specimen)
         self._malformed, self._malformed_reason = 0, ''

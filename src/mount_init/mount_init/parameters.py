@@ -96,6 +96,11 @@ class InitParameters(NamedTuple):
         float, Quantity('m', 'largest credible standard deviation of the contact gap', 1e-7, 5e-5)
     ] = 2e-6
 
+    coil_temperature_celsius: Annotated[
+        float,
+        Quantity('degC', 'coil temperature at the activation, for which the gaps are compensated', -60, 250),
+    ] = 20.0
+
     silence_timeout: Annotated[
         float,
         Quantity('s', 'longest wait for the next ripple sample (wall clock)', 0.05, 60.0),

@@ -317,7 +317,7 @@ def test_the_end_of_the_process_ends_a_ramp_with_zero_current(graph):
 
 
 def test_a_specimen_that_cannot_be_read_is_refused_at_configure(graph):
-    g = graph(specimen='/nowhere/specimen.yaml')
+    g = graph(parameters_file='/nowhere/specimen.yaml')
     assert not g.change(Transition.TRANSITION_CONFIGURE)
     assert g.state() == State.PRIMARY_STATE_UNCONFIGURED
     assert 'specimen file /nowhere/specimen.yaml cannot be read' in g.refusal()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mount_init.errors import OutsideCalibrationError
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 
@@ -135,3 +136,26 @@ def test_samples_with_nan_are_skipped_and_counted(recorded, specimen):
 def test_light_pressure_sets_the_offset_current(simulated_actuator, specimen, run_initialisation):
     firm = run_initialisation(simulated_actuator(), specimen, InitParameters(light_pressure=10.0))
     assert firm.offset_current == pytest.approx(0.570, rel=0.01)
+
+
+@pytest.mark.parametrize('celsius', [-20.0, 80.0])
+def test_gaps_are_compensated_for_the_temperature_of_the_coil(
+    simulated_actuator, specimen, run_initialisation, celsius
+):
+    """Contact at -20 degC is extrapolated from 80 degC; without compensation tens of um are left."""
+    plant = simulated_actuator()
+    warmer = celsius - 20.0
+    plant.coil = plant.coil._replace(
+        conductivity=plant.coil.conductivity / (1.0 + 0.0043 * warmer),
+        resistance=plant.coil.resistance * (1.0 + 0.0039 * warmer),
+    )
+    parameters = InitParameters(coil_temperature_celsius=celsius, peak_current=2.5)
+    result = run_initialisation(plant, specimen, parameters)
+    assert result.rest_gap == pytest.approx(508e-6, abs=3e-6)
+    assert result.contact_gap == pytest.approx(349e-6, abs=6e-6)
+
+
+def test_a_coil_too_hot_for_the_compensation_is_refused(simulated_actuator, specimen, run_initialisation):
+    parameters = InitParameters(coil_temperature_celsius=150.0)
+    with pytest.raises(OutsideCalibrationError, match=r'coil temperature \(150\.0 degC\)'):
+        run_initialisation(simulated_actuator(), specimen, parameters)

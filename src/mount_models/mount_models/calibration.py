@@ -18,8 +18,12 @@ from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.closing import ClosingMechanics
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import measured_inductance
+from mount_models.coil.gap_calibration import RippleRecording, measured_point
 from mount_models.coil.gap_fit import GapCurvesFit, fit_gap_curves
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
+from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT, TemperatureCompensation
+from mount_models.coil.temperature_fit import COPPER_COEFFICIENT, measured_compensation
+from mount_models.quantity import with_values
 from mount_models.specimen import DEFAULT_SPECIMEN, Specimen, checked_specimen, save_specimen
 
 FloatArray = npt.NDArray[np.float64]
@@ -32,6 +36,9 @@ RIG_CURRENTS = np.linspace(0.0, 3.0, 151)
 
 LAW_GAPS = (270e-6, 550e-6)
 """Gaps that the force law is fitted to, m (chosen): it meets 280 .. 540 um with some room on either side."""
+
+RIG_CELSIUS, RIG_WARM_CELSIUS = 20.0, 80.0
+"""Coil temperatures of the rig, degC (chosen)."""
 
 LAW_LOWEST_CURRENT = 0.1
 """Current from which the force law is fitted, A (chosen); below, force sensors see next to nothing."""
@@ -93,10 +100,12 @@ def calibrate(
     rest_current: float = 0.2,
     crossing_inductance: float = 20e-3,
     law_gaps: tuple[float, float] = LAW_GAPS,
+    warm: RigMeasurements | None = None,
     provenance: dict[str, Any] | None = None,
 ) -> Specimen:
     """Return the specimen that the rig's measurements give; stiffnesses are known by design.
 
+    `warm` are measurements at `RIG_WARM_CELSIUS`; without them temperature is not compensated.
     Raises `CalibrationError`, `ForceLawRefusedError`, `GapCurvesRefusedError` or `CrossingError`.
     """
     design = ClosingMechanics() if mechanics is None else mechanics
@@ -113,6 +122,9 @@ def calibrate(
             rest_current=rest_current,
             crossing_inductance=crossing_inductance,
             current_limit=law_fit.law.current_high,
+            temperature=None
+            if warm is None
+            else _compensation(warm, curves_fit, rest_current, crossing_inductance),
             provenance={**(provenance or {}), **_fit_quality(law_fit, curves_fit)},
         )
     )
@@ -121,9 +133,16 @@ def calibrate(
 def calibrate_default() -> Specimen:
     """Return the specimen of the simulated actuator with all its defaults, measured without noise."""
     actuator, coil = ReluctanceActuator(), RippleCoil()
+    difference = RIG_WARM_CELSIUS - RIG_CELSIUS
+    warm = with_values(
+        coil,
+        conductivity=coil.conductivity / (1.0 + CONDUCTIVITY_COEFFICIENT * difference),
+        resistance=coil.resistance * (1.0 + COPPER_COEFFICIENT * difference),
+    )
     return calibrate(
         measure_actuator(actuator, coil),
         name='default',
+        warm=measure_actuator(actuator, warm, currents=RIG_CURRENTS[RIG_CURRENTS <= _WARM_HIGHEST_CURRENT]),
         provenance={
             'written_by': 'python -m mount_models.calibration',
             'measured_on': 'simulated actuator and coil with default parameters, no noise',
@@ -156,6 +175,30 @@ def _force_law(measurements: RigMeasurements, law_gaps: tuple[float, float]) -> 
         measurements.currents[columns],
         measurements.force[np.ix_(rows, columns)],
     )
+
+
+_WARM_HIGHEST_CURRENT = 2.5  # A: with warm copper the bridge cannot hold 3 A and still be sampled in time
+
+
+def _compensation(
+    warm: RigMeasurements, curves_fit: GapCurvesFit, rest_current: float, crossing_inductance: float
+) -> TemperatureCompensation:
+    repeated = 40  # a rig without noise needs no more samples, but a recording has many
+    points = [
+        measured_point(
+            RippleRecording(
+                'rig', float(gap), RIG_WARM_CELSIUS, *np.repeat([warm.currents, row], repeated, axis=1)
+            ),
+            rest_current,
+            crossing_inductance,
+            _CROSSING_HALF_WIDTH,
+        )
+        for gap, row in zip(warm.gaps, warm.inductance, strict=True)
+    ]
+    return measured_compensation(curves_fit.curves, RIG_CELSIUS, points)
+
+
+_CROSSING_HALF_WIDTH = 0.1  # A, as that of the curves
 
 
 def _gap_curves(

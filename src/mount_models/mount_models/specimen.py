@@ -5,6 +5,9 @@ simulated plant; two mounts of one car have two specimens.
 """
 
 import math
+import os
+import tempfile
+import types
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -15,9 +18,15 @@ import yaml
 from mount_models.actuator.law import ForceLaw
 from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
+from mount_models.coil.temperature import CompensationError, TemperatureCompensation, check_compensation
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import Quantity, quantities
 
 T = TypeVar('T', bound=NamedTuple)
+
+SCHEMA_VERSION = 2
+"""Number of the form of specimen files; 2 since they hold a temperature compensation."""
 
 DEFAULT_SPECIMEN = Path(__file__).resolve().parent / 'specimens' / 'default.yaml'
 
@@ -28,7 +37,11 @@ class SpecimenError(ValueError):
 
 @dataclass(frozen=True)
 class Specimen:
-    """One actuator with its coil, springs and pads, as the controller knows it; SI units throughout."""
+    """One actuator with its coil, springs and pads, as the controller knows it; SI units throughout.
+
+    `friction` holds what was identified of `FrictionCoefficients` and `FrictionContact`, by their names; what
+    is not in it keeps its default. Without `temperature` the gap curves hold at one temperature only.
+    """
 
     name: str
     force_law: ForceLaw
@@ -45,6 +58,7 @@ class Specimen:
     current_limit: Annotated[
         float, Quantity('A', 'largest current of the coil', 0.1, 20.0, 'section 3.2')
     ] = 3.0
+    temperature: TemperatureCompensation | None = None
     friction: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
 
@@ -54,41 +68,81 @@ def default_specimen() -> Specimen:
     return load_specimen(DEFAULT_SPECIMEN)
 
 
-def load_specimen(path: str | Path) -> Specimen:
-    """Return the specimen in the YAML file `path`; every doubt raises `SpecimenError` and names the entry."""
+def load_specimen(path: str | Path, name: str = '') -> Specimen:
+    """Return the specimen in the YAML file `path`; every doubt raises `SpecimenError` and names the entry.
+
+    With a `name`, a file for another specimen is refused.
+    """
     try:
         content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except OSError as error:
         raise SpecimenError(
             f'specimen file {path} cannot be read ({error.strerror}); give its full path'
         ) from error
+    except UnicodeDecodeError as error:
+        raise SpecimenError(
+            f'specimen file {path} is no text (byte {error.start} is not UTF-8); give a specimen file in YAML'
+        ) from error
     except yaml.YAMLError as error:
         raise SpecimenError(f'specimen file {path} is not valid YAML; {error}') from error
     try:
-        return specimen_from_mapping(content)
+        specimen = specimen_from_mapping(content)
     except SpecimenError as error:
         raise SpecimenError(f'specimen file {path}: {error}') from error
+    if name and specimen.name != name:
+        raise SpecimenError(
+            f'specimen file {path} is for the specimen {specimen.name!r}, {name!r} is asked for; give '
+            'the file '
+            f'of {name!r}, or ask for {specimen.name!r}'
+        )
+    return specimen
+
+
+def chosen_specimen(parameters_file: str, name: str = '') -> Specimen:
+    """Return the specimen in `parameters_file`, or the default one if that is empty.
+
+    With a `name`, another specimen than that is refused; raises `SpecimenError`.
+    """
+    if '/' in name or name.endswith(('.yaml', '.yml')):
+        raise SpecimenError(
+            f'specimen ({name!r}) must be a name; give the path of its file as parameters_file'
+        )
+    return load_specimen(parameters_file or DEFAULT_SPECIMEN, name)
 
 
 def save_specimen(specimen: Specimen, path: str | Path) -> None:
-    """Write the checked `specimen` to `path` as YAML, readable and without loss of digits."""
+    """Write the checked `specimen` to `path` as YAML without loss of digits, whole or not at all."""
     text = yaml.safe_dump(
         specimen_to_mapping(checked_specimen(specimen)), sort_keys=False, default_flow_style=None, width=110
     )
-    Path(path).write_text(
-        f'# Specimen of the engine mount. SI units; the coefficients of force_law: see Table 1.\n{text}'
-    )
+    target = Path(path)
+    heading = '# Specimen of the engine mount. SI units; the coefficients of force_law: see Table 1.\n'
+    with tempfile.NamedTemporaryFile(
+        'w', encoding='utf-8', dir=target.parent, prefix=f'.{target.name}.', delete=False
+    ) as file:
+        try:
+            file.write(heading + text)
+            file.flush()
+            os.fsync(file.fileno())
+            os.chmod(file.name, _READABLE)
+            os.replace(file.name, target)
+        except BaseException:
+            Path(file.name).unlink(missing_ok=True)
+            raise
 
 
 def specimen_to_mapping(specimen: Specimen) -> dict[str, Any]:
     """Return the specimen as plain dictionaries, lists, texts and numbers."""
-    return {entry.name: _plain(getattr(specimen, entry.name)) for entry in fields(specimen)}
+    content = {entry.name: _plain(getattr(specimen, entry.name)) for entry in fields(specimen)}
+    return {'schema_version': SCHEMA_VERSION, **content}
 
 
 def specimen_from_mapping(content: Any) -> Specimen:
     """Return the checked specimen described by plain dictionaries and lists, or raise `SpecimenError`."""
     hints = get_type_hints(Specimen)
-    values = _complete(content, list(hints), 'specimen')
+    _check_version(content)
+    values = _complete(content, ['schema_version', *hints], 'specimen')
+    del values['schema_version']
     for name, kind in hints.items():
         values[name] = _converted(values[name], kind, name)
     return checked_specimen(Specimen(**values))
@@ -105,14 +159,40 @@ def checked_specimen(specimen: Specimen) -> Specimen:
     try:
         check_force_law(specimen.force_law)
         check_gap_curves(specimen.gap_curves)
-    except (ForceLawRefusedError, GapCurvesRefusedError) as error:
+        if specimen.temperature is not None:
+            for name, quantity in quantities(TemperatureCompensation).items():
+                _check_limits(getattr(specimen.temperature, name), quantity, f'temperature.{name}')
+            check_compensation(specimen.temperature, specimen.gap_curves)
+    except (ForceLawRefusedError, GapCurvesRefusedError, CompensationError) as error:
         raise SpecimenError(f'{error}') from error
+    _check_friction(specimen.friction)
     if specimen.current_limit > specimen.force_law.current_high:
         raise SpecimenError(
             f'current_limit ({specimen.current_limit:.2f} A) must not exceed force_law.current_high '
             f'({specimen.force_law.current_high:.2f} A); lower it, or calibrate up to it'
         )
     return specimen
+
+
+_READABLE = 0o644
+
+
+def _check_version(content: Any) -> None:
+    version = content.get('schema_version') if isinstance(content, Mapping) else SCHEMA_VERSION
+    if version != SCHEMA_VERSION or isinstance(version, bool):
+        raise SpecimenError(
+            f'schema_version ({_told(version)}) must be {SCHEMA_VERSION}; the file is of another '
+            'version of this '
+            f'software, or none of its specimens: calibrate again'
+        )
+
+
+def _check_friction(friction: Mapping[str, float]) -> None:
+    known = {**quantities(FrictionCoefficients), **quantities(FrictionContact)}
+    for name, value in friction.items():
+        if name not in known:
+            raise SpecimenError(f'friction.{name} is unknown; known are {", ".join(known)}')
+        _check_limits(value, known[name], f'friction.{name}')
 
 
 def _complete(content: Any, names: list[str], where: str) -> dict[str, Any]:
@@ -133,6 +213,8 @@ def _complete(content: Any, names: list[str], where: str) -> dict[str, Any]:
 
 def _converted(value: Any, kind: Any, where: str) -> Any:
     """Return `value` from a file as the declared `kind`."""
+    if get_origin(kind) is types.UnionType:
+        return None if value is None else _converted(value, get_args(kind)[0], where)
     if isinstance(kind, type) and issubclass(kind, tuple):
         hints = get_type_hints(kind)
         parts = _complete(value, list(hints), where)

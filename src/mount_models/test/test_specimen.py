@@ -13,6 +13,7 @@ from mount_models.specimen import (
     DEFAULT_SPECIMEN,
     SpecimenError,
     checked_specimen,
+    chosen_specimen,
     default_specimen,
     load_specimen,
     save_specimen,
@@ -56,7 +57,9 @@ def test_the_default_specimen_covers_the_gaps_of_new_and_worn_pads():
 
 
 def test_saving_and_loading_changes_nothing(tmp_path):
-    specimen = replace(DEFAULT, name='left', friction={'mu': 0.1 + 0.2}, provenance={'note': 'bench, May'})
+    specimen = replace(
+        DEFAULT, name='left', friction={'b_offset': 0.1 + 0.2}, provenance={'note': 'bench, May'}
+    )
     save_specimen(specimen, tmp_path / 'left.yaml')
     assert load_specimen(tmp_path / 'left.yaml') == specimen
 
@@ -107,8 +110,17 @@ def test_a_specimen_cannot_be_changed_by_accident():
         ('name', 7, 'name must be a text'),
         ('name', '', 'name must be a text'),
         ('friction', [1.0], 'friction must be a mapping'),
-        ('friction', {'mu': 'high'}, 'friction.mu must be a finite number'),
+        ('friction', {'a_p1': 'high'}, 'friction.a_p1 must be a finite number'),
         ('provenance', 'bench', 'provenance must be a mapping'),
+        ('schema_version', 1, r'schema_version \(1\) must be 2; .* calibrate again'),
+        ('schema_version', None, r'schema_version \(None\) must be 2'),
+        ('friction', {'mu': 0.3}, 'friction.mu is unknown; known are b_offset'),
+        ('friction', {'a_p2': -1.0}, r'friction.a_p2 \(-1 1\) must lie within'),
+        ('temperature', 20.0, 'temperature must be a mapping'),
+        ('temperature.reference_celsius', None, 'reference_celsius is missing'),
+        ('temperature.reference_celsius', 20.0, 'must differ from calibration_celsius'),
+        ('temperature.highest_celsius', 400.0, r'temperature.highest_celsius \(400 degC\) must lie within'),
+        ('temperature.reluctance_shift.coefficients', [-9.0, 9.0], 'must still fall with the gap'),
     ],
 )
 def test_a_doubtful_file_is_refused_in_a_sentence(tmp_path, path, value, sentence):
@@ -137,12 +149,62 @@ def test_a_doubtful_specimen_is_not_saved(tmp_path):
     assert not (tmp_path / 'bad.yaml').exists()
 
 
+def test_a_file_for_another_specimen_is_refused(tmp_path):
+    save_specimen(replace(DEFAULT, name='left'), tmp_path / 'left.yaml')
+    assert load_specimen(tmp_path / 'left.yaml', 'left').name == 'left'
+    with pytest.raises(SpecimenError, match="is for the specimen 'left', 'right' is asked for"):
+        load_specimen(tmp_path / 'left.yaml', 'right')
+
+
+def test_the_default_specimen_is_chosen_without_a_file():
+    assert chosen_specimen('') == chosen_specimen('', 'default') == DEFAULT
+    with pytest.raises(SpecimenError, match=r"specimen \('a/left.yaml'\) must be a name; .* parameters_file"):
+        chosen_specimen('', 'a/left.yaml')
+
+
+def test_a_specimen_without_compensation_can_be_saved_too(tmp_path):
+    plain = replace(DEFAULT, temperature=None)
+    save_specimen(plain, tmp_path / 'plain.yaml')
+    assert load_specimen(tmp_path / 'plain.yaml') == plain
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    (tmp_path / 'x.yaml').write_bytes(b'name: \xff\xfe')
+    with pytest.raises(SpecimenError, match='is no text'):
+        load_specimen(tmp_path / 'x.yaml')
+
+
+def test_a_refused_specimen_leaves_the_file_as_it_was(tmp_path):
+    file = tmp_path / 'left.yaml'
+    save_specimen(DEFAULT, file)
+    before = file.read_bytes()
+    with pytest.raises(SpecimenError):
+        save_specimen(replace(DEFAULT, turns_area=-1.0), file)
+    assert file.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ['left.yaml']
+
+
+def test_a_disk_that_fails_leaves_the_file_as_it_was(tmp_path, monkeypatch):
+    file = tmp_path / 'left.yaml'
+    save_specimen(DEFAULT, file)
+    before = file.read_bytes()
+
+    def fails(*_):
+        raise OSError('no space left')
+
+    monkeypatch.setattr('mount_models.specimen.os.replace', fails)
+    with pytest.raises(OSError, match='no space'):
+        save_specimen(replace(DEFAULT, name='right'), file)
+    assert file.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ['left.yaml']
+
+
 def test_a_whole_number_is_taken_as_a_number():
     assert specimen_from_mapping(changed('spring_stiffness', 140000)).spring_stiffness == 140000.0
 
 
 def test_friction_parameters_pass_through():
-    assert specimen_from_mapping(changed('friction', {'a': 1})).friction == {'a': 1.0}
+    assert specimen_from_mapping(changed('friction', {'a_p1': 1})).friction == {'a_p1': 1.0}
     assert checked_specimen(DEFAULT).friction == {}
 
 

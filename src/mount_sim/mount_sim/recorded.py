@@ -5,7 +5,6 @@ CSV: a header line and columns. MCAP: a topic and a field. Refused are a missing
 NaN, time that does not rise and gaps; each with the place where it was found.
 """
 
-import csv
 import math
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_sim.csv_table import RecordedInputError, read_table
+
+__all__ = ['RecordedInputError', 'RecordedSignal', 'load_signal', 'resample']
+
 LOWEST_RATE = 50.0  # Hz, chosen: 2.5 times the 20 Hz below which the engine moves on its mounts
 LONGEST_GAP = 0.125  # s: one period of the eigenfrequency cannot be interpolated
 _TIME_NAMES = ('t', 'time', 'timestamp', 'time_s', 't_s', 'seconds')
-
-
-class RecordedInputError(ValueError):
-    """A recorded signal cannot be used as excitation; the text says why and what would help."""
 
 
 @dataclass(frozen=True)
@@ -191,24 +190,12 @@ def _numbers(file: Path) -> NDArray[np.float64]:
 def _load_csv(
     path: Path, column: str, time_column: str
 ) -> tuple[str, NDArray[np.float64], NDArray[np.float64]]:
-    with path.open(newline='', encoding='utf-8-sig', errors='replace') as stream:
-        reader = csv.reader(stream)
-        numbered = [(reader.line_num, row) for row in reader if row and not row[0].startswith('#')]
-    lines, rows = [line for line, _ in numbered], [row for _, row in numbered]
-    if len(rows) < 2:
-        raise RecordedInputError(f'{path} holds {len(rows)} lines; needed are a header and the samples')
-    header = [name.strip() for name in rows[0]]
+    table = read_table(path)
+    header = list(table.header)
     value_place = _column_place(path, header, column, 'column')
     default_time = next((name for name in header if name.lower() in _TIME_NAMES), '0')
     time_place = _column_place(path, header, time_column or default_time, 'time column')
-    times, values = np.empty(len(rows) - 1), np.empty(len(rows) - 1)
-    for number, row in enumerate(rows[1:]):
-        try:
-            times[number], values[number] = float(row[time_place]), float(row[value_place])
-        except (ValueError, IndexError):
-            raise RecordedInputError(
-                f'{path}, line {lines[number + 1]}: {",".join(row)!r} is not a line of numbers'
-            ) from None
+    times, values = table.columns(time_place, value_place)
     return header[value_place], times, values
 
 

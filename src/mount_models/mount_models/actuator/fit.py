@@ -1,19 +1,25 @@
 """Fit the force law (Eqs 3, 4) to measured forces, as the authors did for Table 1."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import Polynomial
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
-from mount_models.actuator.law import TABLE_1, ForceLaw, checked_force, coefficients
-from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
+from mount_models.actuator.fit_start import starts
+from mount_models.actuator.law import ForceLaw, checked_force, coefficients
+from mount_models.actuator.law_check import check_force_law
+from mount_models.actuator.points import Orders, check_outliers, checked_points, far_points, gap_groups
 from mount_models.compiled import compiled
 
 FloatArray = npt.NDArray[np.float64]
+
+TABLE_1_ORDERS: Orders = (4, 4, 4, 2, 4)
+"""Numbers of coefficients of a1 .. a5 in Table 1; together 18."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,8 @@ class ForceLawFit:
 
     `relative_rms` and `worst` are relative to the measured force and count forces above 20 N; `rms_error` and
     `largest_error` (N) count all. `gaps` (m, shape (G,)) and `gap_rms` (N) tell where it fits less well.
+    `covariance` (P, P) is that of the coefficients a1 .. a5 as the law holds them, one after the other,
+    scaled by the scatter of the residuals; what the law cannot describe counts as scatter.
     """
 
     law: ForceLaw
@@ -31,85 +39,132 @@ class ForceLawFit:
     largest_error: float
     gaps: FloatArray
     gap_rms: FloatArray
+    covariance: FloatArray
+    points: int
 
 
 def fit_force_law(
     gap: npt.ArrayLike,
     current: npt.ArrayLike,
     force: npt.ArrayLike,
-    orders: tuple[int, int, int, int, int] = (4, 4, 4, 2, 4),
+    orders: Orders = TABLE_1_ORDERS,
+    force_floor: float = 2.0,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> ForceLawFit:
     """Return the law that fits `force` (N) measured at `gap` (m) and `current` (A), shapes that broadcast.
 
-    `orders` are the numbers of coefficients of a1 .. a5; as in Table 1 there are 18. The search starts from
-    Table 1 with weights 1 / (2 N + 0.02 F). The law is guarded to the measured gaps and currents, and refused
-    (`ForceLawRefusedError`) where within them it is not positive, rising with current and falling with gap.
+    `orders` are the numbers of coefficients of a1 .. a5; as in Table 1 there are 18. Weights are
+    1 / (`force_floor` + 0.02 F). The search starts from several places derived from the points (`fit_start`)
+    and keeps the best, within bounds. The law is guarded to the measured gaps and currents, and refused
+    (`ForceLawRefusedError`) where within them it is not positive, rising with current and falling with gap;
+    so are points that lie far from it, and points too few.
     """
-    gaps, currents, forces = _checked_points(gap, current, force, sum(orders))
+    gaps, currents, forces = checked_points(gap, current, force, orders)
     box = (float(gaps.min()), float(gaps.max()), float(currents.max()))
     centre, half = 0.5 * (box[1] + box[0]), 0.5 * (box[1] - box[0])
     domain = ((centre - half) * 1e6, (centre + half) * 1e6)
-    weight = 1.0 / (2.0 + 0.02 * np.abs(forces))
+    tolerance = force_floor + 0.02 * np.abs(forces)
 
     powers = _powers(gaps, orders, centre, half)
     belongs_to = np.repeat(np.arange(5), orders)
 
     def misfit(unknowns: FloatArray) -> FloatArray:
         law = _law_from(unknowns, orders, domain, box)
-        return np.asarray((checked_force(law, currents, gaps) - forces) * weight)
+        return np.asarray((checked_force(law, currents, gaps) - forces) / tolerance)
 
     def slopes(unknowns: FloatArray) -> FloatArray:
         law = _law_from(unknowns, orders, domain, box)
-        return np.asarray(
-            _coefficient_slopes(law, currents, gaps)[:, belongs_to] * powers * weight[:, np.newaxis]
-        )
+        of_coefficients = _coefficient_slopes(law, currents, gaps)[:, belongs_to]
+        return np.asarray(of_coefficients * powers / tolerance[:, np.newaxis])
 
-    found = least_squares(
-        misfit,
-        _start(orders, domain),
-        slopes,
-        x_scale='jac',
-        ftol=1e-15,
-        xtol=1e-15,
-        gtol=1e-15,
-        max_nfev=2000,
-    )
+    mapped = (gaps - centre) / half
+    candidates = starts(mapped, currents, forces, tolerance, orders, domain)
+    found = _best(misfit, slopes, candidates, _bounds(orders, currents, forces), forces, progress)
     law = _law_from(found.x, orders, domain, box)
+    check_outliers(gaps, currents, forces, checked_force(law, currents, gaps), tolerance)
     check_force_law(law)
-    return _judged(law, gaps, currents, forces)
+    return _judged(law, gaps, currents, forces, _covariance(found, orders, domain))
 
 
-def _checked_points(
-    gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayLike, unknowns: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    arrays = np.broadcast_arrays(np.asarray(gap, float), np.asarray(current, float), np.asarray(force, float))
-    gaps, currents, forces = (np.ravel(array) for array in arrays)
-    if forces.size < 3 * unknowns:
-        raise ForceLawRefusedError(
-            f'force measurements ({forces.size}) must be at least {3 * unknowns}, three per coefficient; '
-            f'measure more gaps or currents'
+_SHORT_SEARCH = 60  # steps, chosen: tells good starts from bad ones
+_LONG_SEARCH = 2000
+_PRECISION = 1e-15
+_WIDE = 50.0  # chosen: bounds only keep the search out of nonsense
+
+
+def _best(
+    misfit: Callable[[FloatArray], FloatArray],
+    slopes: Callable[[FloatArray], FloatArray],
+    candidates: list[FloatArray],
+    bounds: tuple[FloatArray, FloatArray],
+    forces: FloatArray,
+    progress: Callable[[int, int], None],
+) -> OptimizeResult:
+    """Return the end of the best of several searches; outliers pull the first ones little."""
+
+    def search(start: FloatArray, steps: int, scale: float, loss: str) -> OptimizeResult:
+        return least_squares(
+            misfit,
+            np.clip(start, *bounds),
+            slopes,
+            bounds=bounds,
+            x_scale='jac',
+            loss=loss,
+            f_scale=scale,
+            ftol=_PRECISION,
+            xtol=_PRECISION,
+            gtol=_PRECISION,
+            max_nfev=steps,
         )
-    if not (np.isfinite(gaps).all() and np.isfinite(currents).all() and np.isfinite(forces).all()):
-        raise ForceLawRefusedError('force measurements must be finite; leave out the points that failed')
-    if np.unique(gaps).size < 4 or currents.min() < 0.0:
-        raise ForceLawRefusedError(
-            f'force measurements must span at least 4 air gaps ({np.unique(gaps).size} given) and currents '
-            f'of 0 A or more (lowest {currents.min():.3f} A)'
-        )
-    return gaps, currents, forces
+
+    total = len(candidates) + 1
+    ends = []
+    for number, start in enumerate(candidates):
+        progress(number, total)
+        ends.append(search(start, _SHORT_SEARCH, 1.0, 'soft_l1'))
+    progress(len(candidates), total)
+    best = min(ends, key=lambda end: float(end.cost))
+    if far_points(forces, np.abs(misfit(best.x))).size:
+        progress(total, total)
+        return best  # with outliers a least-squares search would hide them
+    final = search(best.x, _LONG_SEARCH, 1.0, 'linear')
+    progress(total, total)
+    return final
 
 
-def _start(orders: tuple[int, ...], domain: tuple[float, float]) -> FloatArray:
-    """Return Table 1 as the search sees it: coefficients in the gap mapped to -1 .. 1, cut to `orders`."""
-    tables = (TABLE_1.a1, TABLE_1.a2, TABLE_1.a3, TABLE_1.a4, TABLE_1.a5)
-    parts = []
-    for table, order in zip(tables, orders, strict=True):
-        mapped = Polynomial(table).convert(domain=domain, window=(-1.0, 1.0), kind=Polynomial).coef
-        parts.append(np.pad(mapped, (0, max(0, order - mapped.size)))[:order])
-    return np.concatenate(parts)
+def _bounds(orders: Orders, currents: FloatArray, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return bounds of the coefficients in the mapped gap, by the size of forces and currents."""
+    force, current = float(forces.max()), float(currents.max())
+    scales = (force, force / current, 1.0 / current, current, force / current**2)
+    low, high = [], []
+    for order, scale in zip(orders, scales, strict=True):
+        reach = _WIDE * scale
+        low.append(np.full(order, -reach))
+        high.append(np.full(order, reach))
+    # the knee is a knee: a mean sharpness and a mean current of it above 0
+    low[2][0], low[3][0] = 0.1 / current, 0.01 * current
+    return np.concatenate(low), np.concatenate(high)
 
 
-def _powers(gap: FloatArray, orders: tuple[int, ...], centre: float, half: float) -> FloatArray:
+def _covariance(found: OptimizeResult, orders: Orders, domain: tuple[float, float]) -> FloatArray:
+    """Return the covariance of the plain coefficients from the slopes at the end of the search."""
+    jacobian = np.asarray(found.jac)
+    freedom = max(1, jacobian.shape[0] - jacobian.shape[1])
+    scatter = float(np.sum(np.asarray(found.fun) ** 2)) / freedom
+    columns = np.linalg.norm(jacobian, axis=0)
+    columns[columns == 0.0] = 1.0
+    scaled = np.linalg.pinv((jacobian / columns).T @ (jacobian / columns), hermitian=True)
+    mapped = scatter * scaled / np.outer(columns, columns)
+    blocks = np.zeros_like(mapped)
+    edges = np.concatenate([[0], np.cumsum(orders)])
+    for first, last in pairwise(edges):
+        for column in range(last - first):
+            unit = np.eye(last - first)[column]
+            blocks[first:last, first + column] = _plain(unit, domain, int(last - first))
+    return np.asarray(blocks @ mapped @ blocks.T)
+
+
+def _powers(gap: FloatArray, orders: Orders, centre: float, half: float) -> FloatArray:
     """Return the powers of the mapped gap that stand beside each unknown, shape (points, unknowns)."""
     mapped = (gap - centre) / half
     return np.concatenate([mapped[:, np.newaxis] ** np.arange(order) for order in orders], axis=1)
@@ -135,7 +190,7 @@ def _coefficient_slopes(law, current, gap):
 
 def _law_from(
     unknowns: FloatArray,
-    orders: tuple[int, ...],
+    orders: Orders,
     domain: tuple[float, float],
     box: tuple[float, float, float],
 ) -> ForceLaw:
@@ -152,17 +207,21 @@ def _plain(mapped: FloatArray, domain: tuple[float, float], order: int) -> tuple
     return tuple(float(value) for value in np.pad(plain, (0, order - plain.size)))
 
 
-def _judged(law: ForceLaw, gap: FloatArray, current: FloatArray, force: FloatArray) -> ForceLawFit:
+def _judged(
+    law: ForceLaw, gap: FloatArray, current: FloatArray, force: FloatArray, covariance: FloatArray
+) -> ForceLawFit:
     error = checked_force(law, current, gap) - force
     strong = force > 20.0
     relative = error[strong] / force[strong]
-    gaps = np.unique(gap)
+    groups = gap_groups(gap)
     return ForceLawFit(
         law=law,
         relative_rms=float(np.sqrt(np.mean(relative**2))) if strong.any() else np.nan,
         worst=float(np.abs(relative).max()) if strong.any() else np.nan,
         rms_error=float(np.sqrt(np.mean(error**2))),
         largest_error=float(np.abs(error).max()),
-        gaps=gaps,
-        gap_rms=np.array([np.sqrt(np.mean(error[gap == value] ** 2)) for value in gaps]),
+        gaps=np.array([gap[group].mean() for group in groups]),
+        gap_rms=np.array([np.sqrt(np.mean(error[group] ** 2)) for group in groups]),
+        covariance=covariance,
+        points=int(force.size),
     )

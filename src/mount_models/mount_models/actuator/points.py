@@ -1,0 +1,132 @@
+"""Measured (gap, current, force) points: are they enough, plausible, and without outliers?"""
+
+import numpy as np
+import numpy.typing as npt
+
+from mount_models.actuator.law_check import ForceLawRefusedError
+
+FloatArray = npt.NDArray[np.float64]
+Orders = tuple[int, int, int, int, int]
+
+
+def checked_points(
+    gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayLike, orders: Orders
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return gaps (m), currents (A) and forces (N) as rows of one length, or raise `ForceLawRefusedError`."""
+    if len(orders) != 5 or not all(1 <= order <= _HIGHEST_ORDER for order in orders):
+        raise ForceLawRefusedError(
+            f'orders ({", ".join(str(order) for order in orders)}) must be five numbers of coefficients '
+            f'within 1 .. {_HIGHEST_ORDER}, for a1 .. a5; 4, 4, 4, 2, 4 as in Table 1'
+        )
+    arrays = np.broadcast_arrays(np.asarray(gap, float), np.asarray(current, float), np.asarray(force, float))
+    gaps, currents, forces = (np.ravel(array) for array in arrays)
+    unknowns = sum(orders)
+    if forces.size < 3 * unknowns:
+        raise ForceLawRefusedError(
+            f'force measurements ({forces.size}) must be at least {3 * unknowns}, three per coefficient; '
+            f'measure more gaps or currents'
+        )
+    if not (np.isfinite(gaps).all() and np.isfinite(currents).all() and np.isfinite(forces).all()):
+        raise ForceLawRefusedError('force measurements must be finite; leave out the points that failed')
+    if currents.min() < 0.0 or currents.max() <= 0.0:
+        raise ForceLawRefusedError(
+            f'coil currents ({currents.min():.3f} .. {currents.max():.3f} A) must be 0 A or more, and some '
+            f'above it; is the polarity of the current sensor right?'
+        )
+    if forces.max() <= 0.0 or np.mean(forces) < 0.0:
+        raise ForceLawRefusedError(
+            f'forces ({forces.min():.1f} .. {forces.max():.1f} N) must be positive where the magnet pulls; '
+            f'is the sign of the load cell right?'
+        )
+    _check_span(gaps, currents, max(orders))
+    return gaps, currents, forces
+
+
+def gap_groups(gap: FloatArray) -> list[npt.NDArray[np.intp]]:
+    """Return the places of points that share a gap (m), by rising gap; measured gaps may scatter a little."""
+    order = np.argsort(gap, kind='stable')
+    span = float(gap[order[-1]] - gap[order[0]])
+    apart = np.diff(gap[order]) > max(_SAME_GAP, 0.01 * span)
+    return np.split(order, np.flatnonzero(apart) + 1)
+
+
+def check_outliers(
+    gap: FloatArray, current: FloatArray, force: FloatArray, expected: FloatArray, tolerance: FloatArray
+) -> None:
+    """Raise `ForceLawRefusedError` naming the points whose force lies far from the `expected` one (N).
+
+    Far is more than six standard deviations of points with like forces, and more than `tolerance` (N).
+    """
+    misfit = np.abs(force - expected) / tolerance
+    far = far_points(force, misfit)
+    if not far.size:
+        return
+    if far.size > _MANY * force.size:
+        raise ForceLawRefusedError(
+            f'{far.size} of {force.size} points lie far from any law of this form, the worst at '
+            f'{_point(gap, current, force, expected, far[np.argmax(misfit[far])])}: are gap, current '
+            'and force '
+            f'of the same actuator, in the units of their columns, and taken at the same time?'
+        )
+    worst = far[np.argsort(-misfit[far], kind='stable')][:_NAMED]
+    named = '; '.join(_point(gap, current, force, expected, place) for place in worst)
+    others = f' and {far.size - worst.size} more' if far.size > worst.size else ''
+    raise ForceLawRefusedError(
+        f'{far.size} of {force.size} points are outliers, off by more than {_FAR:.0f} standard deviations of '
+        f'points with like forces: {named}{others}: measure them again, or leave them out'
+    )
+
+
+def far_points(force: FloatArray, misfit: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the places of outliers among misfits in units of their tolerance, by `force` (N)."""
+    order = np.argsort(force, kind='stable')
+    parts = np.array_split(order, max(1, min(_PARTS, force.size // _FEWEST_IN_PART)))
+    middles = np.array([np.median(force[part]) for part in parts])
+    scatters = np.array([1.4826 * np.median(misfit[part]) for part in parts])
+    limit = np.maximum(_FAR * np.interp(force, middles, scatters), 1.0)
+    return np.flatnonzero(misfit > limit)
+
+
+_HIGHEST_ORDER = 7
+_PARTS, _FEWEST_IN_PART = 8, 25  # chosen: noise often grows with the force
+_SAME_GAP = 1e-6  # m, chosen
+_FEWEST_CURRENTS = 8  # chosen: five coefficients and some to spare
+_SMALLEST_SPAN = 0.1  # chosen: of the largest gap
+_FAR = 6.0  # standard deviations, chosen: of 10^5 good points none
+_MANY = 0.1  # chosen: that many are not outliers, something is wrong
+_NAMED = 5
+
+
+def _check_span(gaps: FloatArray, currents: FloatArray, highest_order: int) -> None:
+    groups = gap_groups(gaps)
+    span = float(gaps.max() - gaps.min())
+    steps = len(groups) if len(groups) > 1 else np.unique(gaps).size
+    needed = highest_order + 1
+    if steps < needed:
+        raise ForceLawRefusedError(
+            f'force measurements must span at least {needed} air gaps, one more than the longest polynomial '
+            f'has coefficients; {steps} given: measure more gaps, or choose lower orders'
+        )
+    if span < _SMALLEST_SPAN * gaps.max():
+        raise ForceLawRefusedError(
+            f'air gaps ({gaps.min() * 1e6:.1f} .. {gaps.max() * 1e6:.1f} um) must span at least '
+            f'{_SMALLEST_SPAN:.0%} of the largest; measure over the whole way of the halves'
+        )
+    for group in groups if len(groups) > 1 else []:
+        different = np.unique(np.round(currents[group], 4)).size
+        if different < _FEWEST_CURRENTS:
+            raise ForceLawRefusedError(
+                f'each air gap must be measured at {_FEWEST_CURRENTS} currents or more; at '
+                f'{gaps[group].mean() * 1e6:.1f} um there are {different}: measure more, or leave this '
+                'gap out'
+            )
+
+
+def _point(
+    gap: FloatArray, current: FloatArray, force: FloatArray, expected: FloatArray, place: int | np.intp
+) -> str:
+    return (
+        f'{gap[place] * 1e6:.1f} um, {current[place]:.3f} A: {force[place]:.1f} N, where '
+        f'{expected[place]:.1f} N '
+        f'would fit'
+    )

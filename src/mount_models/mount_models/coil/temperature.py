@@ -1,0 +1,163 @@
+"""What the coil's temperature does to the gap curves, and how a measurement is carried back to them.
+
+A warmer core conducts less, so the ripple reaches more of it: the inductance rises, and a gap read from
+it would be too small. The calibration tells by how much at one other temperature; in between the shift goes
+with the square root of the conductivity, as the depth of the skin does (derived).
+"""
+
+import math
+from collections.abc import Callable
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from mount_models.coil.gap import GapCurves, OutsideCurveError, ScaledPolynomial, evaluate
+from mount_models.quantity import Quantity
+
+CONDUCTIVITY_COEFFICIENT = 0.0043
+"""Relative rise of the core's resistivity per kelvin, 1/K (chosen: 8 % less conductivity after 20 K)."""
+
+
+class TemperatureCompensation(NamedTuple):
+    """Shifts of both gap curves from `calibration_celsius` to `reference_celsius`, over the gap (m).
+
+    `reluctance_shift` is that of 1 / L_0.2 (1/H), `crossing_shift` that of i_20 (A). Used within
+    `lowest_celsius` .. `highest_celsius`.
+    """
+
+    calibration_celsius: Annotated[
+        float, Quantity('degC', 'coil temperature at which the gap curves hold', -60.0, 250.0)
+    ]
+    reference_celsius: Annotated[
+        float, Quantity('degC', 'coil temperature at which the shifts hold', -60.0, 250.0)
+    ]
+    lowest_celsius: Annotated[float, Quantity('degC', 'lowest coil temperature compensated', -60.0, 250.0)]
+    highest_celsius: Annotated[float, Quantity('degC', 'highest coil temperature compensated', -60.0, 250.0)]
+    conductivity_coefficient: Annotated[
+        float, Quantity('1/K', 'rise of the resistivity of the core per kelvin', 0.0, 0.02)
+    ]
+    reluctance_shift: ScaledPolynomial
+    crossing_shift: ScaledPolynomial
+
+
+class CompensationError(ValueError):
+    """A temperature compensation makes no sense; the text says why and the remedy."""
+
+
+def temperature_share(compensation: TemperatureCompensation, celsius: float) -> float:
+    """Return which share of the shifts holds at a coil temperature: 0 at calibration, 1 at reference."""
+    there = _skin_change(compensation, celsius)
+    return there / _skin_change(compensation, compensation.reference_celsius)
+
+
+def inductance_at_calibration(
+    compensation: TemperatureCompensation, curves: GapCurves, inductance: float, celsius: float
+) -> float:
+    """Return what the inductance (H) at the rest current would be at the temperature of the curves.
+
+    Raises `OutsideCurveError` for a temperature that is not compensated.
+    """
+    share = _checked_share(compensation, celsius)
+    if share == 0.0:
+        return inductance
+
+    def reluctance(gap: float) -> float:
+        at_gap = 1.0 / float(evaluate(curves.inductance_of_gap, gap))
+        return at_gap + share * _shift(compensation.reluctance_shift, gap)
+
+    gap = _gap_at(reluctance, 1.0 / inductance, curves.inductance_of_gap)
+    return 1.0 / (1.0 / inductance - share * _shift(compensation.reluctance_shift, gap))
+
+
+def crossing_at_calibration(
+    compensation: TemperatureCompensation, curves: GapCurves, current: float, celsius: float
+) -> float:
+    """Return what the crossing current (A) would be at the temperature of the curves.
+
+    Raises `OutsideCurveError` for a temperature that is not compensated.
+    """
+    share = _checked_share(compensation, celsius)
+    if share == 0.0:
+        return current
+
+    def crossing(gap: float) -> float:
+        at_gap = float(evaluate(curves.crossing_current_of_gap, gap))
+        return at_gap + share * _shift(compensation.crossing_shift, gap)
+
+    gap = _gap_at(crossing, current, curves.crossing_current_of_gap)
+    return current - share * _shift(compensation.crossing_shift, gap)
+
+
+def check_compensation(compensation: TemperatureCompensation, curves: GapCurves) -> None:
+    """Raise `CompensationError` unless temperatures are in order and the curves stay monotone with them."""
+    c = compensation
+    if not c.lowest_celsius <= c.calibration_celsius <= c.highest_celsius:
+        raise CompensationError(
+            f'calibration_celsius ({c.calibration_celsius:g} degC) must lie within lowest_celsius .. '
+            f'highest_celsius ({c.lowest_celsius:g} .. {c.highest_celsius:g} degC); correct the range'
+        )
+    if abs(c.reference_celsius - c.calibration_celsius) < _LEAST_DIFFERENCE:
+        raise CompensationError(
+            f'reference_celsius ({c.reference_celsius:g} degC) must differ from calibration_celsius '
+            f'({c.calibration_celsius:g} degC) by {_LEAST_DIFFERENCE:g} K or more; record warmer or colder'
+        )
+    for name in ('reluctance_shift', 'crossing_shift'):
+        shift = getattr(c, name)
+        if not (shift.low < shift.high and shift.scale > 0.0):
+            raise CompensationError(
+                f'{name} must have a positive scale ({shift.scale:g}) and a range in rising order '
+                f'({shift.low:g} .. {shift.high:g}); calibrate again'
+            )
+    if not 1.0 + c.conductivity_coefficient * (c.lowest_celsius - c.calibration_celsius) > 0.1:
+        raise CompensationError(
+            f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a '
+            'resistivity '
+            f'at {c.lowest_celsius:g} degC; lower it, or raise lowest_celsius'
+        )
+    curve = curves.inductance_of_gap
+    gaps = np.linspace(curve.low, curve.high, 61)
+    shifts = np.array([_shift(c.reluctance_shift, gap) for gap in gaps])
+    for celsius in (c.lowest_celsius, c.highest_celsius):
+        warm = 1.0 / evaluate(curve, gaps) + temperature_share(c, celsius) * shifts
+        if not (np.all(warm > 0.0) and np.all(np.diff(warm) > 0.0)):
+            raise CompensationError(
+                f'at {celsius:g} degC the compensated inductance must still fall with the gap; it does not: '
+                f'narrow lowest_celsius .. highest_celsius, or calibrate again'
+            )
+
+
+_LEAST_DIFFERENCE = 10.0  # K, chosen: less tells too little
+_HALVINGS = 60
+
+
+def _skin_change(compensation: TemperatureCompensation, celsius: float) -> float:
+    """Return the relative change of the root of the conductivity from the temperature of calibration on."""
+    warmer = celsius - compensation.calibration_celsius
+    coefficient = max(compensation.conductivity_coefficient, 1e-6)  # in the limit a straight line
+    return 1.0 / math.sqrt(1.0 + coefficient * warmer) - 1.0
+
+
+def _checked_share(compensation: TemperatureCompensation, celsius: float) -> float:
+    if not compensation.lowest_celsius <= celsius <= compensation.highest_celsius:
+        raise OutsideCurveError(
+            f'coil temperature ({celsius:.1f} degC) must lie within {compensation.lowest_celsius:.1f} .. '
+            f'{compensation.highest_celsius:.1f} degC, where the gap curves are compensated; let the coil '
+            f'cool down or warm up, or calibrate over a wider range'
+        )
+    return temperature_share(compensation, celsius)
+
+
+def _shift(shift: ScaledPolynomial, gap: float) -> float:
+    return float(evaluate(shift, min(max(gap, shift.low), shift.high)))
+
+
+def _gap_at(rising: Callable[[float], float], value: float, curve: ScaledPolynomial) -> float:
+    """Return the gap (m) of the curve at which a `rising` function reaches `value`, or the nearer end."""
+    low, high = curve.low, curve.high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if rising(middle) < value:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)

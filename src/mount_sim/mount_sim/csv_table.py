@@ -1,0 +1,48 @@
+"""A CSV file as a header and columns of numbers; whatever is no number is refused with its line."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class RecordedInputError(ValueError):
+    """A recorded signal cannot be used as excitation; the text says why and what would help."""
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """Names of the columns, and the rows below them as text, each with its line number in the file."""
+
+    path: Path
+    header: tuple[str, ...]
+    lines: tuple[int, ...]
+    rows: tuple[list[str], ...]
+
+    def columns(self, *places: int) -> NDArray[np.float64]:
+        """Return the chosen columns as numbers, shape (columns, rows)."""
+        values = np.empty((len(places), len(self.rows)))
+        for number, row in enumerate(self.rows):
+            try:
+                for column, place in enumerate(places):
+                    values[column, number] = float(row[place])
+            except (ValueError, IndexError):
+                raise RecordedInputError(
+                    f'{self.path}, line {self.lines[number]}: {",".join(row)!r} is not a line of numbers'
+                ) from None
+        return values
+
+
+def read_table(path: Path) -> CsvTable:
+    """Return the table in `path`; lines that begin with # are comments. Raises `RecordedInputError`."""
+    with path.open(newline='', encoding='utf-8-sig', errors='replace') as stream:
+        reader = csv.reader(stream)
+        numbered = [(reader.line_num, row) for row in reader if row and not row[0].startswith('#')]
+    if len(numbered) < 2:
+        raise RecordedInputError(f'{path} holds {len(numbered)} lines; needed are a header and the samples')
+    header = tuple(name.strip() for name in numbered[0][1])
+    return CsvTable(
+        path, header, tuple(line for line, _ in numbered[1:]), tuple(row for _, row in numbered[1:])
+    )

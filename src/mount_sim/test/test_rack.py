@@ -1,0 +1,73 @@
+"""The simulated rack: what it records is the actuator's, with noise of the stated size."""
+
+import numpy as np
+import pytest
+
+from mount_models.actuator.reluctance import force
+from mount_sim.csv_table import read_table
+from mount_sim.rack import (
+    GAPS,
+    Rack,
+    RackError,
+    drawn_rack,
+    measure_force,
+    record_ripple,
+    true_inductance,
+    write_force,
+    write_ripple,
+)
+
+
+def test_forces_are_those_of_the_actuator_with_noise_of_the_stated_size():
+    rack = Rack(noise=0.01, seed=3)
+    columns = measure_force(rack)
+    points = zip(columns['current_a'], columns['gap_um'], strict=True)
+    truth = np.array([force(rack.actuator, current, 1e-6 * gap) for current, gap in points])
+    error = columns['force_n'] / truth - 1.0
+    assert np.std(error) == pytest.approx(0.01, rel=0.1)
+    assert abs(np.mean(error)) < 0.001
+
+
+def test_the_same_seed_gives_the_same_recording_and_another_does_not():
+    one, two, other = (record_ripple(Rack(seed=seed), 349e-6, duration=0.3) for seed in (1, 1, 2))
+    assert (one['current_rate_a_per_s'] == two['current_rate_a_per_s']).all()
+    assert not (one['current_rate_a_per_s'] == other['current_rate_a_per_s']).any()
+
+
+def test_ripple_leads_to_the_inductance_of_the_coil():
+    rack = Rack(noise=0.01)
+    columns = record_ripple(rack, 349e-6)
+    area = rack.actuator.turns * rack.actuator.gap_area
+    held = columns['current_a'] == 0.2
+    inductance = (area * columns['flux_rate_t_per_s'] / columns['current_rate_a_per_s'])[held]
+    assert np.mean(inductance) == pytest.approx(48.04e-3, rel=0.002)
+    assert np.std(inductance) / np.mean(inductance) == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_warmer_core_lets_more_flux_change_so_the_inductance_rises():
+    at_rest = [true_inductance(Rack(), 0.2, 349e-6, celsius) for celsius in (-20.0, 20.0, 40.0, 80.0)]
+    assert np.all(np.diff(at_rest) > 0.0)
+    # 1.08 mH by the core's conductivity alone (-8 %); the warmer copper takes a little away
+    assert at_rest[2] - at_rest[1] == pytest.approx(1.05e-3, abs=0.04e-3)
+
+
+def test_a_current_that_the_bridge_cannot_hold_is_refused():
+    with pytest.raises(
+        RackError, match=r'the bridge cannot hold .* at 120 degC and 14 V; lower peak_current'
+    ):
+        record_ripple(Rack(), 349e-6, 120.0, peak_current=4.5)
+
+
+def test_drawn_racks_differ_and_come_again_by_their_seed():
+    assert drawn_rack(4) == drawn_rack(4)
+    assert drawn_rack(4).actuator != drawn_rack(5).actuator
+
+
+def test_files_hold_what_was_measured(tmp_path):
+    rack = Rack(seed=2)
+    table = read_table(write_force(rack, tmp_path / 'force.csv'))
+    assert table.header == ('gap_um', 'current_a', 'force_n')
+    assert table.columns(2)[0] == pytest.approx(measure_force(rack)['force_n'], rel=1e-8)
+    files = write_ripple(rack, tmp_path / 'ripple', GAPS[:2], 60.0)
+    assert [file.name for file in files] == ['ripple_270um_+60degC.csv', 'ripple_290um_+60degC.csv']
+    assert read_table(files[0]).columns(1)[0] == pytest.approx(270.0)
