@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from mount_bringup.graph import GraphNode, GraphSettings
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 _INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that was asked to end is terminated
 _TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
+_RECORDER_NICENESS = -10  # chosen: behind the loop, before the rest of the machine; what it misses is gone
 
 
 class NodeProcess:
@@ -42,11 +43,15 @@ class NodeProcess:
                 stderr=subprocess.STDOUT,
                 env={**os.environ, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'},
                 start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
-                preexec_fn=partial(_prepare_child, self._priority(settings)),
+                preexec_fn=partial(_prepare_child, self._scheduling(settings)),
             )
 
-    def _priority(self, settings: GraphSettings) -> int:
-        return settings.priority if any(node in settings.urgent for node in self.nodes) else 0
+    def _scheduling(self, settings: GraphSettings) -> Callable[[], None]:
+        if not settings.priority:
+            return lambda: None
+        if any(node in settings.urgent for node in self.nodes):
+            return partial(os.sched_setscheduler, 0, os.SCHED_FIFO, os.sched_param(settings.priority))
+        return partial(os.setpriority, os.PRIO_PROCESS, 0, _RECORDER_NICENESS)
 
     @property
     def exit_code(self) -> int | None:
@@ -118,12 +123,11 @@ def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
     return yaml.safe_dump(tables, sort_keys=True)
 
 
-def _prepare_child(priority: int) -> None:
+def _prepare_child(schedule: Callable[[], None]) -> None:
     # Without its supervisor a node must not go on driving the coil.
     ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGINT)
-    if priority:
-        # Before the middleware makes its threads, so that those that receive inherit it; those that send
-        # again are taken out of it by `mount_ros.scheduling`. Where it is not permitted the node runs as any
-        # other process.
-        with contextlib.suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    # Before the middleware makes its threads, so that those that receive inherit it; those that send
+    # again are taken out of real time by `mount_ros.scheduling`. Where it is not permitted the node runs as
+    # any other process.
+    with contextlib.suppress(PermissionError):
+        schedule()

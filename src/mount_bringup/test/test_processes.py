@@ -1,0 +1,34 @@
+"""What the processes of the graph are given besides their parameters."""
+
+import os
+
+import pytest
+
+from mount_bringup import processes
+from mount_bringup.graph import CONTROL, RECORDER, URGENT, GraphSettings
+
+TELL = 'import os; print(os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0))'
+
+
+def may_be_urgent():
+    return os.geteuid() == 0  # others need CAP_SYS_NICE or limits that the test cannot know
+
+
+@pytest.mark.skipif(not may_be_urgent(), reason='only root may always ask for real time')
+@pytest.mark.parametrize(
+    ('node', 'priority', 'told'),
+    [
+        (CONTROL, 10, f'{os.SCHED_FIFO} {os.getpriority(os.PRIO_PROCESS, 0)}'),
+        (CONTROL, 0, f'{os.SCHED_OTHER} {os.getpriority(os.PRIO_PROCESS, 0)}'),
+        (RECORDER, 10, f'{os.SCHED_OTHER} -10'),
+        (RECORDER, 0, f'{os.SCHED_OTHER} {os.getpriority(os.PRIO_PROCESS, 0)}'),
+    ],
+)
+def test_the_loop_runs_in_real_time_and_the_recorder_before_the_rest(
+    tmp_path, monkeypatch, node, priority, told
+):
+    monkeypatch.setattr(processes, '_program', lambda nodes: TELL)
+    settings = GraphSettings(urgent=URGENT, priority=priority)
+    process = processes.NodeProcess([node], settings, tmp_path)
+    assert process.wait() == 0
+    assert process.log_file.read_text().strip() == told
