@@ -1,5 +1,7 @@
 """The `engine-mount` command."""
 
+import sys
+
 import typer
 from rich.console import Console
 
@@ -11,12 +13,14 @@ from mount_bringup import (
     cut_command,
     drive_command,
     experiment_command,
+    identify_command,
     merge_command,
     record_command,
     recover_command,
     replay_command,
     report_command,
 )
+from mount_bringup.identify_arguments import with_repeated_options
 from mount_ros.environment import prepare_environment
 
 app = typer.Typer(
@@ -67,6 +71,7 @@ app.command(name='report', epilog=report_command.EPILOG)(report_command.report)
 app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)
 app.command(name='merge', epilog=merge_command.EPILOG)(merge_command.merge)
 app.command(name='experiment', epilog=experiment_command.EPILOG)(experiment_command.experiment)
+app.add_typer(identify_command.app, name='identify')
 app.command(name='accept', epilog=accept_command.EPILOG)(accept_command.accept)
 app.add_typer(calibrate_command.app)
 
@@ -78,7 +83,7 @@ def main(arguments: list[str] | None = None) -> None:
     from mount_ros.leaving import end_process
 
     try:
-        app(args=arguments)
+        app(args=with_repeated_options(sys.argv[1:] if arguments is None else arguments))
     except SystemExit as end:
         if not isinstance(end.code, int):
             raise

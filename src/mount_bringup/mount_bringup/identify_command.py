@@ -1,0 +1,176 @@
+"""`engine-mount identify`: from recordings of a rack to parameters."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from mount_bringup.identify_friction import Identification, IdentifyOrder
+
+app = typer.Typer(
+    name='identify',
+    help='Identify parameters from recordings of a rack.',
+    no_args_is_help=True,
+    rich_markup_mode='markdown',
+)
+
+EPILOG = """Examples:
+
+`engine-mount identify friction --train ramp.csv saw_40.csv saw_120.csv --held-out saw_80.csv --out pads.yaml`
+
+`engine-mount identify friction --file a.json b.json c.json` - trained on each, tried on each other one
+
+`engine-mount identify friction --train rig.csv --channel friction_force=cell:kN --step ladder`
+"""
+
+
+@app.callback()
+def _top() -> None:
+    """Keep sub-commands even while there is only one."""
+
+
+@app.command(epilog=EPILOG)
+def friction(
+    train: Annotated[
+        list[Path] | None, typer.Option(metavar='FILE...', help='recordings to fit: CSV, MCAP or JSON')
+    ] = None,
+    held_out: Annotated[
+        list[Path] | None, typer.Option(metavar='FILE...', help='recordings that no fit sees, to judge by')
+    ] = None,
+    file: Annotated[
+        list[Path] | None, typer.Option(metavar='FILE...', help='train on each, predict each other one')
+    ] = None,
+    step: Annotated[str, typer.Option(help='auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
+    channel: Annotated[
+        list[str] | None,
+        typer.Option(metavar='NAME=COLUMN:UNIT', help='CSV column or MCAP topic.field of a quantity; repeatable'),
+    ] = None,
+    clamp: Annotated[
+        str,
+        typer.Option(help="JSON: normal force from the band's pull while sliding, at rest, or none"),
+    ] = 'sliding',
+    seed: Annotated[int, typer.Option(help='seed of the starts of the searches')] = 0,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar='FILE', help='write the parameters (YAML)')] = None,
+    figure: Annotated[Path | None, typer.Option(metavar='FILE', help='draw every step (PNG)')] = None,
+) -> None:
+    """Identify the friction contact, and which law is worth its parameters.
+
+    Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
+    the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
+    """
+    import yaml
+    from rich.progress import Progress
+
+    from mount_bringup.friction_files import parsed_channels
+    from mount_bringup.identify_friction import figures, identify, parameter_file
+    from mount_bringup.summary import write_json
+
+    console = Console()
+    order = IdentifyOrder(
+        train or [], held_out or [], file or [], step, clamp, parsed_channels(channel or []), seed
+    )
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task('reading', total=1.0)
+        found = identify(order, lambda law, share: progress.update(task, description=law, completed=share))
+    parameters = parameter_file(found) if out is not None else {}
+    _print(found, console)
+    if figure is not None:
+        from mount_bringup.identify_figure import draw_identification
+
+        draw_identification(found, figure)
+        console.print(f'figure {figure}', highlight=False)
+    if json_file is not None:
+        write_json(figures(found), json_file)
+    if out is not None:
+        out.write_text(yaml.safe_dump(parameters, sort_keys=False, width=110), encoding='utf-8')
+        console.print(f'parameters {out}', highlight=False)
+
+
+def _print(found: Identification, console: Console) -> None:
+    from mount_bringup.identify_friction import figures
+
+    for note in found.notes:
+        console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True, highlight=False)
+    result = figures(found)
+    if found.ramps:
+        console.print(_step_1(result['step_1']))
+    if found.coefficients is not None:
+        fit = found.fits[0][0]
+        console.print(
+            f'steps 2, 3: {len(found.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} (a) and '
+            f'{fit.b_rms_mm:.2f} 1/mm (b) rms',
+            soft_wrap=True,
+            highlight=False,
+        )
+        for variant, values in result['variants'].items():
+            if values['held_out_error'] is not None:
+                console.print(f'  form of b: {variant}: {_percent(values["held_out_error"])} held out', highlight=False)
+    for each in result.get('validation', []):
+        console.print(
+            f'held out {each["recording"]}: full model {_percent(each["full_error"])}, simplified '
+            f'{_percent(each["simplified_error"])}; macroslip {_percent(each["full_macroslip_error"])}, '
+            f'{_percent(each["simplified_macroslip_error"])}',
+            soft_wrap=True,
+            highlight=False,
+        )
+    if 'pairs' in result:
+        console.print(_pairs(result['pairs']))
+    if 'ladder' in result:
+        console.print(_ladder(result['ladder']))
+        console.print(f'best: {result["best"]}', highlight=False)
+
+
+def _step_1(ramps: list[dict]) -> Table:  # type: ignore[type-arg]
+    table = Table('step 1', 'c_Re (N/m)', 'c_R (N/m)', 'd_R (N s/m)', 'p (N/m)', 'T (s)')
+    for each in ramps:
+        contact, spread, printed = each['contact'], each['deviation'], each['printed']
+        table.add_row(
+            each['recording'],
+            *(
+                f'{contact[name]:.4g} ± {spread[name]:.1g}'
+                for name in ('contact_stiffness', 'tangential_stiffness', 'tangential_damping')
+            ),
+            f'{each["machine_stiffness"]:.4g}',
+            f'{each["time_constant"]:.4f}',
+        )
+        with_p, without = (printed[f'tangential_stiffness_c_xi_{which}'] for which in ('with_p', 'without_p'))
+        table.add_row(
+            '  Eqs (10), (11) as printed',
+            _printed(printed['contact_stiffness']),
+            f'{_printed(with_p)}, {_printed(without)} (c_xi with, without p)',
+            _printed(printed['tangential_damping']),
+            style='dim',
+        )
+    return table
+
+
+def _printed(entry: dict[str, float]) -> str:
+    return f'{entry["value"]:.4g} ({100 * entry["error"]:+.1f} %)'
+
+
+def _pairs(pairs: list[dict]) -> Table:  # type: ignore[type-arg]
+    table = Table('held-out error', *(name for name in pairs[0]['ladder']))
+    for pair in pairs:
+        table.add_row(
+            f'{pair["train"]} -> {pair["held_out"]}',
+            *(_percent(entry['held_out_error']) for entry in pair['ladder'].values()),
+        )
+    return table
+
+
+def _ladder(ladder: dict[str, dict]) -> Table:  # type: ignore[type-arg]
+    table = Table('law', 'held out', 'training', 'parameters')
+    for name, entry in ladder.items():
+        first = next(iter(entry['parameters'].values()))
+        count = len(first) if isinstance(first, dict) else len(entry['parameters'])
+        table.add_row(name, _percent(entry['held_out_error']), _percent(entry['train_error']), str(count))
+    return table
+
+
+def _percent(value: float | None) -> str:
+    return '-' if value is None else f'{100 * value:.1f} %'
