@@ -45,18 +45,24 @@ class Channel:
     factor: float | None = None
 
 
-def read_recording(path: Path, channels: dict[str, Channel] | None = None, clamp: str = 'sliding') -> FrictionRecording:
+def read_recording(
+    path: Path, channels: dict[str, Channel] | None = None, clamp: str = 'sliding'
+) -> FrictionRecording:
     """Return the checked recording in `path`; `channels` name columns or topics, `clamp` see `_rig`."""
     chosen = channels or {}
     if not path.exists():
-        raise IdentificationError(f'{path} does not exist; give a CSV, JSON or MCAP file or the folder of a recording')
+        raise IdentificationError(
+            f'{path} does not exist; give a CSV, JSON or MCAP file or the folder of a recording'
+        )
     if path.is_dir() or path.suffix == '.mcap':
         return _mcap(path, chosen)
     if path.suffix.lower() == '.json':
         return _rig(path, clamp)
     if path.suffix.lower() in ('.csv', '.txt'):
         return _csv(path, chosen)
-    raise IdentificationError(f'{path.name}: files of type {path.suffix or "(none)"} are not read; use .csv, .json, .mcap')
+    raise IdentificationError(
+        f'{path.name}: files of type {path.suffix or "(none)"} are not read; use .csv, .json, .mcap'
+    )
 
 
 def parsed_channels(texts: list[str]) -> dict[str, Channel]:
@@ -71,7 +77,9 @@ def parsed_channels(texts: list[str]) -> dict[str, Channel]:
                 f'{", ".join((*_NEEDED, _DESIRED, "time"))}'
             )
         if unit and unit.lower() not in UNITS:
-            raise IdentificationError(f'--channel {text}: unit {unit!r} is unknown; known are {", ".join(UNITS)}')
+            raise IdentificationError(
+                f'--channel {text}: unit {unit!r} is unknown; known are {", ".join(UNITS)}'
+            )
         found[name] = Channel(source, UNITS[unit.lower()] if unit else None)
     return found
 
@@ -180,7 +188,9 @@ def _rig(path: Path, clamp: str) -> FrictionRecording:
         notes.append('force zero as recorded: there is no rest at the beginning')
     pulls = UNITS['lb'] * table[:, -2:]
     normal = _rig_normal_force(path.name, clamp, np.gradient(displacement, time), pulls, quiet)
-    notes.append(f'normal force ({clamp}): {normal[0]:.0f} N to the positive, {normal[1]:.0f} N to the negative side')
+    notes.append(
+        f'normal force ({clamp}): {normal[0]:.0f} N to the positive, {normal[1]:.0f} N to the negative side'
+    )
     return checked_recording(
         path.stem, time, displacement, force, np.tile(normal, (time.size, 1)), notes=tuple(notes)
     )
@@ -201,11 +211,15 @@ def _rig_table(path: Path) -> FloatArray:
         )
     if not np.isfinite(table).all():
         row = int(np.argmax(~np.isfinite(table).all(axis=1)))
-        raise IdentificationError(f'{path.name}: row {row} holds a value that is no number; repair or cut it there')
+        raise IdentificationError(
+            f'{path.name}: row {row} holds a value that is no number; repair or cut it there'
+        )
     return table
 
 
-def _rig_normal_force(name: str, clamp: str, velocity: FloatArray, pulls: FloatArray, quiet: FloatArray) -> FloatArray:
+def _rig_normal_force(
+    name: str, clamp: str, velocity: FloatArray, pulls: FloatArray, quiet: FloatArray
+) -> FloatArray:
     if clamp not in CLAMPS:
         raise IdentificationError(f'clamp {clamp!r} must be one of {", ".join(CLAMPS)}')
     if clamp == 'none':
@@ -218,7 +232,9 @@ def _rig_normal_force(name: str, clamp: str, velocity: FloatArray, pulls: FloatA
     for sign in (1.0, -1.0):
         moving = sign * velocity > 0.05 * np.abs(velocity).max()
         if not moving.any():
-            raise IdentificationError(f'{name} moves to one side only (0 samples to the other); both are needed')
+            raise IdentificationError(
+                f'{name} moves to one side only (0 samples to the other); both are needed'
+            )
         taut = pulls[moving, int(np.argmax(np.median(pulls[moving], axis=0)))]
         holding = taut[taut > 0.5 * np.percentile(taut, 95)]
         level = float(np.median(holding)) if holding.size else 0.0

@@ -45,7 +45,9 @@ def friction(
     step: Annotated[str, typer.Option(help='auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     channel: Annotated[
         list[str] | None,
-        typer.Option(metavar='NAME=COLUMN:UNIT', help='CSV column or MCAP topic.field of a quantity; repeatable'),
+        typer.Option(
+            metavar='NAME=COLUMN:UNIT', help='CSV column or MCAP topic.field of a quantity; repeatable'
+        ),
     ] = None,
     clamp: Annotated[
         str,
@@ -109,7 +111,9 @@ def _print(found: Identification, console: Console) -> None:
         )
         for variant, values in result['variants'].items():
             if values['held_out_error'] is not None:
-                console.print(f'  form of b: {variant}: {_percent(values["held_out_error"])} held out', highlight=False)
+                console.print(
+                    f'  form of b: {variant}: {_percent(values["held_out_error"])} held out', highlight=False
+                )
     for each in result.get('validation', []):
         console.print(
             f'held out {each["recording"]}: full model {_percent(each["full_error"])}, simplified '
@@ -154,10 +158,12 @@ def _printed(entry: dict[str, float]) -> str:
 
 
 def _pairs(pairs: list[dict]) -> Table:  # type: ignore[type-arg]
+    names = list(dict.fromkeys(pair['train'] for pair in pairs))
     table = Table('held-out error', *(name for name in pairs[0]['ladder']))
+    table.caption = ', '.join(f'{number}: {name}' for number, name in enumerate(names, 1))
     for pair in pairs:
         table.add_row(
-            f'{pair["train"]} -> {pair["held_out"]}',
+            f'{names.index(pair["train"]) + 1} -> {names.index(pair["held_out"]) + 1}',
             *(_percent(entry['held_out_error']) for entry in pair['ladder'].values()),
         )
     return table

@@ -79,7 +79,10 @@ def identify(order: IdentifyOrder, progress: Progress | None = None) -> Identifi
     if order.pairs:
         _try_pairs(found, order, progress)
         return found
-    train, held_out = _read(found, order.train, 'train', order), _read(found, order.held_out, 'held out', order)
+    train, held_out = (
+        _read(found, order.train, 'train', order),
+        _read(found, order.held_out, 'held out', order),
+    )
     ramps = [each for each, kind in train if kind == RAMP]
     moving = [each for each, kind in train if kind != RAMP]
     sawtooths = [each for each, kind in train if kind == SAWTOOTH]
@@ -139,7 +142,8 @@ def figures(found: Identification) -> dict[str, Any]:
         result['best'] = best_rung(found.rungs).law.name
     if found.pairs:
         result['pairs'] = [
-            {'train': pair.train, 'held_out': pair.held_out, 'ladder': _ladder(pair.rungs)} for pair in found.pairs
+            {'train': pair.train, 'held_out': pair.held_out, 'ladder': _ladder(pair.rungs)}
+            for pair in found.pairs
         ]
         result['ladder'] = mean_ladder(found.pairs)
         result['best'] = min(result['ladder'], key=lambda name: result['ladder'][name]['held_out_error'])
@@ -194,11 +198,17 @@ def _check_order(order: IdentifyOrder) -> None:
     if order.step not in STEPS:
         raise IdentificationError(f'--step {order.step!r} must be one of {", ".join(STEPS)}')
     if order.pairs and (order.train or order.held_out):
-        raise IdentificationError('--file tries all pairs of its files; give it alone, or --train and --held-out')
+        raise IdentificationError(
+            '--file tries all pairs of its files; give it alone, or --train and --held-out'
+        )
     if order.pairs and len(order.pairs) < 2:
-        raise IdentificationError('--file names 1 recording; at least 2 are needed: one trains, another is held out')
+        raise IdentificationError(
+            '--file names 1 recording; at least 2 are needed: one trains, another is held out'
+        )
     if not order.pairs and not order.train:
-        raise IdentificationError('0 recordings to train with; give --train FILE..., or --file FILE... for all pairs')
+        raise IdentificationError(
+            '0 recordings to train with; give --train FILE..., or --file FILE... for all pairs'
+        )
     both = {each.resolve() for each in order.train} & {each.resolve() for each in order.held_out}
     if both:
         raise IdentificationError(
@@ -224,7 +234,9 @@ def _read(
 
 def _check_kind(name: str, kind: str, step: str) -> None:
     if kind != step and not (step == SAWTOOTH and kind == RAMP):
-        raise IdentificationError(f'{name} looks like {kind}, not like {step}; leave --step to auto, or choose another file')
+        raise IdentificationError(
+            f'{name} looks like {kind}, not like {step}; leave --step to auto, or choose another file'
+        )
 
 
 def _coefficients(found: Identification, sawtooths: Sequence[FrictionRecording]) -> None:
@@ -256,9 +268,12 @@ def _chosen(found: Identification) -> CoefficientFit:
 def _try_pairs(found: Identification, order: IdentifyOrder, progress: Progress | None) -> None:
     recordings = [each for each, kind in _read(found, order.pairs, 'both', order) if kind != RAMP]
     if len(recordings) < 2:
-        raise IdentificationError(f'{len(recordings)} of the recordings move to and fro; the ladder needs at least 2')
+        raise IdentificationError(
+            f'{len(recordings)} of the recordings move to and fro; the ladder needs at least 2'
+        )
     trained = {}
     for number, one in enumerate(recordings):
+
         def share(law: str, done: float, number: int = number, name: str = one.name) -> None:
             if progress is not None:
                 progress(f'{name}: {law}', done)

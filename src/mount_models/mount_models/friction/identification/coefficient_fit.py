@@ -25,7 +25,9 @@ FEWEST_SPEEDS = 4
 SPEED_SPREAD = 2.0
 _SAME_SPEED = 0.15  # of the speed: closer ones count as one
 _SAME_LOAD = 0.05
-_TYPICAL_A = 0.005  # error of a that the form of Eq (14) is allowed, chosen: noise alone would trust b of long strokes
+_TYPICAL_A = (
+    0.005  # error of a that the form of Eq (14) is allowed, chosen: noise alone would trust b of long strokes
+)
 _TYPICAL_B_MM = 0.3
 
 

@@ -14,7 +14,6 @@ _HELD = 0.4  # of the recording within a quarter of the range of its end
 _STRAIGHT = 0.015  # of a stroke: rms distance from a line; an arc of a sine has 0.05
 
 
-
 def recognised(recording: FrictionRecording) -> str:
     """Return 'ramp', 'sawtooth' or 'other motion'; a motion to one side only that is no ramp is refused."""
     x = smoothed_displacement(recording)

@@ -96,7 +96,9 @@ def fit_ladder(
 
 def best_rung(rungs: Sequence[Rung]) -> Rung:
     """Return the rung with the least held-out error; without any, with the least training error."""
-    return min(rungs, key=lambda each: each.train_error if math.isnan(each.held_out_error) else each.held_out_error)
+    return min(
+        rungs, key=lambda each: each.train_error if math.isnan(each.held_out_error) else each.held_out_error
+    )
 
 
 def law_error(law: FrictionLaw, values: FloatArray, recordings: Sequence[FrictionRecording]) -> float:

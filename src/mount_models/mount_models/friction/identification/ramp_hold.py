@@ -93,7 +93,9 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
         model = _response(values[:7], time)
         parts = [(model[0] + values[7] - x) / noise[0], (model[1] + values[8] - force) / noise[1]]
         # without x_d its zero has nothing to hold it
-        parts.append((model[2] + values[9] - desired) / noise[2] if desired is not None else values[9:] / scale[9])
+        parts.append(
+            (model[2] + values[9] - desired) / noise[2] if desired is not None else values[9:] / scale[9]
+        )
         return np.concatenate(parts)
 
     low = np.array([1e-3, 0.02, 1e-3, 1e-4, 1e-3, -np.inf, 1e-3, -1.0, -1.0, -1.0])
@@ -139,11 +141,19 @@ def mean_contact(fits: list[RampHoldFit]) -> FrictionContact:
 
 
 def ramp_response(
-    contact: FrictionContact, machine_stiffness: float, desired: float, start: float, ramp: float, time: FloatArray
+    contact: FrictionContact,
+    machine_stiffness: float,
+    desired: float,
+    start: float,
+    ramp: float,
+    time: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return (x, F, x_d) of a ramp of x_d to `desired` (m) in `ramp` s from `start` s, in closed form."""
-    c_re, c_r, d_r, p = contact.contact_stiffness, contact.tangential_stiffness, contact.tangential_damping, (
-        machine_stiffness
+    c_re, c_r, d_r, p = (
+        contact.contact_stiffness,
+        contact.tangential_stiffness,
+        contact.tangential_damping,
+        (machine_stiffness),
     )
     c_xi = c_re * c_r / (c_re + c_r)
     lag = d_r / (c_r + p * c_re / (p + c_re))

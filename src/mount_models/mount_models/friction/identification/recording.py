@@ -76,9 +76,11 @@ def checked_recording(
         raise IdentificationError(
             f'{name} has {count} samples; at least {FEWEST_SAMPLES} are needed: record a whole ramp or stroke'
         )
-    clamp = np.broadcast_to(np.asarray(normal_force, float).reshape(-1, 1), (count, 2)).copy() if (
-        np.ndim(normal_force) < 2
-    ) else np.array(normal_force, float)
+    clamp = (
+        np.broadcast_to(np.asarray(normal_force, float).reshape(-1, 1), (count, 2)).copy()
+        if (np.ndim(normal_force) < 2)
+        else np.array(normal_force, float)
+    )
     channels = {
         'time': times,
         'displacement': np.asarray(displacement, float),

@@ -89,12 +89,12 @@ def turning_points(displacement: FloatArray) -> list[int]:
         if displacement[k] < displacement[low]:
             low = k
         if direction >= 0 and displacement[high] - displacement[k] > least:
-            if direction > 0 or high > 0:
+            if direction > 0 or displacement[high] - displacement[0] > 0.5 * least:
                 turns.append(high)
             direction, low = -1, k
             high = k
         elif direction <= 0 and displacement[k] - displacement[low] > least:
-            if direction < 0 or low > 0:
+            if direction < 0 or displacement[0] - displacement[low] > 0.5 * least:
                 turns.append(low)
             direction, high = 1, k
             low = k

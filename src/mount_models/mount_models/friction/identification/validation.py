@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -14,7 +15,7 @@ from mount_models.friction.identification.recording import (
     smoothed_displacement,
 )
 from mount_models.friction.identification.sawtooth import strokes
-from mount_models.friction.simplified import simplified_response
+from mount_models.friction.simplified import FADE_VELOCITY, simplified_response
 
 _SETTLING = 0.03  # s after a turning point, as in step 2
 
@@ -24,7 +25,7 @@ class ModelValidation:
     """Error of both models on one recording, rms over rms of the measured force.
 
     `*_macroslip` leaves out the first 30 ms after each turning point, where the simplified model is not
-    defined. `full`, `simplified` are the predicted forces (N, (n,)).
+    defined, and strokes below twice the speed under which it fades mu to zero (by 2 % there). `full`, `simplified` are the predicted forces (N, (n,)).
     """
 
     name: str
@@ -42,7 +43,7 @@ def validate(
     """Return how full and simplified model predict `recording` from its displacement and normal force."""
     x = smoothed_displacement(recording)
     full = pad_force(contact, coefs, x, recording.dt, recording.normal_force)
-    velocity = np.gradient(x, recording.dt)
+    velocity = _velocity(x, recording.dt)
     clamp = np.where(velocity >= 0.0, recording.normal_force[:, 0], recording.normal_force[:, 1])
     simplified, _ = simplified_response(contact, coefs, velocity, clamp, recording.dt)
     sliding = _sliding(recording)
@@ -70,9 +71,18 @@ def pooled_error(validations: Sequence[ModelValidation], recordings: Sequence[Fr
     return float(np.sqrt((weights * errors**2).sum() / weights.sum()))
 
 
+def _velocity(displacement: FloatArray, dt: float) -> FloatArray:
+    window = max(3, round(0.02 / dt) | 1)  # 20 ms, chosen: less than the 30 ms that are left out
+    if displacement.size <= window:
+        return np.gradient(displacement, dt)
+    return np.asarray(savgol_filter(displacement, window, 1, deriv=1, delta=dt))
+
+
 def _sliding(recording: FrictionRecording) -> FloatArray:
     inside = np.zeros(recording.force.size, bool)
     settling, edge = round(_SETTLING / recording.dt), round(0.01 / recording.dt)
-    for first, last, _ in strokes(recording):
+    for first, last, velocity in strokes(recording):
+        if abs(velocity) < 1.95 * FADE_VELOCITY:
+            continue
         inside[first + settling : max(last - edge, first + settling)] = True
     return inside if inside.any() else np.ones(recording.force.size, bool)

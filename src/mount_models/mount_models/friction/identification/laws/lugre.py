@@ -29,7 +29,9 @@ class LuGre:
         LawParameter('sigma_0', Quantity('N/m', 'stiffness of the bristles', 1e2, 1e10)),
         LawParameter('sigma_1', Quantity('N s/m', 'damping of the bristles', 0.0, 1e7), logarithmic=False),
         LawParameter('sigma_2', Quantity('N s/m', 'viscous part', 0.0, 1e8), logarithmic=False),
-        LawParameter('s', Quantity('1', 'excess of static over sliding friction', -0.9, 4.0), logarithmic=False),
+        LawParameter(
+            's', Quantity('1', 'excess of static over sliding friction', -0.9, 4.0), logarithmic=False
+        ),
         LawParameter('v_s', Quantity('m/s', 'speed over which static friction fades', 1e-5, 1.0)),
     )
 

@@ -50,7 +50,9 @@ class PadModel:
             LawParameter('A_n3', Quantity('1', 'shift in the logarithm, negative', 1e-3, 10.0)),
             LawParameter('s_p', Quantity('1', 'rise of a with F_N / F_ref, positive', 0.0, rise), False),
             LawParameter('s_n', Quantity('1', 'rise of a with F_N / F_ref, negative', 0.0, rise), False),
-            LawParameter('b_offset', Quantity('1/mm', 'part of b that depends on nothing', -30.0, 30.0), False),
+            LawParameter(
+                'b_offset', Quantity('1/mm', 'part of b that depends on nothing', -30.0, 30.0), False
+            ),
             LawParameter('B_1', Quantity('1/mm', 'b at rest', -100.0, 100.0), False),
             LawParameter('B_2', Quantity('s/mm^2', 'change of b with speed', -10.0, 10.0), False),
             LawParameter('s_b', Quantity('1', 'rise of b with F_N / F_ref', -2.0 * rise, 2.0 * rise), False),
@@ -64,8 +66,8 @@ class PadModel:
         if self.known is not None:
             return self._from_known(*self.known)
         level_p, level_n = levels(recordings)
-        stiffness = 20.0 * typical_force(recordings) / max(
-            float(np.ptp(each.displacement)) for each in recordings
+        stiffness = (
+            20.0 * typical_force(recordings) / max(float(np.ptp(each.displacement)) for each in recordings)
         )
         rise = 0.3 if self.with_load else 0.0
         gain = 0.1

@@ -1,0 +1,142 @@
+"""`engine-mount identify friction` from files to files."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from mount_bringup.command import main
+from mount_bringup.friction_files import parsed_channels, read_recording
+from mount_bringup.identify_arguments import with_repeated_options
+from mount_models.friction.identification.recording import IdentificationError
+from mount_sim.rack_friction import RackNoise, ramp_and_hold, sawtooth, write_csv
+
+RIG = Path(__file__).resolve().parents[4] / 'shared' / 'data' / 'friction_rig'
+SPEEDS = (0.002, 0.004, 0.006, 0.010)
+
+
+@pytest.fixture(scope='module')
+def rack(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('rack')
+    write_csv(ramp_and_hold(duration=4.0), folder / 'ramp.csv', with_desired=True)
+    for seed, load in enumerate((40.0, 80.0, 120.0)):
+        write_csv(
+            sawtooth(noise=RackNoise(seed=seed), normal_force=load, speeds=SPEEDS), folder / f'{load:.0f}.csv'
+        )
+    return folder
+
+
+def test_several_paths_after_one_option_become_repeated_options():
+    words = 'identify friction --train a b --held-out c --json d --file e'.split()
+    assert with_repeated_options(words) == (
+        'identify friction --train a --train b --held-out c --json d --file e'.split()
+    )
+    assert with_repeated_options(['--train', 'a', '--', 'b']) == ['--train', 'a', '--', 'b']
+    assert with_repeated_options(['--train=a', 'b']) == ['--train=a', 'b']
+
+
+def test_files_give_parameters_and_a_ladder(rack, tmp_path):
+    _run(
+        'identify', 'friction', '--train', *(str(rack / name) for name in ('ramp.csv', '40.csv', '120.csv')),
+        '--held-out', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'), '--out', str(tmp_path / 'f.yaml'),
+        '--figure', str(tmp_path / 'f.png'),
+    )  # fmt: skip
+    result = json.loads((tmp_path / 'f.json').read_text())
+    assert set(result['ladder']["paper's model"]) >= {'train_error', 'held_out_error', 'parameters'}
+    assert result['best'] == "paper's model"
+    assert result['ladder']["paper's model"]['held_out_error'] < 0.05
+    assert result['contact']['contact_stiffness'] == pytest.approx(4e6, rel=0.03)
+    written = yaml.safe_load((tmp_path / 'f.yaml').read_text())
+    assert written['coefficients'] == pytest.approx(result['coefficients'])
+    assert len(written['provenance']['recordings']['80.csv']['sha256']) == 64
+    assert (tmp_path / 'f.png').stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ('make', 'words'),
+    [
+        (lambda f: f.with_suffix('.csv').write_text('time_s,displacement_mm,friction_force_n,normal_force_n\n'
+                                                    '0,0,1,9\n1,1,1,9\n'), '2 samples'),
+        (lambda f: f.with_suffix('.csv').write_text('time_s,force_n\n0,1\n'), 'no column for displacement'),
+        (lambda f: f.with_suffix('.mcap').write_bytes(b'no recording at all' * 9), 'MCAP'),
+        (lambda f: f.with_suffix('.json').write_text('{"data": [[1, 2]]}'), 'shape'),
+        (lambda f: f.with_suffix('.png').write_text(''), 'are not read'),
+    ],
+)  # fmt: skip
+def test_bad_files_are_refused_and_nothing_is_written(make, words, tmp_path, capsys):
+    make(tmp_path / 'bad')
+    bad = next(iter(tmp_path.iterdir()))
+    outputs = tmp_path / 'f.json', tmp_path / 'f.yaml', tmp_path / 'f2.png'
+    with pytest.raises(SystemExit) as ended:
+        main(['identify', 'friction', '--train', str(bad), '--json', str(outputs[0]), '--out', str(outputs[1]),
+              '--figure', str(outputs[2])])  # fmt: skip
+    assert ended.value.code == 1
+    assert words in capsys.readouterr().err.replace('\n', ' ')
+    assert not any(each.exists() for each in outputs)
+
+
+def test_a_held_out_recording_must_be_unseen(rack, capsys):
+    with pytest.raises(SystemExit):
+        main(['identify', 'friction', '--train', str(rack / '40.csv'), '--held-out', str(rack / '40.csv')])
+    assert 'must be unseen' in capsys.readouterr().err.replace('\n', ' ')
+
+
+def test_parameters_need_ramp_and_sawtooth(rack, tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(['identify', 'friction', '--train', str(rack / 'ramp.csv'), '--out', str(tmp_path / 'f.yaml')])
+    assert 'the sawtooth is missing' in capsys.readouterr().err.replace('\n', ' ')
+    assert not (tmp_path / 'f.yaml').exists()
+
+
+def test_channels_name_column_and_unit(tmp_path):
+    time = np.arange(0.0, 2.0, 1e-3)
+    table = np.column_stack([time, np.sin(6 * time), 0.05 * np.cos(6 * time), np.full(time.size, 0.1)])
+    file = tmp_path / 'own.csv'
+    np.savetxt(file, table, delimiter=',', header='time,way,cell,load', comments='')
+    with pytest.raises(IdentificationError, match='name it as in --channel'):
+        read_recording(file)
+    chosen = parsed_channels(['displacement=way:mm', 'friction_force=cell:kN', 'normal_force=load:kN'])
+    read = read_recording(file, chosen)
+    assert read.displacement.max() == pytest.approx(1e-3, rel=1e-3)
+    assert read.force.max() == pytest.approx(50.0, rel=1e-3)
+    assert read.mean_normal_force == pytest.approx(100.0)
+
+
+def rig_file(folder):
+    time = np.arange(0.0, 4.0, 1e-3)
+    moved = np.clip(time - 0.5, 0.0, None)
+    table = np.column_stack(
+        [time, np.sin(3 * moved), 2 * np.sign(np.cos(3 * moved)) * (time > 0.5) - 0.07, 0 * time,
+         np.where(np.cos(3 * moved) > 0, 10.0, 900.0), np.where(np.cos(3 * moved) > 0, 1000.0, 10.0)]
+    )  # fmt: skip
+    file = folder / 'rig.json'
+    file.write_text(json.dumps({'data': table.tolist()}))
+    return file
+
+
+def test_the_damper_json_is_converted_to_si_and_its_force_zero_removed(tmp_path):
+    read = read_recording(rig_file(tmp_path))
+    assert read.displacement.max() == pytest.approx(0.0254, rel=1e-3)
+    assert read.force.max() == pytest.approx(2 * 4448.2216, rel=1e-6)
+    assert read.force[:400] == pytest.approx(0.0, abs=1e-6)
+    assert read.normal_force[0] == pytest.approx([4448.2216, 0.9 * 4448.2216], rel=1e-3)
+    assert read_recording(rig_file(tmp_path), clamp='none').normal_force[0] == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.skipif(not RIG.is_dir(), reason='the measured friction damper is not committed (../shared/data)')
+def test_the_measured_damper_is_predicted_at_another_clamp():
+    from mount_models.friction.identification.ladder import fit_ladder
+    from mount_models.friction.identification.laws.elastic_play import ElasticPlay
+
+    first, second = (read_recording(RIG / name) for name in (
+        'ds1_1Hz80lbtension.json', 'ds2_0.5Hz36lbtension0.5amplitude.json'))  # fmt: skip
+    (rung,) = fit_ladder([first], [second], laws=[ElasticPlay()])
+    assert rung.held_out_error < 0.20
+
+
+def _run(*words: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(list(words))
+    assert ended.value.code == 0
