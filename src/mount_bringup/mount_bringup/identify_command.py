@@ -104,7 +104,8 @@ def _print(found: Identification, console: Console) -> None:
     if found.coefficients is not None:
         fit = found.fits[0][0]
         console.print(
-            f'steps 2, 3: {len(found.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} (a) and '
+            f'steps 2, 3: {len(found.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} '
+            '(a) and '
             f'{fit.b_rms_mm:.2f} 1/mm (b) rms',
             soft_wrap=True,
             highlight=False,

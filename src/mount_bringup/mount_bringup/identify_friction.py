@@ -132,8 +132,10 @@ def figures(found: Identification) -> dict[str, Any]:
     if found.validations:
         result['validation'] = [
             {
-                'recording': each.name, 'full_error': each.full_error, 'simplified_error': each.simplified_error,
-                'full_macroslip_error': each.full_macroslip, 'simplified_macroslip_error': each.simplified_macroslip,
+                'recording': each.name, 'full_error': each.full_error, 'simplified_error':
+                each.simplified_error,
+                'full_macroslip_error': each.full_macroslip, 'simplified_macroslip_error':
+                each.simplified_macroslip,
             }
             for _, each in found.validations
         ]  # fmt: skip
@@ -155,7 +157,8 @@ def parameter_file(found: Identification) -> dict[str, Any]:
     if found.contact is None or found.coefficients is None:
         raise IdentificationError(
             '--out needs the contact (a ramp and hold) and the coefficients (sawtooths at several speeds); '
-            f'{"the ramp" if found.contact is None else "the sawtooth"} is missing: add such recordings to --train'
+            f'{"the ramp" if found.contact is None else "the sawtooth"} is missing: add such recordings '
+            'to --train'
         )
     coefs = found.coefficients
     speeds = [abs(line.velocity) for line in found.lines]
@@ -212,7 +215,8 @@ def _check_order(order: IdentifyOrder) -> None:
     both = {each.resolve() for each in order.train} & {each.resolve() for each in order.held_out}
     if both:
         raise IdentificationError(
-            f'{sorted(both)[0].name} is among --train and --held-out; a held-out recording must be unseen: leave it '
+            f'{sorted(both)[0].name} is among --train and --held-out; a held-out recording must be '
+            'unseen: leave it '
             'out on one side'
         )
 

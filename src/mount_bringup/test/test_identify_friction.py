@@ -29,9 +29,22 @@ def rack(tmp_path_factory):
 
 
 def test_several_paths_after_one_option_become_repeated_options():
-    words = 'identify friction --train a b --held-out c --json d --file e'.split()
+    words = ['identify', 'friction', '--train', 'a', 'b', '--held-out', 'c', '--json', 'd', '--file', 'e']
     assert with_repeated_options(words) == (
-        'identify friction --train a --train b --held-out c --json d --file e'.split()
+        [
+            'identify',
+            'friction',
+            '--train',
+            'a',
+            '--train',
+            'b',
+            '--held-out',
+            'c',
+            '--json',
+            'd',
+            '--file',
+            'e',
+        ]
     )
     assert with_repeated_options(['--train', 'a', '--', 'b']) == ['--train', 'a', '--', 'b']
     assert with_repeated_options(['--train=a', 'b']) == ['--train=a', 'b']
@@ -40,7 +53,8 @@ def test_several_paths_after_one_option_become_repeated_options():
 def test_files_give_parameters_and_a_ladder(rack, tmp_path):
     _run(
         'identify', 'friction', '--train', *(str(rack / name) for name in ('ramp.csv', '40.csv', '120.csv')),
-        '--held-out', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'), '--out', str(tmp_path / 'f.yaml'),
+        '--held-out', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'), '--out', str(tmp_path /
+        'f.yaml'),
         '--figure', str(tmp_path / 'f.png'),
     )  # fmt: skip
     result = json.loads((tmp_path / 'f.json').read_text())
@@ -70,7 +84,8 @@ def test_bad_files_are_refused_and_nothing_is_written(make, words, tmp_path, cap
     bad = next(iter(tmp_path.iterdir()))
     outputs = tmp_path / 'f.json', tmp_path / 'f.yaml', tmp_path / 'f2.png'
     with pytest.raises(SystemExit) as ended:
-        main(['identify', 'friction', '--train', str(bad), '--json', str(outputs[0]), '--out', str(outputs[1]),
+        main(['identify', 'friction', '--train', str(bad), '--json', str(outputs[0]), '--out',
+        str(outputs[1]),
               '--figure', str(outputs[2])])  # fmt: skip
     assert ended.value.code == 1
     assert words in capsys.readouterr().err.replace('\n', ' ')

@@ -68,7 +68,7 @@ def test_step_1_recovers_drawn_contacts_within_3_percent_with_noise(seed):
 
 
 def test_step_1_refuses_a_contact_that_slides():
-    with pytest.raises(IdentificationError, match='step 1|misses'):
+    with pytest.raises(IdentificationError, match=r'step 1|misses'):
         fit_ramp_hold(sawtooth(100.0))
 
 

@@ -1,6 +1,7 @@
 """Simulated rack recordings of the friction contact: ramp and hold (Fig. 7), sawtooth (Fig. 8).
 
-The rack is what the authors describe: a linear motor under proportional control moves the contact, a load cell
+The rack is what the authors describe: a linear motor under proportional control moves the contact, a load
+cell
 measures the friction force, another one the clamping force. The contact is the full model.
 """
 
@@ -140,7 +141,8 @@ def _pushed(
 ) -> tuple[FloatArray, FloatArray]:
     """Return displacement and force behind the machine's spring p.
 
-    In series with the contact, p makes one spring with c_Re: the full model is driven by the desired displacement.
+    In series with the contact, p makes one spring with c_Re: the full model is driven by the desired
+    displacement.
     """
     soft = contact.contact_stiffness * machine_stiffness / (contact.contact_stiffness + machine_stiffness)
     series = contact._replace(contact_stiffness=soft)

@@ -1,6 +1,7 @@
 """Step 3: Eqs (13), (14) through the lines of step 2, on products that are identifiable.
 
-As printed, nine numbers of a (and six of b) have two scales that no measurement tells apart: (a_1, a_2) against
+As printed, nine numbers of a (and six of b) have two scales that no measurement tells apart: (a_1, a_2)
+against
 (alpha_1, alpha_2), (b_1, b_2) against (beta_1, beta_2). Here alpha and beta are 1 at 100 N:
 
     a = [A_1 + A_2 ln(A_3 + |v|)] [1 + s (F_N - 100 N)]      for each direction, |v| in mm/s
@@ -89,7 +90,8 @@ def _check_coverage(lines: Sequence[StrokeLine]) -> None:
         speeds = sorted(abs(line.velocity) for line in lines if line.velocity * sign > 0.0)
         if not speeds:
             raise IdentificationError(
-                f'only strokes to the {other} side ({len(lines)} strokes, 0 to the {side}); both are needed, for '
+                f'only strokes to the {other} side ({len(lines)} strokes, 0 to the {side}); both are '
+                'needed, for '
                 'each has parameters of its own: record strokes to and fro'
             )
         distinct = 1
@@ -99,8 +101,10 @@ def _check_coverage(lines: Sequence[StrokeLine]) -> None:
                 distinct, reference = distinct + 1, speed
         if distinct < FEWEST_SPEEDS or speeds[-1] < SPEED_SPREAD * speeds[0]:
             raise IdentificationError(
-                f'{distinct} speeds to the {side} side, {1e3 * speeds[0]:.3g} .. {1e3 * speeds[-1]:.3g} mm/s; at least '
-                f'{FEWEST_SPEEDS} are needed, the highest {SPEED_SPREAD:g} times the lowest or more: record more '
+                f'{distinct} speeds to the {side} side, {1e3 * speeds[0]:.3g} .. {1e3 * speeds[-1]:.3g} '
+                'mm/s; at least '
+                f'{FEWEST_SPEEDS} are needed, the highest {SPEED_SPREAD:g} times the lowest or more: '
+                'record more '
                 'speeds'
             )
 

@@ -11,7 +11,8 @@ series with c_Re and with c_R parallel to d_R. After a step X of x_d (derived; E
     c_Re = (p + c_xi) / kappa - p;  c_R = c_xi c_Re / (c_Re - c_xi);  d_R = T (c_R + p c_Re / (p + c_Re))
 
 A real ramp lasts t_r; its response is the mean of the step response over the last t_r, in closed form. All of
-x, F and, where recorded, x_d are fitted at once, so neither the beginning nor the end of the ramp need be told.
+x, F and, where recorded, x_d are fitted at once, so neither the beginning nor the end of the ramp need be
+told.
 """
 
 from dataclasses import dataclass
@@ -101,7 +102,8 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     low = np.array([1e-3, 0.02, 1e-3, 1e-4, 1e-3, -np.inf, 1e-3, -1.0, -1.0, -1.0])
     high = np.array([1e3, 1.999, 1e3, 1e4, 1e3, np.inf, 1e3, 1.0, 1.0, 1.0])
     found = least_squares(
-        residuals, np.clip(start / scale, low, high), bounds=(low, high), x_scale='jac', ftol=1e-12, xtol=1e-12,
+        residuals, np.clip(start / scale, low, high), bounds=(low, high), x_scale='jac', ftol=1e-12,
+        xtol=1e-12,
         gtol=1e-12, max_nfev=100,
     )  # fmt: skip
     values = found.x * scale
@@ -186,8 +188,10 @@ def _start(
     rising = np.flatnonzero(smooth_force[: top + 1] > 0.1 * smooth_force[top])
     if force_end <= 0.0 or x_end <= 0.0 or top < 2 or not rising.size or top > 0.8 * count:
         raise IdentificationError(
-            f'{name}: force ends at {force_end:.3g} N and displacement at {x_end:.3g} m; step 1 needs a ramp that '
-            'is held afterwards, force and displacement to the same side: check signs, or record ramp and hold'
+            f'{name}: force ends at {force_end:.3g} N and displacement at {x_end:.3g} m; step 1 needs a '
+            'ramp that '
+            'is held afterwards, force and displacement to the same side: check signs, or record ramp '
+            'and hold'
         )
     begin = int(rising[0])
     ramp = max(time[top] - time[begin], 2.0 * (time[1] - time[0])) * 1.1
@@ -199,7 +203,8 @@ def _start(
         stiffness = -float(np.polyfit(smooth_x[hold], smooth_force[hold], 1)[0])
     if not stiffness > 0.0:
         raise IdentificationError(
-            f'{name}: while held, force and displacement change by {stiffness:.3g} N/m together; a rack gives way '
+            f'{name}: while held, force and displacement change by {stiffness:.3g} N/m together; a rack '
+            'gives way '
             'against the force (above 0 N/m): record the desired displacement as well, or hold longer'
         )
     height = np.clip(smooth_x[hold][0] / x_end, 0.1, 0.98)
@@ -213,8 +218,10 @@ def _contact(name: str, values: FloatArray) -> FrictionContact:
     contact = _inverted(values)
     if not all(value > 0.0 and np.isfinite(value) for value in contact):
         raise IdentificationError(
-            f'{name}: c_R {contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} N s/m, c_Re '
-            f'{contact.contact_stiffness:.3g} N/m must all be above 0: the displacement does not creep as the '
+            f'{name}: c_R {contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} '
+            'N s/m, c_Re '
+            f'{contact.contact_stiffness:.3g} N/m must all be above 0: the displacement does not creep '
+            'as the '
             'contact does (kappa '
             f'{values[1]:.3f} must lie below 1); ramp faster, hold longer, and stay in microslip'
         )
@@ -258,7 +265,8 @@ def _check_misfit(name: str, misfits: tuple[float, float]) -> None:
         if misfit > LARGEST_MISFIT:
             raise IdentificationError(
                 f'{name}: the fitted ramp misses the {channel} by {100 * misfit:.1f} % rms (at most '
-                f'{100 * LARGEST_MISFIT:.0f} %): the contact slides, or it is no ramp that is held; use a smaller '
+                f'{100 * LARGEST_MISFIT:.0f} %): the contact slides, or it is no ramp that is held; use '
+                'a smaller '
                 'displacement'
             )
 

@@ -1,10 +1,12 @@
 """Step 2: mu over the deflection u at constant speeds and normal force (Figs. 8, 9, Eq 12).
 
-The measured force drives the linear part, xi' = (F_F - c_R xi) / d_R; u = sign(F_F) xi. In every stroke between
+The measured force drives the linear part, xi' = (F_F - c_R xi) / d_R; u = sign(F_F) xi. In every stroke
+between
 two turning points mu = |F_F| / F_N is a straight line over u: mu = a + b u.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import t as student
@@ -29,7 +31,8 @@ _LEAST_STROKE = 0.2  # of the largest stroke
 
 @dataclass(frozen=True)
 class StrokeLine:
-    """mu = a + b u of one stroke: speed with sign (m/s), normal force (N), a (1), b (1/m), half widths of CI."""
+    """mu = a + b u of one stroke: speed with sign (m/s), normal force (N), a (1), b (1/m), half widths of
+    CI."""
 
     recording: str
     velocity: float
@@ -56,19 +59,21 @@ def stroke_lines(recording: FrictionRecording, contact: FrictionContact) -> list
             lines.append(line)
     if not lines:
         raise IdentificationError(
-            f'{recording.name}: no stroke slides for {SHORTEST_WINDOW:g} s or more at constant speed; use longer '
+            f'{recording.name}: no stroke slides for {SHORTEST_WINDOW:g} s or more at constant speed; '
+            'use longer '
             'strokes or lower speeds'
         )
     return lines
 
 
 def strokes(recording: FrictionRecording) -> list[tuple[int, int, float]]:
-    """Return (first sample, last sample, velocity m/s) between turning points; incomplete and short ones too."""
+    """Return (first sample, last sample, velocity m/s) between turning points; incomplete and short ones
+    too."""
     x = smoothed_displacement(recording)
     turns = [0, *turning_points(x), x.size - 1]
     found = []
     time = recording.time
-    for first, last in zip(turns[:-1], turns[1:], strict=True):
+    for first, last in pairwise(turns):
         if last - first < 8:
             continue
         inner = slice(first + (last - first) // 10, last - (last - first) // 10)
@@ -103,7 +108,8 @@ def turning_points(displacement: FloatArray) -> list[int]:
 
 @compiled
 def deflection_from_force(force, dt, tangential_stiffness, tangential_damping):
-    """Return xi (m) of the linear part for `force` (N), (n,), from rest, the force straight between samples."""
+    """Return xi (m) of the linear part for `force` (N), (n,), from rest, the force straight between
+    samples."""
     xi = np.zeros(force.size)
     z = tangential_stiffness * dt / tangential_damping
     fade = np.exp(-z)

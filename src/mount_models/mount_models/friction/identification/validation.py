@@ -25,7 +25,8 @@ class ModelValidation:
     """Error of both models on one recording, rms over rms of the measured force.
 
     `*_macroslip` leaves out the first 30 ms after each turning point, where the simplified model is not
-    defined, and strokes below twice the speed under which it fades mu to zero (by 2 % there). `full`, `simplified` are the predicted forces (N, (n,)).
+    defined, and strokes below twice the speed under which it fades mu to zero (by 2 % there).
+    `full`, `simplified` are the predicted forces (N, (n,)).
     """
 
     name: str

@@ -34,7 +34,8 @@ class FrictionLaw(Protocol):
     ) -> FloatArray:
         """Return the friction force (N, (n,)) for `displacement` (m, (n,)) sampled every `dt` s.
 
-        `normal_force` (N, (n, 2)) counts for sliding to positive and to negative side. The contact starts free
+        `normal_force` (N, (n, 2)) counts for sliding to positive and to negative side. The contact starts
+        free
         of force at the first displacement.
         """
         ...

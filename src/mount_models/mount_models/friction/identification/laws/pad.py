@@ -21,7 +21,8 @@ class PadModel:
     """The paper's model, on products that are identifiable (see `coefficient_fit`).
 
     Loads and speeds are related to those of the training: alpha and beta are 1 at `reference` (N), do not
-    change beyond `lowest` and `highest`, and stay 1 where only one load was trained. `known` starts the search
+    change beyond `lowest` and `highest`, and stay 1 where only one load was trained. `known` starts the
+    search
     at what steps 1 to 3 have found.
     """
 
@@ -116,7 +117,8 @@ class PadModel:
         slope, s_b = factors(coefs.beta_1, coefs.beta_2)
         return np.array(
             [
-                up * coefs.a_p1, up * coefs.a_p2, coefs.a_p3, down * coefs.a_n1, down * coefs.a_n2, coefs.a_n3,
+                up * coefs.a_p1, up * coefs.a_p2, coefs.a_p3, down * coefs.a_n1, down * coefs.a_n2,
+                coefs.a_n3,
                 s_p, s_n, coefs.b_offset, slope * coefs.b_1, slope * coefs.b_2, s_b, *contact,
             ]
         )  # fmt: skip
