@@ -130,7 +130,7 @@ def _print(found: Identification, console: Console) -> None:
         console.print(f'best: {result["best"]}', highlight=False)
 
 
-def _step_1(ramps: list[dict]) -> Table:  # type: ignore[type-arg]
+def _step_1(ramps: list[dict]) -> Table:
     table = Table('step 1', 'c_Re (N/m)', 'c_R (N/m)', 'd_R (N s/m)', 'p (N/m)', 'T (s)')
     for each in ramps:
         contact, spread, printed = each['contact'], each['deviation'], each['printed']
@@ -158,7 +158,7 @@ def _printed(entry: dict[str, float]) -> str:
     return f'{entry["value"]:.4g} ({100 * entry["error"]:+.1f} %)'
 
 
-def _pairs(pairs: list[dict]) -> Table:  # type: ignore[type-arg]
+def _pairs(pairs: list[dict]) -> Table:
     names = list(dict.fromkeys(pair['train'] for pair in pairs))
     table = Table('held-out error', *(name for name in pairs[0]['ladder']))
     table.caption = ', '.join(f'{number}: {name}' for number, name in enumerate(names, 1))
@@ -170,7 +170,7 @@ def _pairs(pairs: list[dict]) -> Table:  # type: ignore[type-arg]
     return table
 
 
-def _ladder(ladder: dict[str, dict]) -> Table:  # type: ignore[type-arg]
+def _ladder(ladder: dict[str, dict]) -> Table:
     table = Table('law', 'held out', 'training', 'parameters')
     for name, entry in ladder.items():
         first = next(iter(entry['parameters'].values()))

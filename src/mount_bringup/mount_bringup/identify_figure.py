@@ -88,7 +88,7 @@ def _coefficient_b(axes: Axes, found: Identification) -> None:
     axes.set(title='step 3: b, lines by Eq (13)', xlabel='velocity (mm/s)', ylabel='b (1/mm)')
 
 
-def _over_speed(axes: Axes, found: Identification, law, factor: float, name: str) -> None:  # type: ignore[no-untyped-def]
+def _over_speed(axes: Axes, found: Identification, law, factor: float, name: str) -> None:
     assert found.coefficients is not None
     for place, recording in enumerate(dict.fromkeys(line.recording for line in found.lines)):
         lines = [line for line in found.lines if line.recording == recording]

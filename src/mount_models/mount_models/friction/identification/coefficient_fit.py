@@ -172,6 +172,6 @@ def _slope_values(lines: Sequence[StrokeLine], variant: str, with_load: bool) ->
     }
 
 
-def _best(residuals, starts, low, high) -> list[float]:  # type: ignore[no-untyped-def]
+def _best(residuals, starts, low, high) -> list[float]:
     found = [least_squares(residuals, start, bounds=(low, high), x_scale='jac') for start in starts]
     return [float(value) for value in min(found, key=lambda each: each.cost).x]

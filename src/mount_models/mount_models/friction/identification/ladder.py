@@ -32,9 +32,11 @@ SEARCH_SAMPLES = 1200
 """Samples per recording while starts are compared."""
 FINAL_SAMPLES = 5000
 STARTS = 5
+DRAWS = 12
+"""So many points are drawn for each start after the first; the search begins at the best of them."""
 TIME_LIMIT = 45.0
 """Seconds for one law; the best so far counts then."""
-_SPREAD = 0.7  # of the logarithm, by which further starts differ from the first
+_SPREAD = 1.2  # of the logarithm, by which further starts differ from the first
 
 Progress = Callable[[str, float], None]
 
@@ -134,7 +136,9 @@ def fit_law(
     found = []
     for number in range(STARTS):
         _tell(progress, law.name, number / (STARTS + 1))
-        found.append(search.run(coarse, search.begin(random, number), 60, end))
+        candidates = [search.begin(random, number + each) for each in range(DRAWS if number else 1)]
+        first = min(candidates, key=lambda seen: search.cost(coarse, seen))
+        found.append(search.run(coarse, first, 60, end))
         if time.monotonic() > end:
             break
     best = min(found, key=lambda each: each[1])[0]
@@ -177,19 +181,25 @@ class _Search:
         margin = 1e-6 * (high - low)
         return np.asarray(np.clip(middle, low + margin, high - margin))
 
+    def residuals(self, recordings: Sequence[FrictionRecording], seen: FloatArray) -> FloatArray:
+        scale = math.sqrt(sum(float((each.force**2).sum()) for each in recordings))
+        values = self.plain(seen)
+        parts = [
+            self.law.simulate(values, each.displacement, each.dt, each.normal_force) - each.force
+            for each in recordings
+        ]
+        return np.asarray(np.nan_to_num(np.concatenate(parts) / scale, nan=1.0, posinf=1.0, neginf=-1.0))
+
+    def cost(self, recordings: Sequence[FrictionRecording], seen: FloatArray) -> float:
+        return 0.5 * float((self.residuals(recordings, seen) ** 2).sum())
+
     def run(
         self, recordings: Sequence[FrictionRecording], seen: FloatArray, evaluations: int, end: float
     ) -> tuple[FloatArray, float]:
         """Return (unknowns, cost) of one search that begins at `seen`."""
-        scale = math.sqrt(sum(float((each.force**2).sum()) for each in recordings))
 
         def residuals(unknowns: FloatArray) -> FloatArray:
-            values = self.plain(unknowns)
-            parts = [
-                self.law.simulate(values, each.displacement, each.dt, each.normal_force) - each.force
-                for each in recordings
-            ]
-            return np.asarray(np.nan_to_num(np.concatenate(parts) / scale, nan=1.0, posinf=1.0, neginf=-1.0))
+            return self.residuals(recordings, unknowns)
 
         def late(intermediate_result: object) -> None:
             if time.monotonic() > end:

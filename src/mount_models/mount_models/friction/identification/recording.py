@@ -44,7 +44,7 @@ class FrictionRecording:
     @property
     def time(self) -> FloatArray:
         """Time from the first sample, s."""
-        return np.arange(self.force.size) * self.dt
+        return np.asarray(np.arange(self.force.size) * self.dt, np.float64)
 
     @property
     def force_rms(self) -> float:
