@@ -14,6 +14,7 @@ import numpy as np
 
 from mount_bringup.recording_path import open_run
 from mount_models.friction.identification.recording import (
+    COEFFICIENT_RANGE,
     FloatArray,
     FrictionRecording,
     IdentificationError,
@@ -196,7 +197,13 @@ def _rig(path: Path, clamp: str) -> FrictionRecording:
         f'normal force ({clamp}): {normal[0]:.0f} N to the positive, {normal[1]:.0f} N to the negative side'
     )
     return checked_recording(
-        path.stem, time, displacement, force, np.tile(normal, (time.size, 1)), notes=tuple(notes)
+        path.stem,
+        time,
+        displacement,
+        force,
+        np.tile(normal, (time.size, 1)),
+        notes=tuple(notes),
+        coefficient_range=COEFFICIENT_RANGE if clamp == 'sliding' else (0.0, np.inf),
     )
 
 

@@ -65,10 +65,12 @@ def checked_recording(
     normal_force: npt.ArrayLike,
     desired_displacement: npt.ArrayLike | None = None,
     notes: tuple[str, ...] = (),
+    coefficient_range: tuple[float, float] = COEFFICIENT_RANGE,
 ) -> FrictionRecording:
     """Return the recording on an even grid, or raise `IdentificationError` with value, limit and remedy.
 
     `time` in s, displacements in m, forces in N, arrays (n,); `normal_force` (n,), (n, 2) or one number.
+    `coefficient_range` is what |F| / F_N may be; wide where the clamp is not the pressure on the contact.
     """
     times = np.asarray(time, float)
     count = times.size
@@ -93,7 +95,7 @@ def checked_recording(
         _check_numbers(name, channel, values, count)
     _check_time(name, times)
     _check_motion(name, channels['displacement'], channels['friction force'])
-    _check_magnitudes(name, channels['displacement'], channels['friction force'], clamp)
+    _check_magnitudes(name, channels['displacement'], channels['friction force'], clamp, coefficient_range)
     return _evenly(name, channels, notes)
 
 
@@ -200,7 +202,9 @@ def _longest_repeat(values: FloatArray) -> tuple[int, int]:
     return int(changes[longest] + 1), int(changes[longest + 1])
 
 
-def _check_magnitudes(name: str, displacement: FloatArray, force: FloatArray, clamp: FloatArray) -> None:
+def _check_magnitudes(
+    name: str, displacement: FloatArray, force: FloatArray, clamp: FloatArray, limits: tuple[float, float]
+) -> None:
     stroke = float(np.ptp(displacement))
     if not STROKE_RANGE[0] <= stroke <= STROKE_RANGE[1]:
         guess = _unit_guess(stroke, STROKE_RANGE, 'm')
@@ -222,7 +226,7 @@ def _check_magnitudes(name: str, displacement: FloatArray, force: FloatArray, cl
             'the contact closed, or check sign and zero of the load cell'
         )
     coefficient = float(np.percentile(np.abs(force), 95) / np.median(clamp))
-    low, high = COEFFICIENT_RANGE
+    low, high = limits
     if coefficient > high:
         raise IdentificationError(
             f'{name}: friction force over normal force reaches {coefficient:.3g}; at most {high:g} is '

@@ -44,7 +44,7 @@ class FrictionLaw(Protocol):
 def level(side: str) -> LawParameter:
     """Return the parameter that every law has once for each direction."""
     return LawParameter(
-        f'mu_{side[0]}', Quantity('1', f'friction over normal force, sliding to the {side} side', 1e-3, 20.0)
+        f'mu_{side[0]}', Quantity('1', f'friction over normal force, sliding to the {side} side', 1e-3, 1e6)
     )
 
 
@@ -55,7 +55,7 @@ def levels(recordings: Sequence[FrictionRecording]) -> tuple[float, float]:
         ratios = np.concatenate([sign * each.force / each.normal_force[:, side] for each in recordings])
         same = ratios[ratios > 0.0]
         found.append(float(np.percentile(same, 70)) if same.size else 0.1)
-    return float(np.clip(found[0], 2e-3, 19.0)), float(np.clip(found[1], 2e-3, 19.0))
+    return float(np.clip(found[0], 2e-3, 9e5)), float(np.clip(found[1], 2e-3, 9e5))
 
 
 def typical_force(recordings: Sequence[FrictionRecording]) -> float:

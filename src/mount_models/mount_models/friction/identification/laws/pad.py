@@ -43,11 +43,11 @@ class PadModel:
         self.known = known
         rise = 0.95 if self.with_load else 1e-9
         self.parameters: tuple[LawParameter, ...] = (
-            LawParameter('A_p1', Quantity('1', 'offset of a, to the positive side', -5.0, 20.0), False),
-            LawParameter('A_p2', Quantity('1', 'logarithmic gain of a, positive', 1e-4, 5.0)),
+            LawParameter('A_p1', Quantity('1', 'offset of a, to the positive side', -5.0, 1e6), False),
+            LawParameter('A_p2', Quantity('1', 'logarithmic gain of a, positive', 1e-4, 1e5)),
             LawParameter('A_p3', Quantity('1', 'shift in the logarithm, positive', 1e-3, 10.0)),
-            LawParameter('A_n1', Quantity('1', 'offset of a, to the negative side', -5.0, 20.0), False),
-            LawParameter('A_n2', Quantity('1', 'logarithmic gain of a, negative', 1e-4, 5.0)),
+            LawParameter('A_n1', Quantity('1', 'offset of a, to the negative side', -5.0, 1e6), False),
+            LawParameter('A_n2', Quantity('1', 'logarithmic gain of a, negative', 1e-4, 1e5)),
             LawParameter('A_n3', Quantity('1', 'shift in the logarithm, negative', 1e-3, 10.0)),
             LawParameter('s_p', Quantity('1', 'rise of a with F_N / F_ref, positive', 0.0, rise), False),
             LawParameter('s_n', Quantity('1', 'rise of a with F_N / F_ref, negative', 0.0, rise), False),
