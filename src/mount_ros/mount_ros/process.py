@@ -1,5 +1,6 @@
 """The life of a process: nodes are made, served, and ended with exit code 0 on SIGINT and SIGTERM."""
 
+import contextlib
 import gc
 import os
 import signal
@@ -41,8 +42,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     for node in nodes:
         node.data_thread = data_thread
     over = _Ending()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, over.tell)
+    over.listen(signal.SIGINT, signal.SIGTERM)
     gc.freeze()  # what stands after set-up need not be looked at again
     services = [_Service(node, over) for node in nodes]
     over.wait()
@@ -68,13 +68,23 @@ class _Ending:
     """Lets the main thread sleep until a signal or a thread tells it that the process shall end.
 
     By a pipe: a lock, as in `threading.Event`, is held for ever by a second signal that comes amid the first.
+    It is written to where the signal arrives, before Python knows of it: a handler in Python waits for the
+    main thread to go on, which one that falls asleep just then never does.
     """
 
     def __init__(self) -> None:
         self._read, self._write = os.pipe()
+        os.set_blocking(self._write, False)
 
-    def tell(self, *_: object) -> None:
-        os.write(self._write, b'.')
+    def listen(self, *signals: int) -> None:
+        """Wake the main thread by these signals too."""
+        signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+        for number in signals:
+            signal.signal(number, lambda *_: None)
+
+    def tell(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # full: it has been told often enough
+            os.write(self._write, b'.')
 
     def wait(self) -> None:
         os.read(self._read, 1)

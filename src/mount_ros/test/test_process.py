@@ -143,3 +143,23 @@ def test_an_exception_in_a_node_ends_all_nodes_of_its_process_with_code_1(start,
     assert f'[FATAL] [{name}]: RuntimeError: nobody foresaw this' in errors
     said = [line for line in process.lines if 'served' not in line]
     assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup']
+
+
+SLEEPER = """
+import signal, threading
+from mount_ros.process import _Ending
+over = _Ending()
+over.listen(signal.SIGTERM)
+
+def take_the_signal():  # the main thread is asleep and is not interrupted
+    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
+
+threading.Timer(0.2, take_the_signal).start()
+over.wait()
+print('awake')
+"""
+
+
+def test_a_signal_that_another_thread_takes_wakes_the_sleeping_main_thread():
+    ended = subprocess.run([sys.executable, '-c', SLEEPER], capture_output=True, text=True, timeout=LIMIT)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'awake\n', '')
