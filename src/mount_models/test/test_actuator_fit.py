@@ -114,5 +114,5 @@ def test_points_that_failed_are_refused(measured):
 
 
 def test_a_single_gap_is_refused(measured):
-    with pytest.raises(ForceLawRefusedError, match='at least 4 air gaps'):
+    with pytest.raises(ForceLawRefusedError, match='at least 5 air gaps'):
         fit_force_law(np.full_like(measured, 349e-6), CURRENTS, measured)
