@@ -112,13 +112,14 @@ def _evaluate(
     from mount_bringup.figure import draw_drive  # after the drive: what draws takes a second to load
 
     drive_data = load_drive(recording, run['excitation_start'])
-    figures = summarise(recording, drive_data, order.parameters, run)
+    audits = audit(recording)
+    figures = summarise(recording, audits, drive_data, order.parameters, run)
     control = control_parameters(order.parameters)
     title = f'{order.scenario}, {order.mode}: mount displacement and actuator current'
     draw_drive(drive_data, control.switch_on_level, control.switch_off_level, title, folder.figure)
     write_json(figures, folder.summary)
     print_summary(figures, console)
-    console.print(as_table(audit(recording)))
+    console.print(as_table(audits))
     return figures
 
 

@@ -1,13 +1,14 @@
 """Figures of a drive from its recording: gaps, switching, peaks, tracking, losses."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.audit import audit
+from mount_bags.audit import TopicAudit
 from mount_bags.reading import Recording
 from mount_control import band_pass
 from mount_control.parameters import ControlParameters
@@ -109,17 +110,16 @@ def wanted_force(
     return wanted, places
 
 
-def lost_samples(recording: Recording, samples_sent: int) -> int:
+def lost_samples(recording: Recording, topics: Mapping[str, TopicAudit], samples_sent: int) -> int:
     """Return how many messages with measurements are missing between the electronics and the recording.
 
-    Gaps are seen in the stamps, what is missing at the ends against `samples_sent`, the electronics' own
-    count.
+    Gaps are seen in the stamps (`topics`: the audit), what is missing at the ends against `samples_sent`, the
+    electronics' own count.
     """
-    topics = audit(recording)
     measured = [topics[recording.resolve(name)] for name in _MEASURED]
     return sum(samples_sent - topic.present + (topic.duplicated or 0) for topic in measured)
 
 
-def unanswered_samples(recording: Recording) -> int:
-    """Return how many displacement samples got no setpoint while the controller was active."""
-    return audit(recording)[recording.resolve('displacement')].unanswered or 0
+def unanswered_samples(recording: Recording, topics: Mapping[str, TopicAudit]) -> int:
+    """Return how many displacement samples got no setpoint while the controller was active, by the audit."""
+    return topics[recording.resolve('displacement')].unanswered or 0

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from mount_bags.audit import TopicAudit
 from mount_bags.reading import Recording
 from mount_bags.recorder_parameters import RecorderParameters
 from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
@@ -18,9 +20,13 @@ _UM, _MM, _US = 1e6, 1e3, 1e6
 
 
 def summarise(
-    recording: Recording, drive: Drive, parameters: Parameters, run: dict[str, Any]
+    recording: Recording,
+    audits: Mapping[str, TopicAudit],
+    drive: Drive,
+    parameters: Parameters,
+    run: dict[str, Any],
 ) -> dict[str, Any]:
-    """Return the figures of a drive; `run` brings those that the recording does not hold.
+    """Return the figures of a drive from its recording and that one's audit; `run` brings the others.
 
     `run`: `scenario`, `mode`, `samples`, `real_time_factor`, `latency_median_s`, `latency_p99_s`.
     Times of switching are s from the start of the excitation. Unknown is null.
@@ -35,8 +41,8 @@ def summarise(
         'mode': run['mode'],
         'duration_s': float(drive.time[-1] - max(drive.time[0], 0.0)),
         'samples': run['samples'],
-        'lost_samples': lost_samples(recording, run['samples']),
-        'unanswered_samples': unanswered_samples(recording),
+        'lost_samples': lost_samples(recording, audits, run['samples']),
+        'unanswered_samples': unanswered_samples(recording, audits),
         'real_time_factor': run['real_time_factor'],
         'rest_gap_m': float(gap['rest_gap'][-1]),
         'contact_gap_m': float(gap['contact_gap'][-1]),
