@@ -10,6 +10,7 @@ import mount_bags
 DATA_TOPICS = (
     'displacement',
     'coil_ripple',
+    'coil_temperature',
     'current_setpoint',
     'air_gap',
     'current_force_table',

@@ -25,6 +25,7 @@ from mount_ros.cdr import serialised
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
+    COIL_TEMPERATURE,
     CURRENT_FORCE_TABLE,
     DISPLACEMENT,
     EVENT,
@@ -35,7 +36,7 @@ from mount_ros.topics import (
 ACCEPTED_NAME = 'accepted.yaml'
 LARGEST_TOTAL = 5_000_000  # bytes, chosen: of all reference recordings together
 _CHUNK_SIZE = 1 << 20  # bytes, chosen: a tenth smaller than with the recorder's chunks
-_INPUTS = (SESSION, EVENT, AIR_GAP, CURRENT_FORCE_TABLE, DISPLACEMENT, COIL_RIPPLE)
+_INPUTS = (SESSION, EVENT, AIR_GAP, CURRENT_FORCE_TABLE, DISPLACEMENT, COIL_RIPPLE, COIL_TEMPERATURE)
 _NAME = re.compile(r'[a-z][a-z0-9_]*')
 
 
@@ -102,8 +103,9 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
             raise AcceptError(f'{run.path} has no {topic.name}, without which nothing can be replayed')
     source = run if _has(run, DISPLACEMENT) else before
     _check_answers(run, source)
-    if COIL_RIPPLE in parts:
-        parts[COIL_RIPPLE] = _of_the_ramp(parts[COIL_RIPPLE], parts[AIR_GAP])
+    for topic in (COIL_RIPPLE, COIL_TEMPERATURE):
+        if topic in parts:
+            parts[topic] = _of_the_ramp(parts[topic], parts[AIR_GAP])
     if SESSION in parts:
         parts[SESSION] = _without_paths(parts[SESSION], run if _has(run, SESSION) else before)
     return list(parts.values())
@@ -129,10 +131,10 @@ def _check_answers(run: Recording, inputs: Recording | None) -> None:
             )
 
 
-def _of_the_ramp(ripple: Messages, air_gap: Messages) -> Messages:
-    """Return the coil ripples up to the last air gap: later ones are not needed."""
+def _of_the_ramp(messages: Messages, air_gap: Messages) -> Messages:
+    """Return the messages up to the last air gap: later ones of the initialisation's inputs are not needed."""
     last = air_gap.log_times[-1]
-    return ripple.chosen(np.flatnonzero(ripple.log_times <= last))
+    return messages.chosen(np.flatnonzero(messages.log_times <= last))
 
 
 def _without_paths(session: Messages, source: Recording | None) -> Messages:

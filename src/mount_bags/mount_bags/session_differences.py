@@ -26,7 +26,7 @@ def session_differences(a: str, b: str) -> list[str]:
     changed = [
         f'{name} is {_shown(one[name])} in A, {_shown(other[name])} in B'
         for name in one
-        if name in other and one[name] != other[name] and not _OF_THE_MOMENT.fullmatch(name)
+        if name in other and not _same(one[name], other[name]) and not _OF_THE_MOMENT.fullmatch(name)
     ]
     return [*changed, *_only('A', one, other), *_only('B', other, one)]
 
@@ -52,6 +52,11 @@ def _flat(content: Any, prefix: str = '') -> dict[str, Any]:
         root = '' if not prefix and key == 'parameters' else f'{prefix}.{key}' if prefix else str(key)
         flat.update(_flat(value, root) if isinstance(value, Mapping) else {root: value})
     return flat
+
+
+def _same(one: Any, other: Any) -> bool:
+    both_unknown = isinstance(one, float) and isinstance(other, float) and one != one and other != other
+    return both_unknown or one == other
 
 
 def _only(where: str, present: Mapping[str, Any], absent: Mapping[str, Any]) -> list[str]:

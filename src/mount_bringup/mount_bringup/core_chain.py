@@ -13,6 +13,7 @@ from mount_control.force_to_current import resample
 from mount_control.identified import check_fits, identified
 from mount_control.parameters import ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
+from mount_init.coil_temperature import TemperatureReadings
 from mount_init.initialisation import OFF, Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.damper import DamperCurve, damper_curve
@@ -61,7 +62,10 @@ class CoreChain:
 
     def __init__(self, parameters: Parameters):
         init_parameters = with_flattened(InitParameters(), parameters.get('mount_init', {}))
-        self._initialisation = Initialisation(chosen_specimen(parameters), init_parameters)
+        self._temperatures = TemperatureReadings()
+        self._initialisation = Initialisation(
+            chosen_specimen(parameters), init_parameters, self._temperatures
+        )
         self._control = control_parameters(parameters)
         self._damper = chosen_damper(parameters)
         self._friction, self._contact = friction_model(parameters)
@@ -83,6 +87,10 @@ class CoreChain:
     def follow(self, last_stamp: int, count: int) -> None:
         """Note `count` samples that the controller answered elsewhere, the last at `last_stamp` (ns)."""
         self._watch.follow(last_stamp, count)
+
+    def take_temperature(self, stamp: int, celsius: float) -> None:
+        """Take a coil temperature (degC) of time `stamp` (ns) as it came over the bus."""
+        self._temperatures.take(stamp, celsius)
 
     def answer(self, stamp: int, reading: Reading) -> float:
         """Return the setpoint (A) for a sample of time `stamp` (ns) as it came over the bus."""

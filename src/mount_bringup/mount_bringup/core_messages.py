@@ -9,13 +9,18 @@ from numpy.typing import NDArray
 
 from mount_control.controller import TRACE
 from mount_init.initialisation import OFF, InitialisationResult
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
 from mount_ros.cdr import serialised
 from mount_ros.force_table_message import to_message
 from mount_ros.scalars import OneNumberLayout, Rows, ScalarsLayout
+from mount_ros.temperature_message import temperature_layout
 from mount_ros.topics import Topic
+from mount_sim.electronics import STATUS_EVERY
 from mount_sim.node import level_imu
 from mount_sim.plant import TRUTH
+
+_STATUS_PERIOD = round(STATUS_EVERY * SAMPLE_TIME * 1e9)  # ns
 
 Write = Callable[[Topic, bytes, int], None]
 """Takes (topic, serialised message, stamp ns)."""
@@ -46,12 +51,14 @@ class Samples:
 class CoreMessages:
     """Packs samples and results and hands them on in the order of the stamps."""
 
-    def __init__(self, write: Write, write_columns: WriteColumns | None = None):
-        """Without `write_columns` every message goes to `write`."""
+    def __init__(self, write: Write, coil_celsius: float, write_columns: WriteColumns | None = None):
+        """Without `write_columns` every message goes to `write`; `coil_celsius` is what each status says."""
+        self._coil_celsius = coil_celsius
         self._write = write
         self._write_columns = write_columns or self._one_by_one
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
+        self._temperature = temperature_layout()
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
         self._trace = ScalarsLayout(topics.CONTROL_TRACE)
@@ -61,9 +68,12 @@ class CoreMessages:
 
     def write_samples(self, samples: Samples) -> None:
         """Write all samples and empty the block."""
-        for begin, end in _alike(samples.traced[: samples.count]):
+        stamps = samples.stamps[: samples.count]
+        for begin, end in _alike(samples.traced[: samples.count], stamps % _STATUS_PERIOD == 0):
             part = slice(begin, end)
-            self._write_columns(self._columns(samples, part), samples.stamps[part])
+            self._write_columns(self._columns(samples, part), stamps[part])
+            if stamps[end - 1] % _STATUS_PERIOD == 0:
+                self._write_temperature(int(stamps[end - 1]))
         samples.count = 0
 
     def write_off(self, stamp: int) -> None:
@@ -76,6 +86,9 @@ class CoreMessages:
         self._write(topics.AIR_GAP, self._air_gap.pack(stamp, numbers), stamp)
         table = serialised(to_message(stamp, result.table))
         self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
+
+    def _write_temperature(self, stamp: int) -> None:
+        self._write(topics.COIL_TEMPERATURE, self._temperature.pack(stamp, self._coil_celsius), stamp)
 
     def _columns(self, samples: Samples, part: slice) -> Columns:
         stamps, readings = samples.stamps[part], samples.readings[part]
@@ -108,8 +121,8 @@ def _numbers(records: NDArray[np.uint8]) -> NDArray[np.float64]:
     return records.view(np.float64)
 
 
-def _alike(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Yield (begin, end) of the stretches of equal flags."""
-    changes = (np.flatnonzero(np.diff(flags)) + 1).tolist()
+def _alike(flags: NDArray[np.bool_], ends: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yield (begin, end) of the stretches of equal flags; where `ends` is set one ends too."""
+    changes = (np.flatnonzero(np.diff(flags) | ends[:-1]) + 1).tolist()
     if len(flags):
         yield from zip([0, *changes], [*changes, len(flags)], strict=True)

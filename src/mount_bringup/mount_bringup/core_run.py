@@ -10,10 +10,10 @@ from mount_bringup import core_loop
 from mount_bringup.core_chain import CoreChain, Parameters
 from mount_bringup.core_messages import CoreMessages, Samples, Write, WriteColumns
 from mount_control.controller import Controller
-from mount_driver.quantisation import quantised_setpoint_current
+from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
-from mount_sim.electronics import Reading
+from mount_sim.electronics import STATUS_EVERY, Reading
 from mount_sim.parameters import SimParameters
 from mount_sim.scenario import build_excitation
 from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
@@ -46,7 +46,8 @@ def run_core(
     sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
     mount = SimulatedMount(sim.plant, build_excitation(sim), sim.seed)
     chain = CoreChain(parameters)
-    messages = CoreMessages(write, write_columns)
+    celsius = quantised_coil_temperature(sim.electronics.coil_temperature)
+    messages = CoreMessages(write, celsius, write_columns)
     samples = Samples(_BLOCK)
     pending: float | None = None
     begin = time.monotonic()
@@ -58,6 +59,8 @@ def run_core(
             taken, pending = _take_many(mount, chain, chain.controller, samples, pending)
             if taken:
                 continue
+        if mount.sample % STATUS_EVERY == 0:
+            chain.take_temperature(_stamp(mount), celsius)
         pending = _take_one(mount, chain, samples, pending)
         if chain.result is not None and not chain.controlled:
             messages.write_samples(samples)

@@ -29,7 +29,7 @@ Column = NDArray[np.float64]
 
 SECOND = 1_000_000_000  # ns
 _PERIOD = round(SAMPLE_TIME * SECOND)
-_INPUTS = (topics.DISPLACEMENT, topics.COIL_RIPPLE)
+_INPUTS = (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.COIL_TEMPERATURE)
 _READ = (
     *_INPUTS,
     topics.CURRENT_SETPOINT,
@@ -96,8 +96,8 @@ class ReplayInput:
     """Everything that goes into a replay; `notes` says in sentences what is not as one would expect.
 
     `zero` is the stamp (ns) from which times are told, that of the recording's first message; `log_shift`
-    (ns) leads from stamps to log times. `messages` are those of displacement and coil ripple by their
-    relative names.
+    (ns) leads from stamps to log times. `messages` are those of displacement, coil ripple and coil
+    temperature by their relative names.
     """
 
     source: str

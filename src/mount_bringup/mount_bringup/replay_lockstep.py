@@ -7,6 +7,7 @@ runs in the same domain neither hears nor disturbs them. A sample that is not an
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -37,6 +38,7 @@ from mount_ros.diagnostics import Level
 from mount_ros.force_table_message import from_bytes, to_message
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.scalars import ScalarsLayout, stamp_of
+from mount_ros.temperature_message import temperature_layout
 
 PATIENCE = 10.0  # s, chosen: a node that answers later does not answer
 _PERIOD = round(SAMPLE_TIME * 1e9)
@@ -100,7 +102,10 @@ class _Player:
         ]
         own = {'silence_timeout': PATIENCE}
         with self._node(MountInit, 'mount_init', own) as node, self._path(node) as path:
-            dialogue = _Dialogue(path.sender(topics.COIL_RIPPLE), ramp.stamps, messages)
+            send = _with_temperatures(
+                path.sender(topics.COIL_RIPPLE), path.sender(topics.COIL_TEMPERATURE), ramp
+            )
+            dialogue = _Dialogue(send, ramp.stamps, messages)
             results: dict[str, bytes] = {}
             path.subscribe(topics.CURRENT_SETPOINT, dialogue.take_setpoint)
             path.subscribe(topics.AIR_GAP, lambda raw: results.update(gap=raw))
@@ -228,6 +233,24 @@ class _Dialogue:
         """Return the setpoints (A) of all samples."""
         unpack = ScalarsLayout(topics.CURRENT_SETPOINT).unpack
         return np.array([unpack(raw)[1][0] for raw in self._answers])
+
+
+def _with_temperatures(send_ripple: Send, send_temperature: Send, ramp: Ramp) -> Send:
+    """Return what sends a ripple sample and behind it the temperatures that had come by its time.
+
+    Those from before the ramp go with its first sample, the newest of them only: a subscription keeps few.
+    """
+    layout = temperature_layout()
+    first = int(ramp.stamps[0])
+    earlier = [entry for entry in ramp.temperatures if entry[0] <= first]
+    due = deque([*earlier[-1:], *(entry for entry in ramp.temperatures if entry[0] > first)])
+
+    def send(raw: bytes) -> None:
+        send_ripple(raw)
+        while due and due[0][0] <= stamp_of(raw):
+            send_temperature(layout.pack(*due.popleft()))
+
+    return send
 
 
 def _control_answers(run: ControlRun, dialogue: _Dialogue, node: SafeLifecycleNode) -> ControlAnswers:

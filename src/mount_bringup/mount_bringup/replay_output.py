@@ -20,6 +20,7 @@ from mount_ros.topics import Topic
 _WRITTEN = (
     topics.DISPLACEMENT,
     topics.COIL_RIPPLE,
+    topics.COIL_TEMPERATURE,
     topics.CURRENT_SETPOINT,
     topics.AIR_GAP,
     topics.CURRENT_FORCE_TABLE,
@@ -49,9 +50,9 @@ def write_replay(folder: Path, given: ReplayInput, replayed: Replayed, session: 
 
 def _inputs(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
     remade = bool(replayed.ramps)
-    for topic in (topics.DISPLACEMENT, topics.COIL_RIPPLE):
+    for topic in (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.COIL_TEMPERATURE):
         recorded = given.messages.get(topic.name)
-        if recorded is None or (topic is topics.COIL_RIPPLE and not remade):
+        if recorded is None or (topic is not topics.DISPLACEMENT and not remade):
             continue
         for place, time in enumerate(recorded.log_times.tolist()):
             yield time, 0, topic, recorded.payloads[place]

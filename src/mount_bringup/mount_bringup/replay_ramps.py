@@ -1,6 +1,6 @@
 """The initialisations in a recording: their results, and the ramps whose samples are all there."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mount_bags.reading import Recording
 from mount_bringup.core_chain import chosen_specimen
+from mount_init.coil_temperature import TemperatureReadings
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 from mount_models.quantity import with_flattened
@@ -31,12 +32,16 @@ class MeasuredGap:
 
 @dataclass(frozen=True)
 class Ramp:
-    """The ripple samples that one initialisation took: stamps ns, A, A/s, T/s."""
+    """The ripple samples that one initialisation took: stamps ns, A, A/s, T/s.
+
+    `temperatures` are the coil temperatures (stamp ns, degC) up to its end; none in older recordings.
+    """
 
     stamps: Times
     coil_current: Column
     current_rate: Column
     flux_rate: Column
+    temperatures: tuple[tuple[int, float], ...] = ()
 
     def samples(self) -> Iterator[tuple[int, float, float, float]]:
         """Return the samples one by one, as an initialisation takes them."""
@@ -94,19 +99,37 @@ def ramps_of(
                 ripple['coil_current'][places],
                 ripple.derivative('coil_current')[places],
                 ripple.derivative('flux_density')[places],
+                _temperatures(recording, int(taken[-1])),
             )
         )
     return ramps
 
 
-def initialisation(parameters: dict[str, dict[str, Any]]) -> Initialisation:
-    """Return a ramp of mount_init with these parameters of the nodes, before its first sample."""
-    return Initialisation(*specimen_and_parameters(parameters))
+def initialisation(
+    parameters: dict[str, dict[str, Any]], temperatures: Iterable[tuple[int, float]] = ()
+) -> Initialisation:
+    """Return a ramp of mount_init with these parameters of the nodes, before its first sample.
+
+    `temperatures` are those of the coil (stamp ns, degC).
+    """
+    readings = TemperatureReadings()
+    for stamp, celsius in temperatures:
+        readings.take(stamp, celsius)
+    return Initialisation(*specimen_and_parameters(parameters), readings)
 
 
 def specimen_and_parameters(parameters: dict[str, dict[str, Any]]) -> tuple[Specimen, InitParameters]:
     """Return what mount_init is configured with."""
     return chosen_specimen(parameters), with_flattened(InitParameters(), parameters.get('mount_init', {}))
+
+
+def _temperatures(recording: Recording, end: int) -> tuple[tuple[int, float], ...]:
+    """Return the coil temperatures of the recording up to `end` (ns), in the order of their coming."""
+    if topics.COIL_TEMPERATURE.name not in recording or not len(recording[topics.COIL_TEMPERATURE.name]):
+        return ()
+    series = recording[topics.COIL_TEMPERATURE.name]
+    pairs = zip(series.stamps.tolist(), series['temperature'].tolist(), strict=True)
+    return tuple((stamp, celsius) for stamp, celsius in pairs if stamp <= end)
 
 
 def _ramp_length(parameters: dict[str, dict[str, Any]], notes: list[str]) -> int | None:

@@ -4,6 +4,7 @@ No ROS here: samples leave by a callback, setpoints come in by `send_setpoint` f
 """
 
 import atexit
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -36,7 +37,8 @@ class Clock(Protocol):
 class Exchange:
     """Owns the bus between `start` and `stop`; every way out of it sends 0 A first.
 
-    `on_sample(stamp_ns, measurement)` is called in the receiving thread for every new sample.
+    `on_sample(stamp_ns, measurement)` is called in the receiving thread for every new sample, and
+    `on_temperature(stamp_ns, celsius)` for a status with a coil temperature, with the last sample's stamp.
     """
 
     def __init__(
@@ -47,6 +49,7 @@ class Exchange:
         on_sample: Callable[[int, Measurement], None],
         *,
         lockstep: bool,
+        on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
     ):
         self.clock = clock
         self.link = Link(codec, round(parameters.setpoint_timeout * 1e9))
@@ -64,6 +67,8 @@ class Exchange:
         self._parameters = parameters
         self._codec = codec
         self._on_sample = on_sample
+        self._on_temperature = on_temperature
+        self._temperature_stamp: int | None = None  # of the temperature told last
         self._lockstep = lockstep
         self._ids = (codec.measurement.frame_id, codec.status.frame_id)
         self._bus: can.BusABC | None = None
@@ -137,7 +142,7 @@ class Exchange:
             elif message.arbitration_id == self._ids[0]:
                 self._take_measurement(message, received)
             elif message.arbitration_id == self._ids[1]:
-                self.link.take_status(message.data)
+                self._take_status(message)
         self._watch()
         return message is not None
 
@@ -153,6 +158,16 @@ class Exchange:
         stamp = self.clock.stamp(sample.microseconds, received)
         link.remember(stamp, sample.sample_counter)
         self._on_sample(stamp, sample)
+
+    def _take_status(self, message: can.Message) -> None:
+        link = self.link
+        status = link.take_status(message.data)
+        if status is None or link.last_sample is None or math.isnan(status.coil_temperature_celsius):
+            return
+        # The frame has no time of its own. A second one without a sample between has none at all.
+        if link.latest_stamp != self._temperature_stamp:
+            self._temperature_stamp = link.latest_stamp
+            self._on_temperature(link.latest_stamp, status.coil_temperature_celsius)
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1

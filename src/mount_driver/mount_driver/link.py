@@ -97,11 +97,12 @@ class Link:
         self._place = (place + 1) % _REMEMBERED
         self.latest_stamp = stamp
 
-    def take_status(self, data: bytes | bytearray) -> None:
-        """Keep the status of a frame if it is sound."""
+    def take_status(self, data: bytes | bytearray) -> Status | None:
+        """Keep the status of a frame if it is sound, and return it; else None."""
         status = self.statuses.receive(data)
         if status is not None:
             self.status = status
+        return status
 
     # To the electronics.
 

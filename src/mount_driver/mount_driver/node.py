@@ -14,11 +14,12 @@ from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.parameters import declare, read
 from mount_ros.process import run_node
 from mount_ros.scalars import ScalarsError, ScalarsLayout
-from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.temperature_message import temperature_layout
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
 
 
 class MountDriver(SafeLifecycleNode):
-    """Publishes `displacement` and `coil_ripple`, sends `current_setpoint`; away from active: 0 A."""
+    """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
 
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
@@ -30,6 +31,7 @@ class MountDriver(SafeLifecycleNode):
         self._started_ns = 0
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
         self._ripple_layout = ScalarsLayout(COIL_RIPPLE)
+        self._temperature_layout = temperature_layout()
         self._setpoint_layout = ScalarsLayout(CURRENT_SETPOINT)
 
     def configure(self) -> None:
@@ -38,6 +40,7 @@ class MountDriver(SafeLifecycleNode):
         path = self.open_data_path()
         self._publish_displacement = path.sender(DISPLACEMENT)
         self._publish_ripple = path.sender(COIL_RIPPLE)
+        self._publish_temperature = path.sender(COIL_TEMPERATURE)
         path.subscribe(CURRENT_SETPOINT, self._on_setpoint)
         path.start()
         self._path = path
@@ -47,7 +50,14 @@ class MountDriver(SafeLifecycleNode):
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
-        exchange = Exchange(self._settings, self._codec, clock, self._on_sample, lockstep=self.lockstep)
+        exchange = Exchange(
+            self._settings,
+            self._codec,
+            clock,
+            self._on_sample,
+            lockstep=self.lockstep,
+            on_temperature=self._on_temperature,
+        )
         self._watch = LinkWatch()
         self._started_ns = time.monotonic_ns()
         # In lock-step on a bus within this process, frames only come while the data thread is free.
@@ -81,6 +91,9 @@ class MountDriver(SafeLifecycleNode):
                 stamp, (sample.coil_current, math.nan), (sample.current_rate, sample.flux_rate)
             )
         )
+
+    def _on_temperature(self, stamp: int, celsius: float) -> None:
+        self._publish_temperature(self._temperature_layout.pack(stamp, celsius))
 
     def _on_setpoint(self, raw: bytes) -> None:
         exchange = self._exchange

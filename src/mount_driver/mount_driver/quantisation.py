@@ -20,6 +20,9 @@ CURRENT_RATE_STEPS = 1.0e3  # per A/s
 CURRENT_RATE_LIMIT = 100_000_000.0
 FLUX_RATE_STEPS = 1.0e4  # per T/s
 FLUX_RATE_LIMIT = 100_000_000.0
+COIL_TEMPERATURE_STEPS = 10.0  # per K
+COIL_TEMPERATURE_LOWEST = -600.0  # raw
+COIL_TEMPERATURE_HIGHEST = 2500.0
 SETPOINT_STEPS = 1.0e4  # per A
 SETPOINT_HIGHEST = 3.0  # A
 
@@ -46,6 +49,15 @@ def quantised_current_rate(rate: float) -> float:
 def quantised_flux_rate(rate: float) -> float:
     """Return the slope of the flux density (T/s) as it arrives, in 0.1 mT/s steps; NaN outside +-10 kT/s."""
     return _quantised(rate, FLUX_RATE_STEPS, FLUX_RATE_LIMIT)
+
+
+@compiled
+def quantised_coil_temperature(celsius: float) -> float:
+    """Return the coil temperature (degC) as it arrives, in steps of 0.1 K; NaN outside -60..250 degC."""
+    scaled = celsius * COIL_TEMPERATURE_STEPS
+    if not COIL_TEMPERATURE_LOWEST <= scaled <= COIL_TEMPERATURE_HIGHEST:
+        return math.nan
+    return np.rint(scaled) / COIL_TEMPERATURE_STEPS + 0.0
 
 
 @compiled

@@ -18,15 +18,16 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from mount_driver.codec import Setpoint
+from mount_driver.codec import Setpoint, Status
 from mount_driver.link import Arrival
 from mount_driver.node import MountDriver
 from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.scalars import ScalarsLayout, stamp_of
+from mount_ros.temperature_message import temperature_of
 from mount_ros.testing import LIMIT, wait_until
-from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT
 
 MS = 1_000_000
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -68,6 +69,8 @@ class Controller:
         self.order = []
         for topic in self.received:
             self.path.subscribe(topic, lambda raw, topic=topic: self._take(topic, raw))
+        self.temperatures = []
+        self.path.subscribe(COIL_TEMPERATURE, lambda raw: self.temperatures.append(temperature_of(raw)))
         self._publisher = self.path.publisher(CURRENT_SETPOINT)
         self._layout = ScalarsLayout(CURRENT_SETPOINT)
         self.path.start()
@@ -121,6 +124,18 @@ def test_frames_become_topics_with_true_stamps_and_values(active, controller, fa
     for k, (stamp, (current, flux), slopes) in enumerate(controller.received[COIL_RIPPLE]):
         assert (stamp, current, slopes) == (k * MS, pytest.approx(0.02 * k, abs=1e-12), (250.0, 80.0))
         assert math.isnan(flux)
+
+
+def test_the_coil_temperature_of_a_status_has_the_stamp_of_the_last_sample(active, controller, far):
+    active()
+    far.send_status(Status(14.0, 20.0))  # before any sample there is no time to give it
+    for index, celsius in ((0, 61.25), (100, math.nan), (200, -12.3)):
+        far.send(sample(index))
+        far.send_status(Status(14.0, celsius))
+        far.send_status(Status(14.0, 99.0) if index == 200 else Status(14.0, math.nan))
+    wait_until(lambda: len(controller.temperatures) >= 2, 'two temperatures')
+    controller.wait_for(3)
+    assert controller.temperatures == [(0, 61.2), (200 * MS, -12.3)]
 
 
 def test_a_displacement_that_is_not_valid_is_nan(active, controller, far):

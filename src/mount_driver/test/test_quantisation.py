@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mount_driver import quantisation
-from mount_driver.codec import Measurement, MountCodec, OutOfRangeError, Setpoint
+from mount_driver.codec import Measurement, MountCodec, OutOfRangeError, Setpoint, Status
 
 CODEC = MountCodec()
 SAMPLE = Measurement(0, 0, 0.0, 0.0, 0.0, 0.0)
@@ -63,6 +63,20 @@ def test_a_setpoint_is_quantised_as_over_can(value):
     assert same_bits(quantisation.quantised_setpoint_current(value), expected)
 
 
+@settings(max_examples=500, deadline=None)
+@given(st.floats(-61.0, 251.0) | anything)
+@example(-60.0)
+@example(250.0)
+@example(-0.01)
+@example(math.nextafter(250.0, math.inf))
+def test_a_coil_temperature_is_quantised_as_over_can(value):
+    try:
+        expected = CODEC.decode_status(CODEC.encode_status(Status(14.0, value), 0)).coil_temperature_celsius
+    except OutOfRangeError:
+        expected = math.nan
+    assert same_bits(quantisation.quantised_coil_temperature(value), expected)
+
+
 @settings(max_examples=200, deadline=None)
 @given(st.floats(-0.05, 0.05))
 def test_quantising_twice_changes_nothing(value):
@@ -82,6 +96,12 @@ def test_quantising_twice_changes_nothing(value):
 )
 def test_steps_and_limits_are_those_of_the_dbc(scaling, steps, limit):
     assert (scaling.steps, scaling.raw_low, scaling.raw_high) == (steps, -limit, limit)
+
+
+def test_step_and_limits_of_the_coil_temperature_are_those_of_the_dbc():
+    assert CODEC.coil_temperature.steps == quantisation.COIL_TEMPERATURE_STEPS
+    assert CODEC.coil_temperature.raw_low == quantisation.COIL_TEMPERATURE_LOWEST
+    assert CODEC.coil_temperature.raw_high == quantisation.COIL_TEMPERATURE_HIGHEST
 
 
 def test_the_setpoint_limits_are_those_of_the_dbc():

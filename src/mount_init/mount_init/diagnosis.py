@@ -1,5 +1,6 @@
 """What `mount_init` says of its result on `/diagnostics`; a pure function of figures."""
 
+import math
 from typing import NamedTuple
 
 from mount_init.initialisation import InitialisationResult
@@ -33,6 +34,8 @@ def verdict(figures: InitFigures, specimen: Specimen, parameters: InitParameters
         'contact_force_N': f'{result.contact_force:.2f}',
         'offset_current_A': f'{result.offset_current:.4f}',
         'highest_normal_force_N': f'{result.table[1, -1]:.1f}',
+        'coil_temperature_celsius': f'{result.evidence.temperature.celsius:.1f}',
+        'coil_temperature_from': result.evidence.temperature.source.value,
         'wear_reserve_um': f'{wear_reserve(result, specimen) * 1e6:.1f}',
         'samples_used': result.evidence.samples,
         'samples_invalid': result.evidence.skipped,
@@ -73,7 +76,14 @@ def _judge(figures: InitFigures, specimen: Specimen, parameters: InitParameters)
         )
     if figures.malformed:
         return Level.WARN, f'{figures.malformed} messages could not be read; {figures.malformed_reason}'
-    return Level.OK, (
+    gaps = (
         f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
         f'offset current {result.offset_current:.3f} A'
     )
+    if specimen.temperature is not None and math.isnan(result.evidence.temperature.celsius):
+        return Level.WARN, (
+            f'{gaps}; not compensated for the coil temperature, which is unknown: right at '
+            f'{specimen.temperature.calibration_celsius:.0f} degC, and off by a micrometre or more per kelvin '
+            'from there; is mount_driver publishing coil_temperature? Else set coil_temperature_celsius'
+        )
+    return Level.OK, gaps

@@ -106,11 +106,11 @@ def inductance_crossing(
 def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsius: float) -> RestGap:
     """Return the gap at 0 A from the inductance (H) at the rest current; raises `OutsideCalibrationError`.
 
-    The inductance is carried back from the coil temperature (degC) to that of the curves. The magnet already
-    closes the halves a little at the rest current: d_rest = d + F(i, d) / k_s.
+    The inductance is carried back from the coil temperature (degC) to that of the curves, unless that is
+    unknown (NaN). The magnet already closes the halves a little at the rest current: d_rest = d + F(i, d) / k_s.
     """
     try:
-        if specimen.temperature is not None:
+        if specimen.temperature is not None and not math.isnan(celsius):
             inductance = inductance_at_calibration(
                 specimen.temperature, specimen.gap_curves, inductance, celsius
             )
@@ -132,13 +132,15 @@ def contact_gap(
 ) -> ContactGap:
     """Return the gap at which the pads just touch, from the crossing current (A) at a temperature (degC).
 
+    A temperature that is unknown (NaN) is taken for that of the curves.
+
     At the crossing the pads are compressed by F_N = F(i, d) - k_s (d_rest - d), so d_c = d + F_N / k_p.
     Raises `OutsideCalibrationError`. A negative F_N is returned as it is, for `plausibility` to judge.
     """
     spring, pads = specimen.spring_stiffness, specimen.pad_stiffness
     try:
         at_curves = current
-        if specimen.temperature is not None:
+        if specimen.temperature is not None and not math.isnan(celsius):
             at_curves = crossing_at_calibration(specimen.temperature, specimen.gap_curves, current, celsius)
         gap = float(gap_from_crossing_current(specimen.gap_curves, at_curves))
         gap_slope = float(gap_per_crossing_current(specimen.gap_curves, at_curves))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mount_init.coil_temperature import CoilTemperature, TemperatureReadings, coil_temperature
 from mount_init.errors import (
     CurrentNotFollowingError,
     InitialisationError,
@@ -65,6 +66,7 @@ class Evidence:
     rest: RestGap
     contact: ContactGap
     curve: InductanceCurve
+    temperature: CoilTemperature
     samples: int
     skipped: int
 
@@ -87,9 +89,18 @@ class InitialisationResult:
 
 
 class Initialisation:
-    """Drives one current ramp, sample by sample, and estimates at its end."""
+    """Drives one current ramp, sample by sample, and estimates at its end.
 
-    def __init__(self, specimen: Specimen, parameters: InitParameters):
+    `temperatures` may go on taking readings meanwhile; the gaps are compensated for the one that held in the
+    middle of the ramp. It is looked up at the end, when it must have come, however late.
+    """
+
+    def __init__(
+        self,
+        specimen: Specimen,
+        parameters: InitParameters,
+        temperatures: TemperatureReadings | None = None,
+    ):
         if parameters.peak_current > specimen.current_limit:
             raise SpecimenMismatchError(
                 f'peak_current ({parameters.peak_current:.3f} A) must not exceed current_limit '
@@ -100,6 +111,8 @@ class Initialisation:
         self.ramp: Ramp = current_ramp(parameters, specimen.rest_current)
         self.readings = Readings(self.ramp.setpoints.size)
         self.last_stamp: int | None = None
+        self._temperatures = temperatures or TemperatureReadings()
+        self._middle_stamp: int | None = None
         self._setpoints: list[float] = self.ramp.setpoints.tolist()
         self._failure: InitialisationError | None = None
         self._deviating = 0
@@ -126,6 +139,8 @@ class Initialisation:
             return OFF
         number = self.readings.received
         self.last_stamp = stamp
+        if number == self.length // 2:
+            self._middle_stamp = stamp
         valid = self.readings.add(current, current_rate, flux_rate)
         self._watch(valid, current, self._setpoints[number - 1] if number else OFF)
         return OFF if self._failure is not None else self._setpoints[number]
@@ -147,7 +162,10 @@ class Initialisation:
                 'received; is mount_driver active?'
             )
         check_readings(self.readings, self.ramp, self.parameters)
-        evidence = _estimate(self.specimen, self.parameters, self.ramp, self.readings)
+        temperature = coil_temperature(
+            self._temperatures, self._middle_stamp, self.parameters.coil_temperature_celsius
+        )
+        evidence = _estimate(self.specimen, self.parameters, self.ramp, self.readings, temperature)
         return _complete(self.specimen, self.parameters, evidence)
 
     def _watch(self, valid: bool, current: float, setpoint: float) -> None:
@@ -179,7 +197,13 @@ def load_compiled_laws(specimen: Specimen) -> None:
     checked_current_for_force(law, float(checked_force(law, specimen.rest_current, middle)), middle)
 
 
-def _estimate(specimen: Specimen, parameters: InitParameters, ramp: Ramp, readings: Readings) -> Evidence:
+def _estimate(
+    specimen: Specimen,
+    parameters: InitParameters,
+    ramp: Ramp,
+    readings: Readings,
+    temperature: CoilTemperature,
+) -> Evidence:
     current, inductance = readings.current, readings.inductance(specimen.turns_area)
     level = specimen.crossing_inductance
 
@@ -189,7 +213,7 @@ def _estimate(specimen: Specimen, parameters: InitParameters, ramp: Ramp, readin
     ]
     for dwell in dwells:
         check_rest_current(specimen, dwell, parameters)
-    celsius = parameters.coil_temperature_celsius
+    celsius = temperature.celsius
     before, after = (rest_gap(specimen, dwell.inductance, dwell.inductance_std, celsius) for dwell in dwells)
     check_same_rest_gap(before, after, parameters)
     mean = _mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells])
@@ -219,6 +243,7 @@ def _estimate(specimen: Specimen, parameters: InitParameters, ramp: Ramp, readin
         rest=rest,
         contact=contact,
         curve=curve,
+        temperature=temperature,
         samples=readings.valid,
         skipped=readings.skipped,
     )

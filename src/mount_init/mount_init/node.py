@@ -2,6 +2,7 @@
 
 import math
 
+from mount_init.coil_temperature import TemperatureReadings
 from mount_init.diagnosis import InitFigures, verdict
 from mount_init.dialogue import CoilDialogue
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
@@ -16,6 +17,7 @@ from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.parameters import declare, read
 from mount_ros.process import run_node
 from mount_ros.scalars import ScalarsError, ScalarsLayout
+from mount_ros.temperature_message import temperature_of
 
 
 class MountInit(SafeLifecycleNode):
@@ -37,6 +39,7 @@ class MountInit(SafeLifecycleNode):
         Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
         load_compiled_laws(self._specimen)
         self._malformed, self._malformed_reason = 0, ''
+        self._temperatures = TemperatureReadings()
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
@@ -46,6 +49,7 @@ class MountInit(SafeLifecycleNode):
         self._send_table = path.sender(topics.CURRENT_FORCE_TABLE)
         self._dialogue = CoilDialogue(self._publish_setpoint)
         path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
+        path.subscribe(topics.COIL_TEMPERATURE, self._on_temperature)
         path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
         path.start()
 
@@ -55,7 +59,7 @@ class MountInit(SafeLifecycleNode):
         self.data_path.wake()
         parameters = self._init_parameters
         self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
-        ramp = Initialisation(self._specimen, parameters)
+        ramp = Initialisation(self._specimen, parameters, self._temperatures)
         # in lock-step only silence can tell a stalled chain from a slow machine
         total_timeout = math.inf if self.lockstep else parameters.total_timeout
         self._dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending)
@@ -100,6 +104,9 @@ class MountInit(SafeLifecycleNode):
             return
         if self._dialogue is not None:
             self._dialogue.take_ripple(stamp, current, current_rate, flux_rate)
+
+    def _on_temperature(self, raw: bytes) -> None:
+        self._temperatures.take(*temperature_of(raw))
 
     def _on_setpoint(self, raw: bytes) -> None:
         try:

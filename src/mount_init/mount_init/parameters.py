@@ -4,6 +4,7 @@ What belongs to the actuator and its calibration (rest current 0.2 A, crossing i
 gap curves, stiffnesses) stands in the specimen and nowhere else.
 """
 
+import math
 from typing import Annotated, NamedTuple
 
 from mount_models.quantity import Quantity
@@ -98,8 +99,10 @@ class InitParameters(NamedTuple):
 
     coil_temperature_celsius: Annotated[
         float,
-        Quantity('degC', 'coil temperature at the activation, for which the gaps are compensated', -60, 250),
-    ] = 20.0
+        Quantity(
+            'degC', 'coil temperature where none is measured; NaN: unknown', -60, 250, may_be_unknown=True
+        ),
+    ] = math.nan
 
     silence_timeout: Annotated[
         float,

@@ -7,6 +7,7 @@ import numba
 import numpy as np
 import pytest
 
+from mount_init.coil_temperature import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.actuator.reluctance import ReluctanceActuator, mean_incremental_inductance
@@ -93,17 +94,23 @@ class SimulatedActuator:
 
 
 def initialise(
-    plant: SimulatedActuator, specimen: Specimen, parameters: InitParameters | None = None
+    plant: SimulatedActuator,
+    specimen: Specimen,
+    parameters: InitParameters | None = None,
+    temperatures: TemperatureReadings | None = None,
 ) -> InitialisationResult:
     """Run a whole initialisation against `plant`, as plain function calls."""
-    return run(plant, specimen, parameters).result()
+    return run(plant, specimen, parameters, temperatures).result()
 
 
 def run(
-    plant: SimulatedActuator, specimen: Specimen, parameters: InitParameters | None = None
+    plant: SimulatedActuator,
+    specimen: Specimen,
+    parameters: InitParameters | None = None,
+    temperatures: TemperatureReadings | None = None,
 ) -> Initialisation:
     """Like `initialise`, up to the end of the ramp."""
-    initialisation = Initialisation(specimen, parameters or InitParameters())
+    initialisation = Initialisation(specimen, parameters or InitParameters(), temperatures)
     while not initialisation.finished:
         stamp = (plant.number + 1) * SAMPLE_TIME_NS
         plant.follow(initialisation.step(stamp, *plant.sample()))

@@ -11,7 +11,9 @@ from mount_ros.diagnostics import Level
 
 @pytest.fixture(scope='module')
 def result(simulated_actuator, specimen, run_initialisation):
-    return run_initialisation(simulated_actuator(noise=0.01), specimen)
+    return run_initialisation(
+        simulated_actuator(noise=0.01), specimen, InitParameters(coil_temperature_celsius=20.0)
+    )
 
 
 def judge(result, specimen, malformed=0, reason=''):

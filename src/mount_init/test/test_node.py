@@ -10,10 +10,12 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_init.node import MountInit
+from mount_init.parameters import InitParameters
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.force_table_message import from_bytes
 from mount_ros.scalars import ScalarsLayout
+from mount_ros.temperature_message import temperature_layout
 from mount_ros.testing import LIMIT, wait_until
 
 STEP = 1_000_000  # ns
@@ -36,6 +38,7 @@ class Electronics:
         self.path = DataPath(self.node, lockstep=True)
         self._publisher = self.path.publisher(topics.COIL_RIPPLE)
         self.foreign = self.path.publisher(topics.CURRENT_SETPOINT)
+        self._send_temperature = self.path.sender(topics.COIL_TEMPERATURE)
         self.path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
         self.path.subscribe(topics.AIR_GAP, lambda raw: self.results.append(self._air_gap.unpack(raw)))
         self.path.subscribe(topics.CURRENT_FORCE_TABLE, lambda raw: self.tables.append(from_bytes(raw)))
@@ -51,6 +54,9 @@ class Electronics:
         self._publisher.publish(
             self._ripple.pack(self.stamp, (current, float('nan')), (current_rate, flux_rate))
         )
+
+    def send_temperature(self, celsius):
+        self._send_temperature(temperature_layout().pack(self.stamp, celsius))
 
     def drive_as_another_node(self, current):
         self.foreign.publish(self._setpoint.pack(self.stamp, (current,)))
@@ -99,6 +105,11 @@ class Graph:
                 and node.count_subscribers('current_setpoint') == 2
                 and self.electronics._publisher.get_subscription_count() == 1
                 and node.count_subscribers('air_gap') == 1
+                and not any(
+                    'coil_temperature' in name
+                    for end in (self.init.data_path, self.electronics.path)
+                    for name in end.unmatched()
+                )
             ),
             'the connection of both sides',
         )
@@ -186,6 +197,21 @@ def test_activation_measures_in_lock_step_and_latches_gaps_and_table(
     verdict = g.init.judge()
     assert verdict.sentence.startswith('rest gap 507.5 um, contact gap 349.0 um')
     assert verdict.figures['last_stamp'] == stamp
+
+
+def test_a_measured_coil_temperature_is_compensated_as_in_plain_function_calls(
+    graph, simulated_actuator, specimen, run_initialisation
+):
+    g = graph(coil_temperature_celsius=90.0)
+    g.configure()
+    g.electronics.send_temperature(45.0)
+    g.electronics.send_sample()
+    assert g.change(Transition.TRANSITION_ACTIVATE)
+    wait_until(lambda: g.electronics.results, 'the gaps')
+    given = InitParameters(coil_temperature_celsius=45.0)
+    core = run_initialisation(simulated_actuator(), specimen, given)
+    assert g.electronics.results[0][1][:2] == (core.rest_gap, core.contact_gap)
+    assert g.init.judge().figures['coil_temperature_from'] == 'measured'
 
 
 def test_after_the_ramp_the_node_leaves_the_coil_to_others(graph):

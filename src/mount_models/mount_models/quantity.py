@@ -20,13 +20,17 @@ class ParameterError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a number means: unit, one sentence, allowed range (inclusive) and where it comes from."""
+    """What a number means: unit, one sentence, allowed range (inclusive) and where it comes from.
+
+    With `may_be_unknown` NaN is allowed beside the range.
+    """
 
     unit: str
     meaning: str
     low: float = -math.inf
     high: float = math.inf
     source: str = 'chosen'
+    may_be_unknown: bool = False
 
 
 def quantities(parameters: type[P] | P) -> dict[str, Quantity]:
@@ -107,6 +111,8 @@ def _checked_value(name: str, value: Any, kind: Any, quantity: Quantity | None) 
     if kind is int and int(value) != value:
         raise ParameterError(f'{name} must be a whole number; instead received {value!r}')
     if quantity is not None and not quantity.low <= value <= quantity.high:
+        if quantity.may_be_unknown and math.isnan(value):
+            return kind(value)
         raise ParameterError(
             f'{name} ({value:g} {quantity.unit}) must lie within '
             f'{quantity.low:g} .. {quantity.high:g} {quantity.unit}: {quantity.meaning}'

@@ -37,6 +37,9 @@ def _descriptor(quantity: Quantity | None, kind: type) -> ParameterDescriptor:
     if quantity is None:
         return descriptor
     descriptor.description = f'{quantity.meaning} [{quantity.unit}]; {quantity.source}'
+    if quantity.may_be_unknown:
+        descriptor.description += '; nan: unknown'
+        return descriptor  # rclpy holds NaN to be outside every range; `read` checks this one
     if kind is float and math.isfinite(quantity.low) and math.isfinite(quantity.high):
         descriptor.floating_point_range = [
             FloatingPointRange(from_value=float(quantity.low), to_value=float(quantity.high))

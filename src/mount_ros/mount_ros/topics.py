@@ -14,7 +14,7 @@ JOINT_STATE = 'sensor_msgs/msg/JointState'
 class Delivery(Enum):
     """How a topic travels; `mount_ros.qos` turns it into a quality of service."""
 
-    STREAM = 'stream'  # 1 kHz data: reliable publisher, keep last
+    STREAM = 'stream'  # data at a rate of its own: reliable publisher, keep last
     LATCHED = 'latched'  # reliable, transient local: late subscribers get the last one
     MARK = 'mark'  # occasional and never to be lost: reliable, keep last
 
@@ -66,6 +66,14 @@ COIL_RIPPLE = Topic(
     SAMPLE_RATE,
     'mean coil current, and the slopes of current and flux density 18 us after switching',
     (Scalar('coil_current', 'A', 'A/s'), Scalar('flux_density', 'T', 'T/s')),
+)
+
+COIL_TEMPERATURE = Topic(
+    'coil_temperature',
+    'sensor_msgs/msg/Temperature',
+    Delivery.STREAM,
+    10.0,
+    'temperature of the coil in degC as its type demands; silent while the electronics have no reading',
 )
 
 CURRENT_SETPOINT = Topic(
@@ -195,6 +203,7 @@ SIM_CLAMP_FORCE = Topic(
 TOPICS: tuple[Topic, ...] = (
     DISPLACEMENT,
     COIL_RIPPLE,
+    COIL_TEMPERATURE,
     CURRENT_SETPOINT,
     AIR_GAP,
     CURRENT_FORCE_TABLE,

@@ -11,6 +11,10 @@ from mount_models.compiled import compiled
 from mount_models.quantity import Quantity
 
 
+STATUS_EVERY = 100
+"""Samples from one status to the next: 10 Hz; the first sample has one."""
+
+
 class ElectronicsParameters(NamedTuple):
     """The electronics' own numbers; noise figures are standard deviations."""
 
@@ -34,8 +38,8 @@ class ElectronicsParameters(NamedTuple):
     ] = 0.0
     supply_voltage: Annotated[float, Quantity('V', 'supply as reported', 0.0, 60.0, 'chosen')] = 14.0
     coil_temperature: Annotated[
-        float, Quantity('degC', 'coil temperature as reported', -60.0, 250.0, 'chosen')
-    ] = 25.0
+        float, Quantity('degC', 'temperature of coil and core, and as reported', -60.0, 250.0, 'chosen')
+    ] = 20.0
 
 
 class Reading(NamedTuple):

@@ -9,11 +9,10 @@ from dataclasses import dataclass, field
 from mount_driver.codec import Status
 from mount_ros.timing import LatencyHistogram
 from mount_sim.can_end import CanEnd, ReceivedSetpoint
-from mount_sim.electronics import ElectronicsParameters
+from mount_sim.electronics import STATUS_EVERY, ElectronicsParameters
 from mount_sim.faults import Fault
 from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
 
-_STATUS_EVERY = 100  # samples: 10 Hz
 _LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
 _REMEMBERED = 1024  # samples whose sending time is kept
 _MICROSECONDS = 1_000_000
@@ -117,7 +116,7 @@ class ElectronicsLoop:
         self._sent_at[number % _REMEMBERED] = time.monotonic()
         if arriving is not None:
             self._can_end.send_frame(arriving)
-        if number % _STATUS_EVERY == 0:
+        if number % STATUS_EVERY == 0:
             self._can_end.send_status(self._status())
         self._publish(number)
         mount.advance(setpoint)

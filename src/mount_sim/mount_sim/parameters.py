@@ -22,6 +22,7 @@ from mount_sim.scenario import (
     SweepScenario,
     Timeline,
 )
+from mount_sim.warm_coil import TemperatureCoefficients
 
 
 class SimParameters(NamedTuple):
@@ -38,6 +39,7 @@ class SimParameters(NamedTuple):
     idle: IdleForce = IdleForce()
     actuator: ReluctanceActuator = ReluctanceActuator()
     coil: RippleCoil = RippleCoil()
+    temperature: TemperatureCoefficients = TemperatureCoefficients()
     mechanics: ClosingMechanics = ClosingMechanics()
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
@@ -52,6 +54,7 @@ class SimParameters(NamedTuple):
         return Plant(
             actuator=self.actuator,
             coil=self.coil,
+            temperature=self.temperature,
             mechanics=self.mechanics,
             friction=self.friction,
             contact=self.contact,

@@ -21,6 +21,7 @@ from mount_models.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, e
 from mount_sim.electronics import ElectronicsParameters, advance_current, read_sensors
 from mount_sim.excitation import Seat
 from mount_sim.mounts import Contents, SeatedMount
+from mount_sim.warm_coil import TemperatureCoefficients, coil_at
 
 _PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
 _BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
@@ -32,6 +33,7 @@ class Plant(NamedTuple):
 
     actuator: ReluctanceActuator = ReluctanceActuator()
     coil: RippleCoil = RippleCoil()
+    temperature: TemperatureCoefficients = TemperatureCoefficients()
     mechanics: ClosingMechanics = ClosingMechanics()
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
@@ -112,6 +114,8 @@ class PlantSimulation:
 
     def __init__(self, plant: Plant, seat: Seat, step_time: float):
         plant = Plant(*(checked(part) for part in plant))
+        celsius = plant.electronics.coil_temperature
+        plant = plant._replace(coil=coil_at(plant.coil, plant.temperature, celsius))
         checked_closing(plant.mechanics, plant.actuator)
         self._plant = record_bytes(plant)
         self._seat = int(seat)

@@ -16,6 +16,7 @@ from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate, incremental_inductance
 from mount_models.quantity import with_values
+from mount_sim.warm_coil import TemperatureCoefficients, coil_at
 
 FloatArray = NDArray[np.float64]
 
@@ -31,24 +32,12 @@ class RackError(ValueError):
 
 
 @dataclass(frozen=True)
-class RackTemperature:
-    """How the parts of the simulated rack change from 20 degC on: resistivity per kelvin (1/K), relative.
-
-    The core is of iron (chosen: 8 % less conductivity after 20 K), the coil of copper. Both are the rack's
-    own truth; a calibration may well assume something else.
-    """
-
-    core: float = 0.0043
-    copper: float = 0.0039
-
-
-@dataclass(frozen=True)
 class Rack:
     """A rack with one actuator in it; `noise` is the relative standard deviation of each sensor."""
 
     actuator: ReluctanceActuator = field(default_factory=ReluctanceActuator)
     coil: RippleCoil = field(default_factory=RippleCoil)
-    temperature: RackTemperature = field(default_factory=RackTemperature)
+    temperature: TemperatureCoefficients = field(default_factory=TemperatureCoefficients)
     noise: float = 0.01
     seed: int = 0
 
@@ -78,7 +67,7 @@ def record_ripple(
     Columns: time_s, gap_um, coil_temperature_c, current_a, current_rate_a_per_s and flux_rate_t_per_s. Noise
     is on both slopes, so that their quotient has `rack.noise`. Raises `RackError` where the bridge gives up.
     """
-    coil = coil_at(rack, temperature)
+    coil = coil_at(rack.coil, rack.temperature, temperature)
     count = round(duration * 1000.0)
     dwell = count // 3
     current = np.concatenate(
@@ -103,19 +92,10 @@ def record_ripple(
     }
 
 
-def coil_at(rack: Rack, temperature: float) -> RippleCoil:
-    """Return the coil and core plates at `temperature` (degC)."""
-    warmer = temperature - 20.0
-    return with_values(
-        rack.coil,
-        conductivity=rack.coil.conductivity / (1.0 + rack.temperature.core * warmer),
-        resistance=rack.coil.resistance * (1.0 + rack.temperature.copper * warmer),
-    )
-
-
 def true_inductance(rack: Rack, current: float, gap: float, temperature: float = 20.0) -> float:
     """Return what a perfect rack would measure (H), to judge a calibration by."""
-    return float(incremental_inductance(coil_at(rack, temperature), rack.actuator, current, gap))
+    coil = coil_at(rack.coil, rack.temperature, temperature)
+    return float(incremental_inductance(coil, rack.actuator, current, gap))
 
 
 def drawn_rack(seed: int, noise: float = 0.01) -> Rack:
@@ -137,7 +117,7 @@ def drawn_rack(seed: int, noise: float = 0.01) -> Rack:
             leakage_permeance=drawn(actuator.leakage_permeance),
         ),
         with_values(coil, conductivity=drawn(coil.conductivity)),
-        RackTemperature(core=drawn(0.0043, 0.2)),
+        TemperatureCoefficients(core=drawn(0.0043, 0.2)),
         noise,
         seed,
     )

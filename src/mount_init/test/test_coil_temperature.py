@@ -1,0 +1,124 @@
+"""Which coil temperature an initialisation is compensated for, and what it says without one."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from mount_init.coil_temperature import TemperatureReadings, TemperatureSource, coil_temperature
+from mount_init.diagnosis import InitFigures, verdict
+from mount_init.errors import OutsideCalibrationError
+from mount_init.parameters import InitParameters
+from mount_models.specimen import Specimen
+from mount_ros.diagnostics import Level
+
+SECOND = 1_000_000_000  # ns
+PARAMETERS = InitParameters(peak_current=2.5)
+
+
+def readings(*pairs):
+    made = TemperatureReadings()
+    for time, celsius in pairs:
+        made.take(round(time * SECOND), celsius)
+    return made
+
+
+def at(made, time):
+    return made.at(round(time * SECOND))
+
+
+def test_the_newest_reading_up_to_then_counts():
+    made = readings((1.0, 30.0), (1.1, 31.0), (1.2, 32.0))
+    assert at(made, 1.15) == 31.0
+    assert at(made, 1.2) == 32.0
+    assert math.isnan(at(made, 0.9))
+
+
+def test_a_reading_that_is_too_old_does_not_count():
+    assert at(readings((1.0, 30.0)), 6.0) == 30.0
+    assert math.isnan(at(readings((1.0, 30.0)), 6.001))
+
+
+def test_nan_is_no_reading():
+    assert at(readings((1.0, 30.0), (1.1, math.nan)), 1.2) == 30.0
+
+
+def test_readings_from_before_the_time_started_anew_are_gone():
+    """A new stream may come to the stamps of the old one before it has a reading of its own there."""
+    assert math.isnan(at(readings((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 7.5))
+    assert at(readings((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 9.0) == 20.0
+
+
+def test_at_10_hz_the_readings_of_the_longest_ramp_are_kept():
+    longest = 2 * (1.0 + 5.0 + 10.0) + 1.0 + 1.0  # s, of all durations
+    made = readings(*((0.1 * k, 20.0 + 0.1 * k) for k in range(round(10 * longest))))
+    assert at(made, 0.5 * longest) == pytest.approx(20.0 + 0.5 * longest)
+
+
+def test_what_is_measured_comes_before_what_is_given_and_that_before_nothing():
+    made = readings((1.0, 30.0))
+    assert coil_temperature(made, SECOND, 50.0) == (30.0, TemperatureSource.MEASURED)
+    assert coil_temperature(made, 0, 50.0) == (50.0, TemperatureSource.PARAMETER)
+    unknown = coil_temperature(made, 0, math.nan)
+    assert math.isnan(unknown.celsius)
+    assert unknown.source is TemperatureSource.UNKNOWN
+
+
+def warm(simulated_actuator, celsius):
+    """An actuator whose core and coil are that warm."""
+    plant, warmer = simulated_actuator(), celsius - 20.0
+    plant.coil = plant.coil._replace(
+        conductivity=plant.coil.conductivity / (1.0 + 0.0043 * warmer),
+        resistance=plant.coil.resistance * (1.0 + 0.0039 * warmer),
+    )
+    return plant
+
+
+def judged(result, specimen: Specimen):
+    return verdict(InitFigures(result, 1, 0, ''), specimen, PARAMETERS)
+
+
+def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
+    simulated_actuator, specimen, run_initialisation
+):
+    # the ramp begins at 1 ms; what comes behind its middle does not count any more
+    made = readings((0.0, 20.0), (1.3, 60.0), (1.5, 100.0))
+    measured = run_initialisation(warm(simulated_actuator, 60.0), specimen, PARAMETERS, made)
+    given = PARAMETERS._replace(coil_temperature_celsius=60.0)
+    expected = run_initialisation(warm(simulated_actuator, 60.0), specimen, given)
+    assert (measured.rest_gap, measured.contact_gap) == (expected.rest_gap, expected.contact_gap)
+    assert measured.evidence.temperature == (60.0, TemperatureSource.MEASURED)
+    said = judged(measured, specimen)
+    assert said.level == Level.OK
+    assert said.figures['coil_temperature_celsius'] == '60.0'
+    assert said.figures['coil_temperature_from'] == 'measured'
+
+
+def test_an_unknown_temperature_is_taken_for_that_of_the_calibration_with_a_warning(
+    simulated_actuator, specimen, run_initialisation
+):
+    result = run_initialisation(warm(simulated_actuator, 60.0), specimen, PARAMETERS)
+    calibrated = PARAMETERS._replace(coil_temperature_celsius=specimen.temperature.calibration_celsius)
+    expected = run_initialisation(warm(simulated_actuator, 60.0), specimen, calibrated)
+    assert (result.rest_gap, result.contact_gap) == (expected.rest_gap, expected.contact_gap)
+    assert abs(result.rest_gap - 508e-6) > 20e-6  # what the warning is for
+    said = judged(result, specimen)
+    assert said.level == Level.WARN
+    assert said.sentence.startswith('rest gap ')
+    assert 'not compensated for the coil temperature, which is unknown: right at 20 degC' in said.sentence
+    assert 'coil_temperature_celsius' in said.sentence
+    assert said.figures['coil_temperature_from'] == 'unknown'
+
+
+def test_a_specimen_without_compensation_asks_for_no_temperature(
+    simulated_actuator, specimen, run_initialisation
+):
+    plain = replace(specimen, temperature=None)
+    assert judged(run_initialisation(simulated_actuator(), plain, PARAMETERS), plain).level == Level.OK
+
+
+def test_a_measured_temperature_beyond_the_compensation_is_refused(
+    simulated_actuator, specimen, run_initialisation
+):
+    with pytest.raises(OutsideCalibrationError, match=r'coil temperature \(150\.0 degC\)'):
+        run_initialisation(simulated_actuator(), specimen, PARAMETERS, readings((0.0, 150.0)))
