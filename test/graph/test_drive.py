@@ -55,11 +55,14 @@ def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switchin
         '--mount', 'hydro', '--set', 'mount_control.switching=always', '--scenario', 'sweep',
         '--duration', '1', '--set', 'mount_sim.timeline.start=3',
         '--set', 'mount_sim.sweep.first_frequency=8', '--set', 'mount_sim.idle.amplitude=200',
+        '--set', 'mount_sim.electronics.coil_temperature=55.04',
     )  # fmt: skip
     lockstep, core = command.drive('--lockstep', *options), command.drive('--core', *options)
     assert lockstep.code == core.code == 0, lockstep.output + core.output
     for topic in DATA_TOPICS:
         assert _payloads(lockstep.folder, topic) == _payloads(core.folder, topic), topic
+    measured = mount_bags.open(core.folder / 'recording')['coil_temperature']['temperature']
+    assert set(measured) == {55.0}
     active = mount_bags.open(core.folder / 'recording')['control_trace']['damping_active']
     assert bool(active[:200].all()) is False
     assert bool(active[200:].all()) is True

@@ -4,17 +4,19 @@ Plant and controller share the friction law unless a test says otherwise; so the
 chain works, not how well the law describes a real mount.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mount_bringup import core_chain
 from mount_bringup.core_chain import chosen_damper, control_parameters
 from mount_bringup.core_run import CoreOutcome, run_core
 from mount_bringup.evaluation import Drive, switching, tracking_error
 from mount_bringup.mount_choice import with_control_of_mount
+from mount_models.specimen import default_specimen
 from mount_ros import topics
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import Topic
@@ -233,6 +235,29 @@ def test_without_noise_the_gaps_are_measured_within_a_micrometre(contact_gap, re
     result = _initialisation(mechanics__contact_gap=contact_gap, mechanics__rest_gap=rest_gap)
     assert result.contact_gap == pytest.approx(contact_gap, abs=1e-6)
     assert result.rest_gap == pytest.approx(rest_gap, abs=1e-6)
+
+
+@pytest.mark.parametrize('celsius', [-10.0, 20.0, 70.0])
+@pytest.mark.parametrize('core', [0.0035, 0.0043])
+def test_a_warm_or_cold_coil_is_compensated_by_its_measured_temperature(celsius, core):
+    """The controller assumes 0.0043 1/K of the core, measured between 20 and 80 degC."""
+    result = _initialisation(electronics__coil_temperature=celsius, temperature__core=core)
+    assert result.evidence.temperature.celsius == celsius
+    wrong = (0.0043 - core) * abs(celsius - 20.0)  # share of conductivity that the controller does not know
+    assert result.rest_gap == pytest.approx(508e-6, abs=2e-6 + 350e-6 * wrong)
+    assert result.contact_gap == pytest.approx(349e-6, abs=4e-6 + 200e-6 * wrong)
+
+
+def test_without_compensation_a_warm_coil_would_shift_both_gaps():
+    """8 % less conductive core: the plant follows its own coefficient. With the copper's it is +7 um."""
+    settings = {**SHORT, 'electronics.coil_temperature': 40.0, 'temperature.copper': 0.0}
+    unaware = replace(default_specimen(), temperature=None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(core_chain, 'chosen_specimen', lambda *_: unaware)
+        result = run_core({'mount_sim': settings}, lambda topic, raw, stamp: None).result
+    assert result is not None
+    assert result.rest_gap - 508e-6 == pytest.approx(-26e-6, abs=3e-6)
+    assert result.contact_gap - 349e-6 == pytest.approx(12e-6, abs=3e-6)
 
 
 def test_with_noise_the_gaps_of_20_seeds_stay_within_their_targets():

@@ -132,7 +132,7 @@ def _check_answers(run: Recording, inputs: Recording | None) -> None:
 
 
 def _of_the_ramp(messages: Messages, air_gap: Messages) -> Messages:
-    """Return the messages up to the last air gap: later ones of the initialisation's inputs are not needed."""
+    """Return the messages up to the last air gap: the initialisation needs none behind it."""
     last = air_gap.log_times[-1]
     return messages.chosen(np.flatnonzero(messages.log_times <= last))
 

@@ -20,14 +20,17 @@ class GraphNode:
 
 RECORDER = GraphNode('mount_recorder', 'mount_bags', 'MountRecorder', ())
 DRIVER = GraphNode(
-    'mount_driver', 'mount_driver', 'MountDriver', ('current_setpoint', 'displacement', 'coil_ripple')
+    'mount_driver',
+    'mount_driver',
+    'MountDriver',
+    ('current_setpoint', 'displacement', 'coil_ripple', 'coil_temperature'),
 )
 SIM = GraphNode('mount_sim', 'mount_sim', 'MountSim', ())
 INIT = GraphNode(
     'mount_init',
     'mount_init',
     'MountInit',
-    ('coil_ripple', 'current_setpoint'),
+    ('coil_ripple', 'coil_temperature', 'current_setpoint'),
     activations=3,  # chosen: the machine may be too busy for one ramp
 )
 CONTROL = GraphNode(

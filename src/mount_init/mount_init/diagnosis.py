@@ -83,7 +83,7 @@ def _judge(figures: InitFigures, specimen: Specimen, parameters: InitParameters)
     if specimen.temperature is not None and math.isnan(result.evidence.temperature.celsius):
         return Level.WARN, (
             f'{gaps}; not compensated for the coil temperature, which is unknown: right at '
-            f'{specimen.temperature.calibration_celsius:.0f} degC, and off by a micrometre or more per kelvin '
-            'from there; is mount_driver publishing coil_temperature? Else set coil_temperature_celsius'
+            f'{specimen.temperature.calibration_celsius:.0f} degC only; do the electronics report it '
+            '(topic coil_temperature)? Else set coil_temperature_celsius'
         )
     return Level.OK, gaps

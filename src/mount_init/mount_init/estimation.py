@@ -107,7 +107,8 @@ def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsi
     """Return the gap at 0 A from the inductance (H) at the rest current; raises `OutsideCalibrationError`.
 
     The inductance is carried back from the coil temperature (degC) to that of the curves, unless that is
-    unknown (NaN). The magnet already closes the halves a little at the rest current: d_rest = d + F(i, d) / k_s.
+    unknown (NaN). The magnet already closes the halves a little at the rest current, so
+    d_rest = d + F(i, d) / k_s.
     """
     try:
         if specimen.temperature is not None and not math.isnan(celsius):

@@ -82,7 +82,7 @@ def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
     simulated_actuator, specimen, run_initialisation
 ):
     # the ramp begins at 1 ms; what comes behind its middle does not count any more
-    made = readings((0.0, 20.0), (1.3, 60.0), (1.5, 100.0))
+    made = readings((0.0, 20.0), (1.3, 60.0), (1.4, 100.0))
     measured = run_initialisation(warm(simulated_actuator, 60.0), specimen, PARAMETERS, made)
     given = PARAMETERS._replace(coil_temperature_celsius=60.0)
     expected = run_initialisation(warm(simulated_actuator, 60.0), specimen, given)

@@ -1,6 +1,7 @@
 """The one declaration of every topic: name, type, delivery, rate, and the scalars that it carries.
 
-Names are relative, so that several mounts live in one car under namespaces. SI units everywhere.
+Names are relative, so that several mounts live in one car under namespaces. SI units, and
+degC where a type demands it.
 """
 
 from dataclasses import dataclass

@@ -10,7 +10,6 @@ from mount_models.coil.ripple import current_rate, flux_rate
 from mount_models.compiled import compiled
 from mount_models.quantity import Quantity
 
-
 STATUS_EVERY = 100
 """Samples from one status to the next: 10 Hz; the first sample has one."""
 

@@ -8,7 +8,7 @@ from mount_sim.mounts import MOUNTS
 from mount_sim.parameters import SimParameters
 
 README = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
-OWN = ('timeline', 'bench', 'motorway', 'sweep', 'recorded', 'idle', 'electronics', 'fault')
+OWN = ('timeline', 'bench', 'motorway', 'sweep', 'recorded', 'idle', 'electronics', 'temperature', 'fault')
 
 
 def rows(parameters, prefix=''):
