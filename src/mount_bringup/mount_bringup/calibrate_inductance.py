@@ -61,6 +61,7 @@ class InductanceResult:
             f'{_intervals(self.region.rising, 1.0)} A (rises), and by its current at '
             f'{_intervals(self.region.levels, 1e3)} mH; elsewhere it is ambiguous or unknown',
             f'temperature compensation: {self.compensated_by}',
+            *([_OPTIMISTIC] if any(row['source'] == 'predicted' for row in self.left) else []),
         ]
 
     def figures(self) -> dict[str, Any]:
@@ -190,6 +191,10 @@ def calibrate_inductance(
     return InductanceResult(calibration, compensation, how, region, left, found)
 
 
+_OPTIMISTIC = (
+    'rows marked predicted are optimistic: they hold the error of a wrong coefficient of the core alone, not '
+    'that of the skin formula, which only recordings held out at that temperature show'
+)
 _SAME_CELSIUS = 5.0  # K, chosen
 _SOURCES = {
     'fitted': 'measured, used by the fit',

@@ -1,6 +1,7 @@
 """The specimen after a calibration: new values, the rest from its base, and where each part comes from."""
 
 import datetime
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -128,10 +129,10 @@ def _fit_entry(fit: CurveFit) -> dict[str, Any]:
     }
 
 
-def _matrix(values: np.ndarray) -> list[list[float]]:
+def _matrix(values: np.ndarray) -> list[list[float | None]]:
     return [[_short(value) for value in row] for row in values]
 
 
-def _short(value: float) -> float:
-    """Return `value` with the four digits that say all there is to say."""
-    return float(f'{value:.4g}')
+def _short(value: float) -> float | None:
+    """Return `value` with the four digits that say all there is to say; None where it is unknown."""
+    return float(f'{value:.4g}') if math.isfinite(value) else None

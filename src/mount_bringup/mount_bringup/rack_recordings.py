@@ -27,7 +27,7 @@ from mount_bringup.recording_path import open_run
 from mount_models.actuator.points import gap_groups
 from mount_models.coil.gap import measured_inductance
 from mount_models.coil.gap_calibration import RippleRecording
-from mount_ros.topics import COIL_RIPPLE
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
 
 FloatArray = NDArray[np.float64]
 FORCE_SIGNAL = 'sim/clamp_force:wrench.force.z'
@@ -140,20 +140,26 @@ def _gap_of(file: Path, given: Mapping[Path, float]) -> float:
     """Return the gap (m) by option or by name; raises `RackRecordingError` without either."""
     if file in given:
         return given[file]
-    named = _GAP_IN_NAME.search(file.stem)
+    named = _GAP_IN_NAME.search(_bare_name(file))
     if named is None:
+        kind = '' if file.is_dir() else file.suffix
         raise RackRecordingError(
             f'{file}: its air gap is not known; add --gap {file.name}=UM, a column gap_um, or the gap '
             'to its name, '
-            f'as in ripple_349um{file.suffix}'
+            f'as in ripple_349um{kind}'
         )
     return float(named[1]) * 1e-6
+
+
+def _bare_name(file: Path) -> str:
+    """Return the name without the kind of file; a folder's has none, whatever stands behind its last dot."""
+    return file.name if file.is_dir() else file.stem
 
 
 def _celsius_of(file: Path, given: GivenValues) -> float:
     if file in given.celsius:
         return given.celsius[file]
-    named = _CELSIUS_IN_NAME.search(file.stem)
+    named = _CELSIUS_IN_NAME.search(_bare_name(file))
     if named is not None:
         return float(named[1])
     if given.celsius_of_others is None:
@@ -205,7 +211,11 @@ def _celsius(
 ) -> float:
     if 'coil_temperature' not in columns or file in given.celsius:
         return _celsius_of(file, given)
-    values = columns['coil_temperature'][rows]
+    return _settled(file, columns['coil_temperature'][rows])
+
+
+def _settled(file: Path, values: FloatArray) -> float:
+    """Return the mean of the coil's temperatures (degC); raises `RackRecordingError` if they ran away."""
     if np.ptp(values) > _LARGEST_DRIFT:
         raise RackRecordingError(
             f'{file}: the coil temperature ran from {values.min():.1f} to {values.max():.1f} degC, it may by '
@@ -223,8 +233,19 @@ def _ripple_from_bag(file: Path, given: GivenValues, turns_area: float) -> Rippl
     inductance = measured_inductance(
         turns_area, series.derivative('flux_density'), series.derivative('coil_current')
     )
-    gap, celsius = _gap_of(file, given.gap), _celsius_of(file, given)
-    return RippleRecording(file.name, gap, celsius, series['coil_current'], inductance)
+    current = series['coil_current']
+    finite = current[np.isfinite(current)]
+    check_alive(file, 'current', 'A', finite, np.zeros(finite.size))
+    gap = _gap_of(file, given.gap)
+    return RippleRecording(file.name, gap, _celsius_of_bag(recording, file, given), current, inductance)
+
+
+def _celsius_of_bag(recording: Recording, file: Path, given: GivenValues) -> float:
+    if file in given.celsius or not (
+        COIL_TEMPERATURE.name in recording and len(recording[COIL_TEMPERATURE.name])
+    ):
+        return _celsius_of(file, given)
+    return _settled(file, recording[COIL_TEMPERATURE.name]['temperature'])
 
 
 def _force_from_bag(

@@ -21,6 +21,7 @@ from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_cu
 from mount_models.coil.temperature import CompensationError, TemperatureCompensation, check_compensation
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.provenance import ProvenanceError, check_provenance
 from mount_models.quantity import Quantity, quantities
 
 T = TypeVar('T', bound=NamedTuple)
@@ -166,6 +167,10 @@ def checked_specimen(specimen: Specimen) -> Specimen:
     except (ForceLawRefusedError, GapCurvesRefusedError, CompensationError) as error:
         raise SpecimenError(f'{error}') from error
     _check_friction(specimen.friction)
+    try:
+        check_provenance(specimen.provenance)
+    except ProvenanceError as error:
+        raise SpecimenError(f'{error}; correct it or calibrate again') from error
     if specimen.current_limit > specimen.force_law.current_high:
         raise SpecimenError(
             f'current_limit ({specimen.current_limit:.2f} A) must not exceed force_law.current_high '

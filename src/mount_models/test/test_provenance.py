@@ -1,0 +1,100 @@
+"""The provenance of a specimen: free in what it tells, refused where it tells nonsense."""
+
+import copy
+import datetime
+import math
+from dataclasses import replace
+
+import pytest
+import yaml
+
+from mount_models.specimen import (
+    DEFAULT_SPECIMEN,
+    SpecimenError,
+    checked_specimen,
+    default_specimen,
+    load_specimen,
+    save_specimen,
+)
+
+GOOD = {
+    'written_by': 'engine-mount calibrate',
+    'remark': None,
+    'parts': {
+        'force_law': {
+            'specimen': 'left',
+            'date': '2026-05-04T10:00:00+00:00',
+            'recordings': [{'file': 'force.csv', 'sha256': 64 * 'a'}],
+            'valid': {'gap': [3e-4, 5e-4], 'current': [0.0, 3.0]},
+            'residuals': {'rms': 0.4, 'relative_rms': None, 'gaps': [3e-4, 5e-4]},
+            'covariance': [[1.0, -0.5], [-0.5, 2.0]],
+        },
+        'gap_curves': {
+            'specimen': 'left',
+            'inductance_of_gap': {'degree': 3, 'covariance': [[0.0]]},
+        },
+    },
+}
+
+
+def with_entry(path, value):
+    changed = copy.deepcopy(GOOD)
+    *outer, last = path.split('.')
+    inside = changed
+    for name in outer:
+        inside = inside[name]
+    inside[last] = value
+    return replace(default_specimen(), provenance=changed)
+
+
+def test_a_good_provenance_comes_back_from_its_file(tmp_path):
+    specimen = replace(default_specimen(), provenance=GOOD)
+    save_specimen(specimen, tmp_path / 'left.yaml')
+    assert load_specimen(tmp_path / 'left.yaml').provenance == GOOD
+
+
+NONSENSE = [
+    ('temperature', math.nan, r'provenance\.temperature must be a finite number; instead received nan'),
+    ('parts.force_law.residuals.gaps', [3e-4, math.inf], r'residuals\.gaps\[1\] must be a finite number'),
+    ('remark', {1, 2}, r'provenance\.remark must be a text, a number, or a list'),
+    ('remark', {7: 'seven'}, r'provenance\.remark must have texts as names; instead received 7'),
+    ('parts', 3, r'provenance\.parts must be a mapping of parts'),
+    ('parts.force_law', 'by hand', r'provenance\.parts\.force_law must be a mapping with the name'),
+    ('parts.force_law.specimen', '', r'force_law must be a mapping with the name of a specimen'),
+    ('parts.force_law.date', 'yesterday', r"force_law\.date must be a text such as .* received 'yesterday'"),
+    ('parts.force_law.date', datetime.date(2026, 5, 4), r'force_law\.date must be a text'),
+    ('parts.force_law.recordings', [], r'force_law\.recordings must be a list of recordings'),
+    ('parts.force_law.recordings', [{'file': 'a.csv'}], r'recordings\[0\] must tell file and sha256'),
+    (
+        'parts.force_law.recordings',
+        [{'file': 'a.csv', 'sha256': 'abc'}],
+        r'recordings\[0\] must tell file and sha256 \(64',
+    ),
+    ('parts.force_law.valid', {'gap': [5e-4, 3e-4]}, r'valid\.gap must be two numbers in rising order'),
+    ('parts.force_law.valid', 'always', r"force_law\.valid must be two numbers .* received 'always'"),
+    ('parts.force_law.covariance', [[1.0, 2.0]], r'covariance must be a square matrix'),
+    ('parts.force_law.covariance', [[-1.0]], r'covariance must be a square matrix of numbers, none below 0'),
+    ('parts.force_law.covariance', [[True]], r'covariance must be a square matrix'),
+    ('parts.gap_curves.inductance_of_gap.covariance', 2.0, r'inductance_of_gap\.covariance must be a square'),
+]
+
+
+@pytest.mark.parametrize(('path', 'value', 'sentence'), NONSENSE)
+def test_nonsense_is_refused_by_its_place(path, value, sentence):
+    with pytest.raises(SpecimenError, match=sentence + '.*calibrate again'):
+        checked_specimen(with_entry(path, value))
+
+
+def test_nonsense_written_into_the_file_by_hand_is_refused_when_it_is_loaded(tmp_path):
+    content = yaml.safe_load(DEFAULT_SPECIMEN.read_text(encoding='utf-8'))
+    content['provenance']['coil']['turns'] = math.nan
+    file = tmp_path / 'edited.yaml'
+    file.write_text(yaml.safe_dump(content), encoding='utf-8')
+    with pytest.raises(SpecimenError, match=r'edited\.yaml: provenance\.coil\.turns must be a finite number'):
+        load_specimen(file)
+
+
+def test_nothing_is_written_of_a_specimen_with_nonsense(tmp_path):
+    with pytest.raises(SpecimenError):
+        save_specimen(with_entry('temperature', math.nan), tmp_path / 'left.yaml')
+    assert not list(tmp_path.iterdir())
