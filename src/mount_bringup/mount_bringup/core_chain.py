@@ -52,8 +52,8 @@ def friction_model(parameters: Parameters) -> tuple[FrictionCoefficients, Fricti
     specimen, control = chosen_specimen(parameters, 'mount_control'), parameters.get('mount_control', {})
     check_fits(control_parameters(parameters), specimen)
     return (
-        identified(specimen, with_flattened(FrictionCoefficients(), control, 'friction')),
-        identified(specimen, with_flattened(FrictionContact(), control, 'contact')),
+        identified(specimen, FrictionCoefficients(), control, 'friction'),
+        identified(specimen, FrictionContact(), control, 'contact'),
     )
 
 

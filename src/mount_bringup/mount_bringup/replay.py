@@ -176,7 +176,23 @@ def _load_displacement(recording: Recording) -> float:
 def _changed(given: ReplayInput, changes: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     if 'mount_init' in changes and not any(part not in given.controls for part in given.parts):
         raise ReplayError('there is no initialisation to replay, so parameters of mount_init change nothing')
-    return {node: {**given.parameters.get(node, {}), **changes.get(node, {})} for node in REPLAYED_NODES}
+    return with_changes(given.parameters, changes)
+
+
+def with_changes(
+    recorded: Mapping[str, Mapping[str, Any]], changes: Mapping[str, Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """Return the parameters of the nodes that replay, changed.
+
+    With another `parameters_file` the recorded friction goes: it may be that of the file before.
+    """
+    parameters = {node: dict(recorded.get(node, {})) for node in REPLAYED_NODES}
+    if 'parameters_file' in changes.get('mount_control', {}):
+        control = parameters['mount_control']
+        parameters['mount_control'] = {
+            name: value for name, value in control.items() if not name.startswith(('friction.', 'contact.'))
+        }
+    return {node: {**values, **changes.get(node, {})} for node, values in parameters.items()}
 
 
 def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:

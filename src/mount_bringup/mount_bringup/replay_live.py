@@ -19,7 +19,7 @@ from mount_bringup.domain import domain_lock
 from mount_bringup.graph import SIMULATED
 from mount_bringup.keyboard import Keyboard
 from mount_bringup.recording_path import open_run
-from mount_bringup.replay import check_parameters
+from mount_bringup.replay import check_parameters, with_changes
 from mount_bringup.replay_input import Notes, ReplayError, has, recorded_parameters
 from mount_bringup.replay_live_control import LiveControl
 from mount_bringup.replay_lockstep import ros_context
@@ -252,7 +252,7 @@ def _parameters(recording: Recording, order: LiveOrder, gaps: list[MeasuredGap])
     if not gaps:
         raise ReplayError(f'{order.recording} holds no air_gap with its table: --with-control cannot begin')
     recorded = recorded_parameters(recording, Notes())
-    parameters = {node: {**values, **order.changes.get(node, {})} for node, values in recorded.items()}
+    parameters = with_changes(recorded, order.changes)
     check_parameters(parameters)
     return parameters
 

@@ -120,7 +120,7 @@ def test_a_recording_without_what_is_needed_is_refused(tmp_path):
     with pytest.raises(RackRecordingError, match='its air gap is not known; add --gap held=UM'):
         read_ripple([bag], {}, NOTHING, AREA)
     given = GivenValues({bag: 349e-6}, {})
-    with pytest.raises(RackRecordingError, match='has no topic sim/mount_force; it holds .*clamp_force'):
+    with pytest.raises(RackRecordingError, match=r'has no topic sim/mount_force; it holds .*clamp_force'):
         read_force([bag], {'force': 'sim/mount_force:wrench.force.z'}, given)
     with pytest.raises(RackRecordingError, match='of an MCAP recording write TOPIC:FIELD'):
         read_force([bag], {'force': 'kraft'}, given)

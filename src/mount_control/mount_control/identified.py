@@ -1,29 +1,22 @@
 """What a specimen file says about the friction, put into the controller's parameters."""
 
-from typing import NamedTuple, TypeVar
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar
 
 from mount_control.parameters import ControlParameters
-from mount_models.quantity import with_values
+from mount_models.quantity import with_flattened, with_values
 from mount_models.specimen import Specimen, SpecimenError
 
 P = TypeVar('P', bound=NamedTuple)
 
 
-def identified(specimen: Specimen, parameters: P) -> P:
-    """Return `parameters` with the values of the specimen wherever they still have their defaults.
+def identified(specimen: Specimen, defaults: P, settings: Mapping[str, Any], prefix: str) -> P:
+    """Return the set that holds: what `settings` name as `prefix.name`, else the specimen's, else `defaults`.
 
-    A parameter that was set to something else stays as it was set.
+    What is set holds even where it equals the default.
     """
-    defaults = type(parameters)._field_defaults
-    values = parameters._asdict()
-    return with_values(
-        parameters,
-        **{
-            name: value
-            for name, value in specimen.friction.items()
-            if name in values and values[name] == defaults[name]
-        },
-    )
+    known = {name: value for name, value in specimen.friction.items() if name in defaults._fields}
+    return with_flattened(with_values(defaults, **known), settings, prefix)
 
 
 def check_fits(settings: ControlParameters, specimen: Specimen) -> None:

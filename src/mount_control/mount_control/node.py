@@ -7,7 +7,7 @@ from mount_control.activation import MeasurementStream, check_belongs
 from mount_control.controller import TRACE, Controller, load_compiled_law
 from mount_control.diagnosis import ControlFigures, verdict
 from mount_control.force_to_current import ForceTableError, resample
-from mount_control.identified import check_fits, identified
+from mount_control.identified import check_fits
 from mount_control.parameters import ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_models.damper import damper_curve
@@ -19,7 +19,7 @@ from mount_ros import topics
 from mount_ros.diagnostics import Verdict
 from mount_ros.force_table_message import ForceTable, ForceTableMessageError, from_bytes
 from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.parameters import declare, read
+from mount_ros.parameters import SpecimenValues, declare, read
 from mount_ros.process import run_node
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.timing import LatencyHistogram
@@ -39,6 +39,7 @@ class MountControl(SafeLifecycleNode):
         self.declare_parameter('damper', 'viscous_2000')
         self.declare_parameter('parameters_file', '')
         self.declare_parameter('specimen', '')
+        self._of_specimen = SpecimenValues(self)
         self._controller: Controller | None = None
         self._table: ForceTable | None = None
         self._air_gap: tuple[int, tuple[float, ...]] | None = None
@@ -54,8 +55,10 @@ class MountControl(SafeLifecycleNode):
             str(self.get_parameter('parameters_file').value), str(self.get_parameter('specimen').value)
         )
         check_fits(self._settings, specimen)
-        self._friction = identified(specimen, read(self, FrictionCoefficients(), 'friction'))
-        self._contact = identified(specimen, read(self, FrictionContact(), 'contact'))
+        self._of_specimen.give(FrictionCoefficients(), 'friction', specimen.friction)
+        self._of_specimen.give(FrictionContact(), 'contact', specimen.friction)
+        self._friction = read(self, FrictionCoefficients(), 'friction')
+        self._contact = read(self, FrictionContact(), 'contact')
         self._damper = damper_curve(self.get_parameter('damper').value)
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)

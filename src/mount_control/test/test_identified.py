@@ -14,12 +14,15 @@ SPECIMEN = replace(default_specimen(), friction={'a_p1': 0.4, 'contact_stiffness
 
 
 def test_what_was_identified_replaces_defaults():
-    assert identified(SPECIMEN, FrictionCoefficients()) == FrictionCoefficients(a_p1=0.4)
-    assert identified(SPECIMEN, FrictionContact()) == FrictionContact(contact_stiffness=3e6)
+    assert identified(SPECIMEN, FrictionCoefficients(), {}, 'friction') == FrictionCoefficients(a_p1=0.4)
+    assert identified(SPECIMEN, FrictionContact(), {}, 'contact') == FrictionContact(contact_stiffness=3e6)
 
 
-def test_what_was_set_stays():
-    assert identified(SPECIMEN, FrictionCoefficients(a_p1=0.7)).a_p1 == 0.7
+def test_what_was_set_stays_even_if_it_is_the_default():
+    for value in (0.7, FrictionCoefficients().a_p1):
+        settings = {'friction.a_p1': value, 'friction.a_p2': 0.1, 'contact.a_p1': 9.0}
+        found = identified(SPECIMEN, FrictionCoefficients(), settings, 'friction')
+        assert found == FrictionCoefficients(a_p1=value, a_p2=0.1)
 
 
 def test_a_current_beyond_the_calibration_is_refused():

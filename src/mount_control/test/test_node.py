@@ -1,6 +1,7 @@
 """The node between a driver and an initialisation that the test plays, in the real middleware."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from rclpy.parameter import Parameter
 
 from mount_control.controller import Controller
 from mount_control.force_to_current import resample
+from mount_control.identified import identified
 from mount_control.node import MountControl
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.specimen import default_specimen, load_specimen, save_specimen
 from mount_ros import topics
 from mount_ros.cdr import serialised
 from mount_ros.data_path import DataPath
@@ -375,6 +378,27 @@ def test_parameters_that_cannot_work_are_refused_at_configure(make_control, para
     assert control.trigger_configure() == FAILURE
     assert reason in control._refusal
     assert control.data_path is None
+
+
+def test_the_friction_of_a_specimen_is_in_the_parameters_that_the_session_will_tell(make_control, tmp_path):
+    """What is set on purpose stays, even if it is the default; core and node agree on the rest."""
+    friction = {'a_p1': 0.4, 'a_p2': 0.05, 'contact_stiffness': 3e6}
+    save_specimen(replace(default_specimen(), friction=friction), tmp_path / 'left.yaml')
+    default = FrictionCoefficients().a_p1
+    settings = {'parameters_file': str(tmp_path / 'left.yaml'), 'friction.a_p1': default}
+    control = make_control(**settings)
+    assert control.trigger_configure() == SUCCESS
+    names = ('friction.a_p1', 'friction.a_p2', 'contact.contact_stiffness')
+    assert [control.get_parameter(name).value for name in names] == [default, 0.05, 3e6]
+    assert control._friction == FrictionCoefficients(a_p2=0.05)
+    assert control._contact == FrictionContact(contact_stiffness=3e6)
+    specimen = load_specimen(tmp_path / 'left.yaml')
+    assert identified(specimen, FrictionCoefficients(), settings, 'friction') == control._friction
+    # another file, another friction
+    assert control.trigger_cleanup() == SUCCESS
+    control.set_parameters([Parameter('parameters_file', value='')])
+    assert control.trigger_configure() == SUCCESS
+    assert control._friction == FrictionCoefficients()
 
 
 def test_silence_is_told_in_real_time(active, around):

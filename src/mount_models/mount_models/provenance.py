@@ -1,7 +1,7 @@
 """Where a specimen comes from: free in its entries, but nothing in it may be nonsense.
 
-Known entries have a form: `parts` with the `specimen` of each, `recordings` with their hashes, `valid` ranges,
-square `covariance`, `date`. All others hold texts, finite numbers, and lists and mappings of them.
+Known entries have a form: `parts` with the `specimen` of each, `recordings` with their hashes, `valid`
+ranges, square `covariance`, `date`. All others hold texts, finite numbers, and lists and mappings of them.
 """
 
 import datetime

@@ -1,10 +1,12 @@
 """Node parameters declared from parameter sets: unit, sentence and range travel with the value."""
 
 import math
-from typing import NamedTuple, TypeVar, get_type_hints
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity, flattened, quantities, with_flattened
 
@@ -30,6 +32,38 @@ def read(node: Node, defaults: P, prefix: str = '') -> P:
         return with_flattened(defaults, values, prefix)
     except ParameterError as error:
         raise ParameterError(f'{node.get_name()}: {error}') from None
+
+
+class SpecimenValues:
+    """Gives parameters the values of a file, except those that somebody has set otherwise.
+
+    Set otherwise is what came with the start of the node, even if it equals the default, and what was changed
+    since to another value. After `give` the parameters of the node are those in use.
+    """
+
+    def __init__(self, node: Node):
+        self._node = node
+        self._given: dict[str, Any] = {}
+        # The only trace that rclpy keeps of values given at the start; without it they look like defaults.
+        self._at_start = set(node._parameter_overrides)
+
+    def give(self, defaults: NamedTuple, prefix: str, values: Mapping[str, Any]) -> None:
+        """Set the declared parameters of the set `defaults` to `values` where nobody has set them.
+
+        What an earlier file gave goes back to its default if this one does not name it. Raises
+        `ParameterError` for a value that the parameter refuses.
+        """
+        changes = {}
+        for name, default in flattened(defaults).items():
+            full = f'{prefix}.{name}' if prefix else name
+            present = self._node.get_parameter(full).value
+            if full not in self._at_start and present == self._given.get(full, default):
+                self._given[full] = values.get(name, default)
+                if self._given[full] != present:
+                    changes[full] = self._given[full]
+        for result in self._node.set_parameters([Parameter(name, value=v) for name, v in changes.items()]):
+            if not result.successful:
+                raise ParameterError(f'{self._node.get_name()}: {result.reason}')
 
 
 def _descriptor(quantity: Quantity | None, kind: type) -> ParameterDescriptor:

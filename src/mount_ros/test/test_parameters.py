@@ -8,7 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity
-from mount_ros.parameters import declare, read
+from mount_ros.parameters import SpecimenValues, declare, read
 
 
 class Spring(NamedTuple):
@@ -102,3 +102,50 @@ def test_what_ros_lets_through_is_refused_when_it_is_read_and_the_node_is_named(
     node = make_node(open_ended=value)
     with pytest.raises(ParameterError, match=r'^subject: open_ended \(.* s\) must lie within 0 \.\. inf s'):
         read(node, Settings())
+
+
+def test_a_number_that_may_be_unknown_may_be_nan_and_no_other(context):
+    class Measured(NamedTuple):
+        celsius: Annotated[float, Quantity('degC', 'how warm', -60, 250, may_be_unknown=True)] = float('nan')
+
+    for value, refused in ((None, False), (25.0, False), (float('nan'), False), (300.0, True)):
+        overrides = [] if value is None else [Parameter('celsius', value=value)]
+        node = Node('subject', context=context, parameter_overrides=overrides)
+        declare(node, Measured())
+        if refused:
+            with pytest.raises(
+                ParameterError, match='celsius \\(300 degC\\) must lie within -60 .. 250 degC'
+            ):
+                read(node, Measured())
+        else:
+            assert str(read(node, Measured()).celsius) == str(float('nan') if value is None else value)
+        node.destroy_node()
+
+
+# Values of a file.
+
+
+def test_a_file_gives_values_where_nobody_set_them(make_node):
+    node = make_node(level=0.003)
+    SpecimenValues(node).give(Settings(), '', {'level': 0.004, 'count': 7, 'spring.stiffness': 9.0, 'x': 1.0})
+    assert read(node, Settings()) == Settings(0.003, 7, 5.0, 'first', Spring(9.0))
+
+
+def test_a_parameter_set_to_its_default_on_purpose_stays(make_node):
+    node = make_node(level=0.002)
+    SpecimenValues(node).give(Settings(), '', {'level': 0.004})
+    assert read(node, Settings()).level == 0.002
+
+
+def test_what_was_changed_after_a_file_stays_and_the_rest_follows_the_next_file(make_node):
+    node = make_node('plant')
+    values = SpecimenValues(node)
+    values.give(Settings(), 'plant', {'level': 0.004, 'count': 7, 'open_ended': 1.0})
+    node.set_parameters([Parameter('plant.level', value=0.005)])
+    values.give(Settings(), 'plant', {'level': 0.006, 'count': 8})
+    assert read(node, Settings(), 'plant') == Settings(0.005, 8)
+
+
+def test_a_value_that_the_parameter_refuses_is_told(make_node):
+    with pytest.raises(ParameterError, match=r'subject: .*level'):
+        SpecimenValues(make_node()).give(Settings(), '', {'level': 0.5})
