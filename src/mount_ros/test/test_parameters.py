@@ -114,7 +114,7 @@ def test_a_number_that_may_be_unknown_may_be_nan_and_no_other(context):
         declare(node, Measured())
         if refused:
             with pytest.raises(
-                ParameterError, match='celsius \\(300 degC\\) must lie within -60 .. 250 degC'
+                ParameterError, match=r'celsius \(300 degC\) must lie within -60 \.\. 250 degC'
             ):
                 read(node, Measured())
         else:

@@ -1,0 +1,46 @@
+"""A drive with a warm coil, replayed: the recorded temperature compensates as it did in the drive."""
+
+import pytest
+
+import mount_bags
+from mount_bags.accept import accept
+from mount_bringup.core_recording import record_core
+from mount_bringup.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from mount_bringup.replay_ramps import measured_gaps
+from mount_bringup.supervisor import session_text
+
+SIM = {
+    'scenario': 'bench',
+    'timeline.start': 2.8,
+    'timeline.duration': 0.4,
+    'bench.amplitude': 0.0015,
+    'electronics.coil_temperature': 55.0,
+}
+
+
+@pytest.fixture(scope='module')
+def warm_drive(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('warm') / 'drive'
+    parameters = {'mount_sim': SIM, 'mount_init': {'coil_temperature_celsius': float('nan')}}
+    record_core(folder, parameters, session_text({'parameters': parameters}))
+    return folder
+
+
+@pytest.mark.parametrize('mode', [CORE, LOCKSTEP])
+def test_the_replayed_initialisation_finds_the_recorded_gaps_to_the_bit(warm_drive, mode, domain, tmp_path):
+    outcome = replay(ReplayOrder(warm_drive, mode, out=tmp_path / 'replay', domain=domain))
+    assert outcome.held
+    (ramp,) = outcome.replayed.ramps
+    (recorded,) = measured_gaps(mount_bags.open(warm_drive))
+    assert ramp.gap.numbers == recorded.numbers
+    assert abs(ramp.gap.numbers['rest_gap'] - 508e-6) < 5e-6  # without compensation some 40 um less
+    kept = mount_bags.open(outcome.folder.recording)['coil_temperature']
+    assert kept.stamps.tolist() == mount_bags.open(warm_drive)['coil_temperature'].stamps.tolist()
+    assert set(kept['temperature']) == {55.0}
+
+
+def test_a_reference_keeps_the_temperatures_of_its_initialisation(warm_drive, tmp_path):
+    accepted = accept(mount_bags.open(warm_drive), 'warm', 'a warm coil', tmp_path)
+    stamps = mount_bags.open(accepted.folder)['coil_temperature'].stamps
+    assert stamps.tolist() == [100_000_000 * k for k in range(28)]
+    assert replay(ReplayOrder(accepted.folder, CORE, out=tmp_path / 'replay')).held
