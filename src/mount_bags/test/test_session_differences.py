@@ -21,3 +21,10 @@ def test_what_differs_in_every_run_is_not_told():
 
 def test_sessions_that_are_no_yaml_are_compared_as_texts():
     assert session_differences('one: [', 'two: [') == ['text is one: [ in A, two: [ in B']
+
+
+def test_what_is_unknown_in_both_is_no_difference():
+    unknown = 'parameters:\n  mount_init: {coil_temperature_celsius: .nan}\n'
+    assert session_differences(unknown, unknown) == []
+    known = unknown.replace('.nan', '20.0')
+    assert session_differences(unknown, known) == ['mount_init.coil_temperature_celsius is nan in A, 20 in B']
