@@ -69,11 +69,9 @@ class CoreMessages:
     def write_samples(self, samples: Samples) -> None:
         """Write all samples and empty the block."""
         stamps = samples.stamps[: samples.count]
-        for begin, end in _alike(samples.traced[: samples.count], stamps % _STATUS_PERIOD == 0):
+        for begin, end in _alike(samples.traced[: samples.count]):
             part = slice(begin, end)
-            self._write_columns(self._columns(samples, part), stamps[part])
-            if stamps[end - 1] % _STATUS_PERIOD == 0:
-                self._write_temperature(int(stamps[end - 1]))
+            self._write_with_temperatures(self._columns(samples, part), stamps[part])
         samples.count = 0
 
     def write_off(self, stamp: int) -> None:
@@ -87,8 +85,16 @@ class CoreMessages:
         table = serialised(to_message(stamp, result.table))
         self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
 
-    def _write_temperature(self, stamp: int) -> None:
-        self._write(topics.COIL_TEMPERATURE, self._temperature.pack(stamp, self._coil_celsius), stamp)
+    def _write_with_temperatures(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
+        """Write the columns up to each sample with a status, then the temperature of that, and go on."""
+        begin = 0
+        for end in (np.flatnonzero(stamps % _STATUS_PERIOD == 0) + 1).tolist():
+            self._write_columns([(topic, rows[begin:end]) for topic, rows in columns], stamps[begin:end])
+            stamp = int(stamps[end - 1])
+            self._write(topics.COIL_TEMPERATURE, self._temperature.pack(stamp, self._coil_celsius), stamp)
+            begin = end
+        if begin < len(stamps):
+            self._write_columns([(topic, rows[begin:]) for topic, rows in columns], stamps[begin:])
 
     def _columns(self, samples: Samples, part: slice) -> Columns:
         stamps, readings = samples.stamps[part], samples.readings[part]
@@ -121,8 +127,8 @@ def _numbers(records: NDArray[np.uint8]) -> NDArray[np.float64]:
     return records.view(np.float64)
 
 
-def _alike(flags: NDArray[np.bool_], ends: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Yield (begin, end) of the stretches of equal flags; where `ends` is set one ends too."""
-    changes = (np.flatnonzero(np.diff(flags) | ends[:-1]) + 1).tolist()
+def _alike(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yield (begin, end) of the stretches of equal flags."""
+    changes = (np.flatnonzero(np.diff(flags)) + 1).tolist()
     if len(flags):
         yield from zip([0, *changes], [*changes, len(flags)], strict=True)
