@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -33,6 +34,16 @@ class CoreOutcome:
     result: InitialisationResult | None
 
 
+class Sink(Protocol):
+    """What takes the samples of a run; `write_samples` empties the block that it is given."""
+
+    def write_samples(self, samples: Samples) -> None: ...
+
+    def write_result(self, stamp: int, result: InitialisationResult) -> None: ...
+
+    def write_off(self, stamp: int) -> None: ...
+
+
 def run_core(
     parameters: Parameters,
     write: Write,
@@ -43,10 +54,16 @@ def run_core(
 
     With `write_columns` those of the samples go there, many at a time.
     """
+    return run_core_into(CoreMessages(write, write_columns), parameters, progress)
+
+
+def run_core_into(
+    messages: Sink, parameters: Parameters, progress: Callable[[float], None] = lambda share: None
+) -> CoreOutcome:
+    """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
     sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
     mount = SimulatedMount(sim.plant, build_excitation(sim), sim.seed)
     chain = CoreChain(parameters)
-    messages = CoreMessages(write, write_columns)
     samples = Samples(_BLOCK)
     pending: float | None = None
     begin = time.monotonic()

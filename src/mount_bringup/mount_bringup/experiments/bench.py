@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -210,8 +211,8 @@ def _on_active(figures: dict[str, Any], family: list[str]) -> Statement:
         'Sec. 6',
         "At the engine's eigenfrequency of 8 Hz the damper is permanently active.",
         f'Damping is on for at least {100 * least:.0f} % of the evaluated time at '
-        f'{figures["frequency_hz"]:g} Hz and {1e3 * figures["amplitude_m"]:g} mm; the paper does not tell its '
-        'amplitude.',
+        f'{figures["frequency_hz"]:g} Hz and {1e3 * figures["amplitude_m"]:g} mm; the paper does not tell '
+        'its amplitude.',
         Holds.YES if least == 1.0 else Holds.NO if least == 0.0 else Holds.PARTLY,
     )
 
@@ -220,18 +221,15 @@ def _on_loss(runs: dict[str, Any], family: list[str]) -> Statement:
     losses = {name: runs[name]['loss_energy_j'] for name in family}
     least, hydro = runs[OFF]['loss_energy_j'], runs[HYDRO]['loss_energy_j']
     above = [name for name, loss in losses.items() if loss > hydro]
-    grows = all(a < b for a, b in zip(losses.values(), list(losses.values())[1:], strict=False))
+    rising = [least, *(losses[name] for name in FAMILY)]
+    grows = all(a < b for a, b in pairwise(rising))
     told = ', '.join(f'{name} {loss:.3f}' for name, loss in losses.items())
     return Statement(
         'Fig. 13, left',
         "The loss can be chosen by the characteristic, from the elastomer's own to more than the original "
         "mount's.",
         f'Loss work in J per cycle: 0 A {least:.3f}, {told}, hydromount {hydro:.3f}.',
-        Holds.YES
-        if above and least < min(losses.values()) and grows
-        else Holds.PARTLY
-        if above
-        else Holds.NO,
+        Holds.YES if above and grows else Holds.PARTLY if above or grows else Holds.NO,
     )
 
 
@@ -242,9 +240,9 @@ def _on_smoothness(figures: dict[str, Any], chosen: dict[str, Any]) -> Statement
     return Statement(
         'Fig. 13, left',
         'The loops are very smooth and show nothing of the bumps of a dry friction device.',
-        f'With {figures["damper"]} the friction force changes by {told} within 1 ms; a sine of this frequency '
-        f'by {100 * sine:.1f} %, a plain Coulomb damper by {100 * (coulomb or 0.0):.0f} %. Counted as smooth '
-        f'up to {_SMOOTH:g} times the sine (chosen).',
+        f'With {figures["damper"]} the friction force changes by {told} within 1 ms; a sine of this '
+        f'frequency by {100 * sine:.1f} %, a plain Coulomb damper by {100 * (coulomb or 0.0):.0f} %. '
+        f'Counted as smooth up to {_SMOOTH:g} times the sine (chosen).',
         Holds.NOT_COMPARABLE if steep is None else Holds.YES if steep <= _SMOOTH * sine else Holds.NO,
     )
 
@@ -274,16 +272,16 @@ def _on_chosen(runs: dict[str, Any], damper: str) -> Statement:
     odd = ', '.join(f'{found[k]:.2f} ({wanted[k]:.2f})' for k in _ODD)
     as_asked = all(abs(found[k] - wanted[k]) <= _AS_ASKED * wanted[k] for k in _ODD)
     source = (
-        f'They agree within {100 * _AS_ASKED:.0f} % (chosen), so the distortion is that of the dead zone, not of '
-        'the pads.'
+        f'They agree within {100 * _AS_ASKED:.0f} % (chosen), so the distortion is that of the dead zone, '
+        'not of the pads.'
         if as_asked
         else f'They differ by more than {100 * _AS_ASKED:.0f} % (chosen), so the dead zone alone does not '
         'explain the distortion.'
     )
     return Statement(
         'Secs. 5, 6',
-        'Damping proportional to velocity gives the best acoustics; a dead zone round zero velocity is needed '
-        'to avoid sticking.',
+        'Damping proportional to velocity gives the best acoustics; a dead zone round zero velocity is '
+        'needed to avoid sticking.',
         f'THD {100 * chosen["thd"]:.2f} % with {damper}, {100 * hydro["thd"]:.2f} % with the hydromount, '
         f'{100 * coulomb["thd"]:.1f} % with a plain Coulomb damper. Third, fifth and seventh harmonic of the '
         f'friction force in N, in brackets what the characteristic with its dead zone asks for: {odd}. '

@@ -25,7 +25,8 @@ FloatArray = npt.NDArray[np.float64]
 class Ride:
     """One run as it stands in its recording, from the start of the excitation on; SI, arrays (n,) at 1 kHz.
 
-    What the rack and the chassis measure is taken from `sim/truth`; `seen` is what sensor and control saw.
+    What the rack and the chassis measure is taken from `sim/truth`; `seen` is what sensor and control saw,
+    `band_displacement` what the control compares with its levels, at `band_time`.
     """
 
     recording: Path
@@ -37,6 +38,8 @@ class Ride:
     chassis_acceleration: FloatArray
     coil_current: FloatArray
     seen: Drive
+    band_time: FloatArray
+    band_displacement: FloatArray
 
 
 def mode_of(order: Order) -> str:
@@ -86,7 +89,7 @@ def ride(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], experim
 
 def _read(recording: Any, place: Path, excitation_start: float) -> Ride:
     seen = load_drive(recording, excitation_start)
-    truth = recording['sim/truth']
+    truth, trace = recording['sim/truth'], recording['control_trace']
     order = np.argsort(truth.stamps)
     order = order[truth.stamps[order] >= seen.excitation_start]
 
@@ -103,4 +106,6 @@ def _read(recording: Any, place: Path, excitation_start: float) -> Ride:
         chassis_acceleration=column('chassis_acceleration'),
         coil_current=column('coil_current'),
         seen=seen,
+        band_time=(trace.stamps - seen.excitation_start) * 1e-9,
+        band_displacement=np.asarray(trace['band_displacement'], np.float64),
     )

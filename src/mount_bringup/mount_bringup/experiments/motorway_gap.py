@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_bringup.evaluation import switching
-from mount_bringup.experiments.closed_loop import Ride, mode_of, ride
+from mount_bringup.experiments.closed_loop import FloatArray, Ride, mode_of, ride
 from mount_bringup.experiments.contract import (
     Experiment,
     Holds,
@@ -16,26 +16,28 @@ from mount_bringup.experiments.contract import (
     Statement,
     parameters_of,
 )
+from mount_bringup.experiments.numbers import numbers_of
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity, with_flattened
 
 NAME = 'motorway_gap'
-DEPTHS = (0.010, 0.020, 0.030)  # m, chosen
 FRICTION, HYDRO, OFF = 'friction', 'hydromount', 'friction, 0 A'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', OFF: 'friction_off'}
 _WINDOW = (0.2, 1.2)  # s after the switch-on level was exceeded: damping has come on, the gap still rings
 _DELAY = (0.125, 0.200)  # s, chosen: one period, and up to 0.6 more for the band-pass and the rise
+_OFF_TOLERANCE = 0.020  # s, chosen
 _CLEAR = 0.75  # chosen: a clear effect leaves less than so much
 
 
 class GapParameters(NamedTuple):
-    """The gap that is drawn, when it comes, and the characteristic."""
+    """The gap that is drawn, when it comes, others to compare with (m), and the characteristic."""
 
     gap_depth: Annotated[float, Quantity('m', 'depth of the gap that is drawn', 0.001, 0.1)] = 0.020
     gap_time: Annotated[float, Quantity('s', 'when the wheel meets it', 0.5, 60.0)] = 2.0
     duration: Annotated[float, Quantity('s', 'length of the drive', 2.5, 120.0)] = 6.0
+    compared_depths: str = '0.010, 0.020, 0.030'
     damper: str = DEFAULT_DAMPER
 
 
@@ -54,7 +56,8 @@ def run(order: Order, progress: Progress) -> Outcome:
     parameters = parameters_of(order, NAME, GapParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
     control = with_flattened(ControlParameters(), order.settings.get('mount_control', {}))
-    depths = sorted({*DEPTHS, parameters.gap_depth})
+    compared = numbers_of(f'{NAME}.compared_depths', parameters.compared_depths, 0.001, 0.1)
+    depths = sorted({*compared, parameters.gap_depth})
     crossings: dict[float, Crossing] = {}
     for number, depth in enumerate(depths):
         rides = {}
@@ -95,7 +98,17 @@ def _exceeded(ridden: Ride, level: float, parameters: GapParameters) -> float | 
 def _figures_of(crossing: Crossing, control: ControlParameters) -> dict[str, Any]:
     found: dict[str, Any] = {'exceeded_s': crossing.exceeded}
     if crossing.exceeded is None:
-        return found | dict.fromkeys(('on_delay_s', 'on_duration_s', 'off_delay_s', 'rms_m', 'peak_m'))
+        return found | dict.fromkeys(
+            (
+                'on_delay_s',
+                'on_duration_s',
+                'off_delay_s',
+                'off_delay_in_band_s',
+                'rms_m',
+                'peak_m',
+                'highest_current_a',
+            )
+        )
     friction = crossing.rides[FRICTION]
     changes = switching(friction.seen)
     on = next((time for time in changes.on if time >= crossing.exceeded), None)
@@ -110,6 +123,7 @@ def _figures_of(crossing: Crossing, control: ControlParameters) -> dict[str, Any
         'on_delay_s': None if on is None else on - crossing.exceeded,
         'on_duration_s': None if on is None or off is None else off - on,
         'off_delay_s': None if off is None else off - _last_above(friction, control, off),
+        'off_delay_in_band_s': None if off is None else off - _last_above_in_band(friction, control, off),
         'rms_m': rms,
         'peak_m': peak,
         'highest_current_a': float(friction.coil_current.max()),
@@ -118,9 +132,16 @@ def _figures_of(crossing: Crossing, control: ControlParameters) -> dict[str, Any
 
 def _last_above(ridden: Ride, control: ControlParameters, off: float) -> float:
     """Return when the displacement was last at or above the switch-off level before damping went off."""
-    seen = ridden.seen
-    above = np.flatnonzero((seen.time < off) & (np.abs(seen.displacement) >= control.switch_off_level))
-    return float(seen.time[above[-1]]) if above.size else float(seen.time[0])
+    return _last(ridden.seen.time, ridden.seen.displacement, control.switch_off_level, off)
+
+
+def _last_above_in_band(ridden: Ride, control: ControlParameters, off: float) -> float:
+    """Return the same of the band-passed displacement, which the control compares with the level."""
+    return _last(ridden.band_time, ridden.band_displacement, control.switch_off_level, off)
+
+
+def _last(time: FloatArray, values: FloatArray, level: float, before: float) -> float:
+    return float(time[np.flatnonzero((time < before) & (np.abs(values) >= level))[-1]])
 
 
 def _figures(
@@ -147,13 +168,13 @@ def _on_switching_on(figures: dict[str, Any]) -> Statement:
     delays = {gap: found['on_delay_s'] for gap, found in figures['gaps'].items()}
     known = [delay for delay in delays.values() if delay is not None]
     inside = [_DELAY[0] <= delay <= _DELAY[1] for delay in known]
-    told = ', '.join(f'{gap}: {_milliseconds(delay)}' for gap, delay in delays.items())
+    told = _delays(delays)
     return Statement(
         'Fig. 15; Sec. 6',
         'One period after the displacement exceeds the switch-on level of 0.8 mm damping is activated.',
-        f'From the first sample above {1e3 * figures["switch_on_level_m"]:g} mm to damping on, by depth of the '
-        f'gap, {told}. One period is {1e3 * figures["period_s"]:.0f} ms; the rest is the band-pass. Counted as '
-        f'one period from {1e3 * _DELAY[0]:.0f} to {1e3 * _DELAY[1]:.0f} ms (chosen).',
+        f'From the first sample above {1e3 * figures["switch_on_level_m"]:g} mm to damping on, by depth '
+        f'of the gap, {told}. One period is {1e3 * figures["period_s"]:.0f} ms; the rest is the band-pass. '
+        f'Counted as one period from {1e3 * _DELAY[0]:.0f} to {1e3 * _DELAY[1]:.0f} ms (chosen).',
         _verdict(inside),
     )
 
@@ -165,29 +186,38 @@ def _on_effect(figures: dict[str, Any]) -> Statement:
     return Statement(
         'Fig. 15',
         'A significant effect of damping can be seen.',
-        f'Rms of the displacement from {_WINDOW[0]:g} to {_WINDOW[1]:g} s behind that moment over that of the '
-        f'same mount without current, by depth of the gap, {told}; counted as significant below {_CLEAR:g} '
-        '(chosen). The first peak comes before damping and is the same.',
+        f'Rms of the displacement from {_WINDOW[0]:g} to {_WINDOW[1]:g} s behind that moment over that '
+        f'of the same mount without current, by depth of the gap, {told}; counted as significant below '
+        f'{_CLEAR:g} (chosen). The first peak comes before damping and is the same.',
         _verdict(known),
     )
 
 
 def _on_switching_off(figures: dict[str, Any]) -> Statement:
-    delays = {gap: found['off_delay_s'] for gap, found in figures['gaps'].items()}
-    durations = [f['on_duration_s'] for f in figures['gaps'].values() if f['on_duration_s'] is not None]
-    # the band-pass moves the displacement by some samples against the one that is measured here
-    within = [abs(delay - figures['period_s']) < 0.05 for delay in delays.values() if delay is not None]
-    told = ', '.join(f'{gap}: {_milliseconds(delay)}' for gap, delay in delays.items())
+    gaps, period = figures['gaps'], figures['period_s']
+    shown = {gap: found['off_delay_s'] for gap, found in gaps.items()}
+    compared = {gap: found['off_delay_in_band_s'] for gap, found in gaps.items()}
+    durations = [found['on_duration_s'] for found in gaps.values() if found['on_duration_s'] is not None]
+    answers = [
+        abs(delay - period) <= _OFF_TOLERANCE
+        for delay in (*shown.values(), *compared.values())
+        if delay is not None
+    ]
     lasting = f' Damping was on for {_span(durations)}.' if durations else ''
     return Statement(
         'Fig. 15; Sec. 6',
         'When the displacement stays below the switch-off level of 0.35 mm for more than one period, damping '
         'is deactivated.',
-        f'From the last sample above {1e3 * figures["switch_off_level_m"]:g} mm to damping off, by depth of the '
-        f'gap, {told}.{lasting} The control compares the band-passed displacement, the picture shows the '
-        'measured one; counted as one period within 50 ms (chosen).',
-        _verdict(within),
+        f'From the last sample above {1e3 * figures["switch_off_level_m"]:g} mm to damping off, by depth of '
+        f'the gap: of the band-passed displacement, which the control compares, {_delays(compared)}; of the '
+        f'measured one, which the picture shows, {_delays(shown)}.{lasting} Counted as one period '
+        f'({1e3 * period:.0f} ms) within {1e3 * _OFF_TOLERANCE:.0f} ms (chosen).',
+        _verdict(answers),
     )
+
+
+def _delays(delays: dict[str, float | None]) -> str:
+    return ', '.join(f'{gap}: {_milliseconds(delay)}' for gap, delay in delays.items())
 
 
 def _on_hydro(figures: dict[str, Any]) -> Statement:
@@ -199,8 +229,8 @@ def _on_hydro(figures: dict[str, Any]) -> Statement:
     return Statement(
         'Sec. 7',
         'On good roads the friction mount has a clear advantage.',
-        f'Rms of the displacement in the same second over that of the hydromount, {told}; the highest peak over '
-        f"that of the hydromount, {first}: before damping comes on, the hydromount's is always there.",
+        f'Rms of the displacement in the same second over that of the hydromount, {told}; the highest peak '
+        f"over that of the hydromount, {first}: before damping comes on, the hydromount's is always there.",
         _verdict(better),
     )
 

@@ -8,6 +8,7 @@ from mount_bringup.experiments import (
     motorway_gap,
     ramp_and_hold,
     sawtooth,
+    sensitivity,
     sweep,
 )
 from mount_bringup.experiments.contract import Experiment, ExperimentError
@@ -25,6 +26,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         bench.EXPERIMENT,
         sweep.EXPERIMENT,
         motorway_gap.EXPERIMENT,
+        sensitivity.EXPERIMENT,
     )
 }
 

@@ -1,4 +1,4 @@
-"""Fig. 14: the front wheels on a sine of rising frequency; displacement of the mount, chassis acceleration."""
+"""Fig. 14: the front wheels on a sine of rising frequency; displacement, chassis acceleration."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
@@ -187,8 +187,8 @@ def _on_peak_of_hydro(figures: dict[str, Any]) -> Statement:
     return Statement(
         'Fig. 14',
         'With the original mount the displacement shows a clear resonance peak.',
-        f'The hydromount shows {told}, counted from {limit:.2f} mm on (chosen). Its height grows with the road '
-        'level, which the paper does not give.',
+        f'The hydromount shows {told}, counted from {limit:.2f} mm on (chosen). Its height grows with the '
+        'road level, which the paper does not give.',
         Holds.YES if found is not None else Holds.NO,
     )
 
@@ -228,8 +228,8 @@ def _on_damping(figures: dict[str, Any]) -> Statement:
         reference,
         paper,
         f'Largest displacement from 7 to 10 Hz in mm: {told}. So {share:.2f} of the hydromount; damping '
-        f'always on leaves {undamped:.2f} of the undamped one. Against the hydromount this depends on the road '
-        'level (docs/results.md).',
+        f'always on leaves {undamped:.2f} of the undamped one. Against the hydromount this depends on the '
+        'road level (docs/results.md).',
         Holds.YES if share < 0.75 else Holds.PARTLY if share < 1.0 else Holds.NO,
     )
 
@@ -269,10 +269,10 @@ EXPERIMENT = Experiment(
     reference='Fig. 14',
     summary=(
         'The road under the wheel is a sine whose frequency rises by 1 Hz per second at a constant amplitude '
-        'of its velocity (chosen). The same sweep is driven with the friction mount, the original hydromount, '
-        'the friction mount without current and with damping always on, and with an idling engine; '
-        'displacement and chassis acceleration come from the recordings. Which of the two mounts is better '
-        'depends on what the paper does not give: docs/results.md.'
+        'of its velocity (chosen). The same sweep is driven with the friction mount, the original '
+        'hydromount, the friction mount without current and with damping always on, and with an idling '
+        'engine; displacement and chassis acceleration come from the recordings. Which of the two '
+        'mounts is better depends on what the paper does not give: docs/results.md.'
     ),
     defaults=SweepParameters(),
     run=run,
