@@ -134,6 +134,26 @@ def test_other_parameters_of_nodes_reach_the_run(tmp_path):
     assert outcome.figures['runs']['viscous_2000']['loss_stiffness_n_per_m'] < 70e3
 
 
+@pytest.mark.parametrize('mount', ['friction', 'hydro'])
+def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mount, monkeypatch):
+    quiet_bench = {
+        'scenario': 'bench',
+        'mount': mount,
+        'timeline.start': 2.9,
+        'timeline.duration': 4.0,
+        'bench.frequency': 8.0,
+        'electronics.displacement_noise': 0.0,
+        'electronics.ripple_noise': 0.0,
+    }
+    job = Job(('rack',), {'mount_sim': quiet_bench})
+    found = []
+    for step in (5e-5, 2.5e-5):
+        monkeypatch.setattr('mount_sim.scenario.STEP_TIME', step)
+        found.append(np.array(run_job(job)[1]['harmonics_n'])[[0, 2, 4, 6]])
+    assert not np.array_equal(*found)
+    assert found[1] == pytest.approx(found[0], rel=0.005)
+
+
 # Sweep.
 
 

@@ -64,6 +64,7 @@ def write_results(
         '## Chassis acceleration where damping is off\n',
         f'![Chassis acceleration, friction mount over hydromount](figures/{acceleration})\n',
         _share_table(maps),
+        _asymmetry(maps),
         '## Harmonics on the rack, 8 Hz and 1 mm\n',
         _harmonics_table(maps),
         '## Beside an independent computation\n',
@@ -214,6 +215,18 @@ def _share_table(maps: Maps) -> str:
             cells.append('not reached' if np.isnan(ratios).any() else f'{_counted(ratios)}; {_range(ratios)}')
         lines.append(f'| {low:.0f} to {high:.0f} Hz | ' + ' | '.join(cells) + ' |')
     return '\n'.join(lines) + '\n'
+
+
+def _asymmetry(maps: Maps) -> str:
+    """Say how much the chamber's asymmetry moves the ratios of the sweep."""
+    if len(maps.axes.asymmetries) < 2:
+        return ''
+    peak, rms = np.ptp(maps.peak, axis=2), np.ptp(maps.rms, axis=3)
+    told = '' if np.isnan(rms).all() else f', those of the acceleration by at most {np.nanmax(rms):.2f}'
+    return (
+        f'Between the asymmetries of the chamber ({_listed(maps.axes.asymmetries)}) the ratios of the '
+        f'displacement differ by at most {peak.max():.2f}{told}.\n'
+    )
 
 
 def _harmonics_table(maps: Maps) -> str:
