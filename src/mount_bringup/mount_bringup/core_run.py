@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -33,6 +34,16 @@ class CoreOutcome:
     result: InitialisationResult | None
 
 
+class Sink(Protocol):
+    """What takes the samples of a run; `write_samples` empties the block that it is given."""
+
+    def write_samples(self, samples: Samples) -> None: ...
+
+    def write_result(self, stamp: int, result: InitialisationResult) -> None: ...
+
+    def write_off(self, stamp: int) -> None: ...
+
+
 def run_core(
     parameters: Parameters,
     write: Write,
@@ -43,11 +54,18 @@ def run_core(
 
     With `write_columns` those of the samples go there, many at a time.
     """
-    sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
+    messages = CoreMessages(write, _coil_temperature(_sim_parameters(parameters)), write_columns)
+    return run_core_into(messages, parameters, progress)
+
+
+def run_core_into(
+    messages: Sink, parameters: Parameters, progress: Callable[[float], None] = lambda share: None
+) -> CoreOutcome:
+    """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
+    sim = _sim_parameters(parameters)
     mount = SimulatedMount(sim.plant, build_excitation(sim), sim.seed)
     chain = CoreChain(parameters)
-    celsius = quantised_coil_temperature(sim.electronics.coil_temperature)
-    messages = CoreMessages(write, celsius, write_columns)
+    celsius = _coil_temperature(sim)
     samples = Samples(_BLOCK)
     pending: float | None = None
     begin = time.monotonic()
@@ -76,6 +94,15 @@ def run_core(
         wall_time=time.monotonic() - begin,
         result=chain.result,
     )
+
+
+def _sim_parameters(parameters: Parameters) -> SimParameters:
+    return with_flattened(SimParameters(), parameters.get('mount_sim', {}))
+
+
+def _coil_temperature(sim: SimParameters) -> float:
+    """Return the coil temperature (degC) as the electronics' status tells it."""
+    return quantised_coil_temperature(sim.electronics.coil_temperature)
 
 
 def _stamp(mount: SimulatedMount) -> int:

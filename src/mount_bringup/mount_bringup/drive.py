@@ -69,13 +69,7 @@ class DriveOutcome:
 
 def drive(order: DriveOrder, console: Console) -> DriveOutcome:
     """Drive, record, evaluate; raises `Interrupted`, `GraphError` or a `ValueError` with the reason."""
-    excitation = preflight(order.parameters)
-    folder = make_run_folder(order.out, order.scenario)
-    complaints: list[str] = []
-    if order.mode == 'core':
-        run = _drive_in_core(order, folder, console)
-    else:
-        run = _drive_graph(order, excitation, folder, console, complaints)
+    folder, run, complaints = record_drive(order, console)
     if _recorder_parameters(order).snapshot:
         return _tell_snapshots(order, folder, run, complaints, console)
     recording = open_recording(folder.recording)
@@ -83,6 +77,19 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
     figures = _evaluate(order, folder, recording, run, console)
     complaints += _write_report(folder, recording, console)
     return DriveOutcome(figures, folder, [folder.recording], complaints)
+
+
+def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[str, Any], list[str]]:
+    """Drive and record; return the folder, what the run itself knows, and what was not as it should be.
+
+    Raises as `drive` does.
+    """
+    excitation = preflight(order.parameters)
+    folder = make_run_folder(order.out, order.scenario)
+    complaints: list[str] = []
+    if order.mode == 'core':
+        return folder, _drive_in_core(order, folder, console), complaints
+    return folder, _drive_graph(order, excitation, folder, console, complaints), complaints
 
 
 def _tell_snapshots(

@@ -55,13 +55,16 @@ class Order:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of it; `figures` is what `--json` writes, so it holds plain numbers, texts, lists, "
-    "mappings."""
+    """What came of it; `figures` is what `--json` writes, so it holds plain numbers, texts, lists, mappings.
+
+    `pages` are texts of the experiment's own (Markdown) that find its pictures in `figures/`.
+    """
 
     figures: dict[str, Any]
     pictures: list[Path] = field(default_factory=list)
     recordings: list[Path] = field(default_factory=list)
     statements: list[Statement] = field(default_factory=list)
+    pages: list[Path] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

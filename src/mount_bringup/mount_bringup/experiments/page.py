@@ -28,19 +28,28 @@ def print_outcome(experiment: Experiment, outcome: Outcome, console: Console) ->
     for statement in outcome.statements:
         table.add_row(statement.reference, statement.paper, statement.found, statement.holds.value)
     console.print(table)
-    for kind, places in (('figure', outcome.pictures), ('recording', outcome.recordings)):
+    for kind, places in (
+        ('figure', outcome.pictures),
+        ('recording', outcome.recordings),
+        ('page', outcome.pages),
+    ):
         for place in places:
             console.print(f'{kind:11}{place}', highlight=False, soft_wrap=True)
 
 
 def write_page(outcomes: Sequence[tuple[Experiment, Outcome]], file: Path) -> None:
-    """Write the page to `file` (Markdown) and copy all pictures into the folder `figures` beside it."""
+    """Write the page to `file` (Markdown) and copy all pictures into the folder `figures` beside it.
+
+    The experiments' own pages go beside it too.
+    """
     folder = file.parent / _FIGURES
     folder.mkdir(parents=True, exist_ok=True)
     parts = [_HEAD, _overview(outcomes)]
     for experiment, outcome in outcomes:
         for picture in outcome.pictures:
             shutil.copyfile(picture, folder / picture.name)
+        for page in outcome.pages:
+            shutil.copyfile(page, file.parent / page.name)
         parts.append(_section(experiment, outcome))
     file.write_text('\n'.join(parts), encoding='utf-8')
 
@@ -66,5 +75,7 @@ def _section(experiment: Experiment, outcome: Outcome) -> str:
         lines += [f'![{experiment.title}]({_FIGURES}/{picture.name})', '']
     lines += ['| paper | says | here | holds |', '|---|---|---|---|']
     lines += [f'| {s.reference} | {s.paper} | {s.found} | {s.holds.value} |' for s in outcome.statements]
+    for page in outcome.pages:
+        lines += ['', f'All of it: [{page.name}]({page.name})']
     lines += ['', f'`engine-mount experiment {experiment.name}`', '']
     return '\n'.join(lines)

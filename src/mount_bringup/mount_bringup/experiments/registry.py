@@ -1,11 +1,15 @@
 """All experiments by name, in the order of the paper's figures."""
 
 from mount_bringup.experiments import (
+    bench,
     field_penetration,
     force_characteristic,
     inductance_map,
+    motorway_gap,
     ramp_and_hold,
     sawtooth,
+    sensitivity,
+    sweep,
 )
 from mount_bringup.experiments.contract import Experiment, ExperimentError
 
@@ -19,6 +23,10 @@ EXPERIMENTS: dict[str, Experiment] = {
         inductance_map.EXPERIMENT,
         ramp_and_hold.EXPERIMENT,
         sawtooth.EXPERIMENT,
+        bench.EXPERIMENT,
+        sweep.EXPERIMENT,
+        motorway_gap.EXPERIMENT,
+        sensitivity.EXPERIMENT,
     )
 }
 
