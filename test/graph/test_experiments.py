@@ -5,6 +5,7 @@ import json
 import numpy as np
 
 import mount_bags
+from mount_bags.session_differences import session_text
 
 
 def _setpoints(run):
@@ -26,6 +27,7 @@ def test_an_experiment_through_the_nodes_gives_the_setpoints_and_figures_of_the_
         assert process.returncode == 0, output
         found[mode] = json.loads(figures.read_text())
         assert found[mode].pop('mode') == mode
+        assert f'mode: {mode}' in session_text(mount_bags.open(out / '20mm_friction' / 'recording'))
     assert found['core'] == found['lock-step']
     for run in ('20mm_friction', '20mm_hydromount', '20mm_friction_0A'):
         assert _setpoints(command.folder / 'core' / run) == _setpoints(command.folder / 'lock-step' / run)

@@ -16,7 +16,7 @@ from PIL import Image
 BLUE, RED, GREY, GREEN = '#1f5fa8', '#b03030', '#666666', '#3a8a4d'
 _WIDTH = 10.0  # inches
 _DPI = 100
-_COLOURS = 128  # chosen: more are not told apart
+_COLOURS = 256  # the most that a palette holds
 
 
 def new_figure(title: str, height: float = 5.0) -> Figure:

@@ -97,8 +97,8 @@ def _displacement(maps: Maps) -> str:
     never = [level for k, level in enumerate(axes.levels) if higher(maps.peak[k]).all()]
     mixed = [level for level in axes.levels if level not in always and level not in never]
     parts = [
-        'The largest displacement from 3 to 14 Hz is smaller with the friction mount than with the other '
-        f'in {_counted(maps.peak)}'
+        'The largest displacement from 3 to 14 Hz is smaller with the friction mount than with the '
+        f'hydromount in {_counted(maps.peak)} combinations'
     ]
     for levels, text in (
         (always, 'it wins whatever the rest'),
@@ -133,21 +133,17 @@ def _why(maps: Maps) -> str:
 
 def _acceleration(maps: Maps) -> str:
     axes = maps.axes
-    texts = []
-    for band, (low, high) in enumerate(ISOLATION_BANDS):
-        ratios = maps.rms[band]
-        if np.isnan(ratios).any():
-            continue
-        shares = [
-            f'{_counted(ratios[..., k])} with F_i = {force:g} N' for k, force in enumerate(axes.idle_forces)
-        ]
-        texts.append(
-            f'{low:.0f} to {high:.0f} Hz: lower with the friction mount in {"; ".join(shares)} '
-            f'(ratio {_range(ratios)})'
-        )
-    if not texts:
+    rms = maps.rms[~np.isnan(maps.rms).any(axis=(1, 2, 3, 4))]
+    if not len(rms):
         return 'The sweep ends before 20 Hz.'
-    return '. '.join(texts) + '. ' + _extremes(maps)
+    forces = [f'F_i = {f:g} N: {_counted(rms[..., k])}' for k, f in enumerate(axes.idle_forces)]
+    decouplers = [f'R_d = {r:.0e}: {_counted(rms[:, :, k])}' for k, r in enumerate(axes.resistances)]
+    bands = ', '.join(f'{low:.0f} to {high:.0f}' for low, high in ISOLATION_BANDS[: len(rms)])
+    return (
+        f'In the bands {bands} Hz the chassis has less acceleration with the friction mount in '
+        f'{_counted(rms)} combinations of a band and the rest (ratio {_range(rms)}). By idle force, '
+        f'{"; ".join(forces)}. By decoupler, {"; ".join(decouplers)}. {_extremes(maps)}'
+    )
 
 
 def _extremes(maps: Maps) -> str:

@@ -33,6 +33,9 @@ DEFINED_PEAK = 1.25
 """A local maximum of the displacement over frequency is a resonance peak if it exceeds the switch-on level by
 this factor (chosen); below it the switched mount cannot damp."""
 
+FAR_HIGHER = 0.75
+"""Damping counts as far higher if it leaves less than this share of the other's displacement (chosen)."""
+
 Band = tuple[float, float]
 
 
@@ -228,9 +231,10 @@ def _on_damping(figures: dict[str, Any]) -> Statement:
         reference,
         paper,
         f'Largest displacement from 7 to 10 Hz in mm: {told}. So {share:.2f} of the hydromount; damping '
-        f'always on leaves {undamped:.2f} of the undamped one. Against the hydromount this depends on the '
+        f'always on leaves {undamped:.2f} of the undamped one. Counted as far higher '
+        f'below {FAR_HIGHER:g} of the hydromount (chosen). Against the hydromount this depends on the '
         'road level (docs/results.md).',
-        Holds.YES if share < 0.75 else Holds.PARTLY if share < 1.0 else Holds.NO,
+        Holds.YES if share < FAR_HIGHER else Holds.PARTLY if share < 1.0 else Holds.NO,
     )
 
 
