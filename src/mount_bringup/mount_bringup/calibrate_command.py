@@ -42,7 +42,8 @@ CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a
 """
 _RACK_EPILOG = """Example:
 
-`engine-mount calibrate rack --out rack --celsius 20 --celsius 80` - then `calibrate actuator rack/force.csv`
+`engine-mount calibrate rack --out rack --celsius 20 --celsius 80` - then `calibrate actuator rack/force.csv`,
+`calibrate inductance rack/ripple_*.csv`, `identify friction --train rack/friction_*.csv`
 """
 
 Files = Annotated[list[Path], typer.Argument(help='CSV files, MCAP files or folders of recordings')]
@@ -149,7 +150,7 @@ def actuator(
     if out is not None:
         save_specimen(specimen, out)
         console.print(f'specimen   {out}', highlight=False)
-    _note_foreign(console, foreign_parts(specimen), specimen.name)
+    note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
 @app.command(epilog=_INDUCTANCE_EPILOG)
@@ -235,7 +236,7 @@ def inductance(
     if out is not None:
         save_specimen(specimen, out)
         console.print(f'specimen   {out}', highlight=False)
-    _note_foreign(console, foreign_parts(specimen), specimen.name)
+    note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
 @app.command(epilog=_RACK_EPILOG)
@@ -244,28 +245,34 @@ def rack(
     seed: Annotated[int, typer.Option(help='seed of the noise, and of the actuator with --drawn')] = 0,
     noise: Annotated[float, typer.Option(help='relative standard deviation of each sensor')] = 0.01,
     drawn: Annotated[
-        bool, typer.Option('--drawn', help='another actuator, drawn at random around the default one')
+        bool, typer.Option('--drawn', help='another actuator with other pads, drawn around the default ones')
     ] = False,
     celsius: Annotated[
         list[float] | None, typer.Option(help='coil temperature of the ripple, degC; may be repeated')
     ] = None,
 ) -> None:
-    """Write recordings of the simulated rack: force.csv, and ripple at 15 fixed gaps."""
+    """Write recordings of the simulated rack: force.csv, ripple at 16 fixed gaps, friction of the pads."""
     from dataclasses import replace
 
+    from mount_models.friction.coefficient import FrictionCoefficients
+    from mount_models.friction.contact import FrictionContact
     from mount_sim.rack import Rack, drawn_rack, write_force, write_ripple
+    from mount_sim.rack_friction import drawn_friction, write_friction
 
     console = Console()
     chosen = replace(drawn_rack(seed) if drawn else Rack(seed=seed), noise=noise)
+    pads = drawn_friction(seed) if drawn else (FrictionContact(), FrictionCoefficients())
     out.mkdir(parents=True, exist_ok=True)
     with _progress(console) as progress:
         each = tuple(celsius or (20.0,))
-        task = progress.add_task('measuring', total=1 + len(each))
+        task = progress.add_task('measuring', total=2 + len(each))
         written = [write_force(chosen, out / 'force.csv')]
         progress.advance(task)
         for temperature in each:
             written += write_ripple(chosen, out, temperature=temperature)
             progress.advance(task)
+        written += write_friction(out, *pads, noise, seed)
+        progress.advance(task)
     console.print(f'{len(written)} recordings in {out}', highlight=False)
 
 
@@ -374,13 +381,16 @@ def _say(console: Console, sentence: str) -> None:
     console.print(sentence, soft_wrap=True, highlight=False, markup=False)
 
 
-def _note_foreign(console: Console, parts: list[str], name: str) -> None:
-    command = {'force_law': 'actuator', 'gap_curves': 'inductance'}
+def note_foreign(console: Console, parts: list[str], name: str) -> None:
+    command = {
+        'force_law': 'calibrate actuator',
+        'gap_curves': 'calibrate inductance',
+        'friction': 'identify friction',
+    }
     for part in parts:
         console.print('[yellow]note[/yellow]', end=' ')
         _say(
             console,
-            f'{part} is not yet that of {name!r} but of its base; run engine-mount calibrate '
-            f'{command[part]} with '
-            f'this file as --base',
+            f'{part} is not yet that of {name!r} but of its base; run engine-mount {command[part]} with this '
+            'file as --base',
         )

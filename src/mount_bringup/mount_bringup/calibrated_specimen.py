@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mount_bringup.identify_friction import Identification, chosen_fit
 from mount_bringup.rack_columns import RackRecordingError
 from mount_bringup.rack_recordings import described
 from mount_models.actuator.fit import ForceLawFit
@@ -86,36 +87,84 @@ def with_gap_curves(
     )
 
 
+def with_friction(base: Specimen, name: str, found: Identification) -> Specimen:
+    """Return `base` under `name` with the identified contact and coefficients; raises `SpecimenError`.
+
+    Raises `IdentificationError` where the recordings did not give both.
+    """
+    from mount_models.friction.identification.ramp_hold import mean_covariance
+
+    fit = chosen_fit(found)
+    assert found.contact is not None  # or there were no lines, and no fit
+    speeds = [abs(line.velocity) for line in found.lines]
+    covariance: dict[str, Any] = {', '.join(part.names): _matrix(part.covariance) for part in fit.covariances}
+    if found.ramps:
+        covariance[', '.join(found.contact._fields)] = _matrix(
+            mean_covariance([each for _, each in found.ramps])
+        )
+    entry = {
+        **_made_with(),
+        'recordings': [{'file': file, **told} for file, told in found.recordings.items()],
+        'valid': {
+            'normal_force': [fit.coefficients.lowest_normal_force, fit.coefficients.highest_normal_force],
+            'speed': [_short(min(speeds)), _short(max(speeds))],
+        },
+        'form_of_b': fit.variant,
+        'contact': 'identified' if found.ramps else 'that of the base',
+        'residuals': {
+            'a_rms': _short(fit.a_rms),
+            'b_rms_per_mm': _short(fit.b_rms_mm),
+            'held_out': {each.name: _short(each.full_error) for _, each in found.validations},
+        },
+        'covariance': covariance,
+    }
+    return checked_specimen(
+        replace(
+            base,
+            name=name or base.name,
+            friction={**fit.coefficients._asdict(), **found.contact._asdict()},
+            provenance=_provenance(base, name, 'friction', entry, 'engine-mount identify'),
+        )
+    )
+
+
 def foreign_parts(specimen: Specimen) -> list[str]:
     """Return the parts that were calibrated on another specimen or not at all, for a warning."""
     parts = specimen.provenance.get('parts', {})
     return [
         part
-        for part in ('force_law', 'gap_curves')
+        for part in ('force_law', 'gap_curves', 'friction')
         if parts.get(part, {}).get('specimen', specimen.name) != specimen.name
     ]
 
 
-def _provenance(base: Specimen, name: str, part: str, entry: dict[str, Any]) -> dict[str, Any]:
+def _provenance(
+    base: Specimen, name: str, part: str, entry: dict[str, Any], written_by: str = 'engine-mount calibrate'
+) -> dict[str, Any]:
     """Return the origin of each part; what was not calibrated now keeps that of `base`."""
     before = base.provenance.get('parts')
     if not isinstance(before, dict):
         other = {'specimen': base.name, 'from': base.provenance.get('written_by', 'unknown')}
         before = {'force_law': other, 'gap_curves': dict(other)}
+        if base.friction:
+            before['friction'] = dict(other)
     return {
-        'written_by': 'engine-mount calibrate',
+        'written_by': written_by,
         'parts': {**before, part: {'specimen': name or base.name, **entry}},
     }
 
 
 def _origin(files: Sequence[Path]) -> dict[str, Any]:
+    return {**_made_with(), 'recordings': described(files)}
+
+
+def _made_with() -> dict[str, Any]:
     from mount_bringup.drive import versions
 
     known = versions()
     return {
         'date': datetime.datetime.now(datetime.UTC).isoformat(timespec='seconds'),
         'versions': {name: known[name] for name in ('mount_bringup', 'numpy', 'scipy')},
-        'recordings': described(files),
     }
 
 

@@ -18,7 +18,8 @@ app = typer.Typer(
 
 EPILOG = """Examples:
 
-`engine-mount identify friction --train ramp.csv saw_40.csv saw_120.csv --held-out saw_80.csv --out pads.yaml`
+`engine-mount identify friction --train ramp.csv 40N.csv 120N.csv --held-out 80N.csv --base left.yaml
+--name left --out left.yaml` - into the specimen file that init and control load
 
 `engine-mount identify friction --file a.json b.json c.json` - trained on each, tried on each other one
 
@@ -57,7 +58,11 @@ def friction(
     json_file: Annotated[
         Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar='FILE', help='write the parameters (YAML)')] = None,
+    base: Annotated[
+        Path | None, typer.Option(help='specimen that gives all other values; default: the shipped one')
+    ] = None,
+    name: Annotated[str, typer.Option(help='name of the specimen; default: that of the base')] = '',
+    out: Annotated[Path | None, typer.Option(metavar='FILE', help='write the specimen (YAML)')] = None,
     figure: Annotated[Path | None, typer.Option(metavar='FILE', help='draw every step (PNG)')] = None,
 ) -> None:
     """Identify the friction contact, and which law is worth its parameters.
@@ -65,21 +70,26 @@ def friction(
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
-    import yaml
     from rich.progress import Progress
 
+    from mount_bringup.calibrate_command import note_foreign
+    from mount_bringup.calibrated_specimen import check_targets, foreign_parts, with_friction
     from mount_bringup.friction_files import parsed_channels
-    from mount_bringup.identify_friction import figures, identify, parameter_file
+    from mount_bringup.identify_friction import figures, identify
     from mount_bringup.summary import write_json
+    from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
 
     console = Console()
+    check_targets(out, json_file, figure)
+    starting = chosen_specimen(str(base) if base else '')
     order = IdentifyOrder(
-        train or [], held_out or [], file or [], step, clamp, parsed_channels(channel or []), seed
-    )
+        train or [], held_out or [], file or [], step, clamp, parsed_channels(channel or []), seed,
+        friction_contact(starting.friction),
+    )  # fmt: skip
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
         found = identify(order, lambda law, share: progress.update(task, description=law, completed=share))
-    parameters = parameter_file(found) if out is not None else {}
+    specimen = with_friction(starting, name, found) if out is not None else None
     _print(found, console)
     if figure is not None:
         from mount_bringup.identify_figure import draw_identification
@@ -88,13 +98,14 @@ def friction(
         console.print(f'figure {figure}', highlight=False)
     if json_file is not None:
         write_json(figures(found), json_file)
-    if out is not None:
-        out.write_text(yaml.safe_dump(parameters, sort_keys=False, width=110), encoding='utf-8')
-        console.print(f'parameters {out}', highlight=False)
+    if out is not None and specimen is not None:
+        save_specimen(specimen, out)
+        console.print(f'specimen {out}', highlight=False)
+        note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
 def _print(found: Identification, console: Console) -> None:
-    from mount_bringup.identify_friction import figures
+    from mount_bringup.identify_friction import chosen_fit, figures
 
     for note in found.notes:
         console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True, highlight=False)
@@ -102,11 +113,10 @@ def _print(found: Identification, console: Console) -> None:
     if found.ramps:
         console.print(_step_1(result['step_1']))
     if found.coefficients is not None:
-        fit = found.fits[0][0]
+        fit = chosen_fit(found)
         console.print(
-            f'steps 2, 3: {len(found.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} '
-            '(a) and '
-            f'{fit.b_rms_mm:.2f} 1/mm (b) rms',
+            f'steps 2, 3: {len(found.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} (a) '
+            f'and {fit.b_rms_mm:.2f} 1/mm (b) rms',
             soft_wrap=True,
             highlight=False,
         )

@@ -1,11 +1,9 @@
 """What `engine-mount identify friction` does: read, steps 1 to 3, ladder; everything but printing."""
 
-import datetime
 import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +41,8 @@ class IdentifyOrder:
     clamp: str = 'sliding'
     channels: dict[str, Channel] = field(default_factory=dict)
     seed: int = 0
+    contact: FrictionContact = field(default_factory=FrictionContact)
+    """Taken by step 2 where no ramp and hold tells it."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ def identify(order: IdentifyOrder, progress: Progress | None = None) -> Identifi
         found.ramps = [(each, fit_ramp_hold(each)) for each in ramps]
         found.contact = mean_contact([fit for _, fit in found.ramps])
     if sawtooths and order.step in ('auto', 'sawtooth'):
-        _coefficients(found, sawtooths)
-    if order.step == 'ramp' or not moving:
+        _coefficients(found, sawtooths, order.contact)
+    if order.step in (RAMP, SAWTOOTH) or not moving:
         return found
     known = (
         (found.contact, found.coefficients)
@@ -132,13 +132,14 @@ def figures(found: Identification) -> dict[str, Any]:
     if found.validations:
         result['validation'] = [
             {
-                'recording': each.name, 'full_error': each.full_error, 'simplified_error':
-                each.simplified_error,
-                'full_macroslip_error': each.full_macroslip, 'simplified_macroslip_error':
-                each.simplified_macroslip,
+                'recording': each.name,
+                'full_error': each.full_error,
+                'simplified_error': each.simplified_error,
+                'full_macroslip_error': each.full_macroslip,
+                'simplified_macroslip_error': each.simplified_macroslip,
             }
             for _, each in found.validations
-        ]  # fmt: skip
+        ]
     if found.rungs:
         result['ladder'] = _ladder(found.rungs)
         result['best'] = best_rung(found.rungs).law.name
@@ -152,35 +153,15 @@ def figures(found: Identification) -> dict[str, Any]:
     return result
 
 
-def parameter_file(found: Identification) -> dict[str, Any]:
-    """Return the identified parameters with where they come from, for YAML; refused where there are none."""
-    if found.contact is None or found.coefficients is None:
+def chosen_fit(found: Identification) -> CoefficientFit:
+    """Return the fit of the coefficients that the held-out recordings chose; refused where there is none."""
+    if found.contact is None or not found.fits:
         raise IdentificationError(
-            '--out needs the contact (a ramp and hold) and the coefficients (sawtooths at several speeds); '
-            f'{"the ramp" if found.contact is None else "the sawtooth"} is missing: add such recordings '
-            'to --train'
+            '--out needs the coefficients (sawtooths at several speeds) and the contact (a ramp and hold, or '
+            f'that of --base); the {"ramp" if found.fits else "sawtooth"} is missing: add such recordings to '
+            '--train, and leave --step to auto'
         )
-    coefs = found.coefficients
-    speeds = [abs(line.velocity) for line in found.lines]
-    return {
-        'schema': 'engine_mount_friction/1',
-        'contact': found.contact._asdict(),
-        'coefficients': coefs._asdict(),
-        'validity': {
-            'normal_force_n': [coefs.lowest_normal_force, coefs.highest_normal_force],
-            'speed_m_s': [float(min(speeds)), float(max(speeds))],
-        },
-        'provenance': {
-            'written_by': 'engine-mount identify friction',
-            'version': metadata.version('mount_bringup'),
-            'date': datetime.datetime.now(datetime.UTC).date().isoformat(),
-            'recordings': found.recordings,
-            'contact_deviation': _mean_deviation(found),
-            'a_rms': _chosen(found).a_rms,
-            'b_rms_per_mm': _chosen(found).b_rms_mm,
-            'held_out': {each.name: each.full_error for _, each in found.validations},
-        },
-    }
+    return min(found.fits, key=lambda each: 0.0 if math.isnan(each[1]) else each[1])[0]
 
 
 def mean_ladder(pairs: Sequence[PairResult]) -> dict[str, dict[str, Any]]:
@@ -215,9 +196,8 @@ def _check_order(order: IdentifyOrder) -> None:
     both = {each.resolve() for each in order.train} & {each.resolve() for each in order.held_out}
     if both:
         raise IdentificationError(
-            f'{sorted(both)[0].name} is among --train and --held-out; a held-out recording must be '
-            'unseen: leave it '
-            'out on one side'
+            f'{sorted(both)[0].name} is among --train and --held-out; a held-out recording must be unseen: '
+            'leave it out on one side'
         )
 
 
@@ -230,7 +210,8 @@ def _read(
         kind = recognised(recording)
         if order.step in (RAMP, SAWTOOTH) and part == 'train':
             _check_kind(recording.name, kind, order.step)
-        found.recordings[path.name] = {'part': part, 'kind': kind, 'sha256': file_hash(path)}
+        key = path.name if path.name not in found.recordings else str(path)
+        found.recordings[key] = {'part': part, 'kind': kind, 'sha256': file_hash(path)}
         found.notes += [f'{recording.name}: {note}' for note in recording.notes]
         result.append((recording, kind))
     return result
@@ -243,13 +224,15 @@ def _check_kind(name: str, kind: str, step: str) -> None:
         )
 
 
-def _coefficients(found: Identification, sawtooths: Sequence[FrictionRecording]) -> None:
+def _coefficients(
+    found: Identification, sawtooths: Sequence[FrictionRecording], unless_told: FrictionContact
+) -> None:
     """Steps 2 and 3; held-out recordings choose the form of b."""
     contact = found.contact
     if contact is None:
-        contact = found.contact = FrictionContact()
+        contact = found.contact = unless_told
         found.notes.append(
-            'no ramp and hold among the training: step 2 takes the default contact (c_R '
+            'no ramp and hold among the training: step 2 takes the contact of the base (c_R '
             f'{contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} N s/m, c_Re '
             f'{contact.contact_stiffness:.3g} N/m)'
         )
@@ -261,12 +244,8 @@ def _coefficients(found: Identification, sawtooths: Sequence[FrictionRecording])
             tried = [validate(each, contact, fit.coefficients) for each in found.held_out]
             error = pooled_error(tried, found.held_out)
         found.fits.append((fit, error))
-    found.coefficients = _chosen(found).coefficients
+    found.coefficients = chosen_fit(found).coefficients
     found.validations = [(each, validate(each, contact, found.coefficients)) for each in found.held_out]
-
-
-def _chosen(found: Identification) -> CoefficientFit:
-    return min(found.fits, key=lambda each: 0.0 if math.isnan(each[1]) else each[1])[0]
 
 
 def _try_pairs(found: Identification, order: IdentifyOrder, progress: Progress | None) -> None:
@@ -333,14 +312,6 @@ def _ramp_figures(fit: RampHoldFit) -> dict[str, Any]:
 
 def _beside(printed: float, right: float) -> dict[str, float]:
     return {'value': printed, 'error': printed / right - 1.0}
-
-
-def _mean_deviation(found: Identification) -> dict[str, float]:
-    if not found.ramps:
-        return {}
-    deviations = np.array([fit.deviation for _, fit in found.ramps])
-    pooled = 1.0 / np.sqrt((1.0 / np.maximum(deviations, 1e-300) ** 2).sum(axis=0))
-    return dict(zip(FrictionContact._fields, (float(value) for value in pooled), strict=True))
 
 
 def _known(value: float) -> float | None:

@@ -20,6 +20,7 @@ from mount_models.actuator.law_check import ForceLawRefusedError, check_force_la
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
 from mount_models.coil.temperature import CompensationError, TemperatureCompensation, check_compensation
 from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_coefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.provenance import ProvenanceError, check_provenance
 from mount_models.quantity import Quantity, quantities
@@ -111,6 +112,20 @@ def chosen_specimen(parameters_file: str, name: str = '') -> Specimen:
     return load_specimen(parameters_file or DEFAULT_SPECIMEN, name)
 
 
+def friction_coefficients(friction: Mapping[str, float]) -> FrictionCoefficients:
+    """Return the coefficients that a specimen's `friction` gives; what is not in it keeps its default."""
+    return FrictionCoefficients(
+        **{name: value for name, value in friction.items() if name in FrictionCoefficients._fields}
+    )
+
+
+def friction_contact(friction: Mapping[str, float]) -> FrictionContact:
+    """Return the contact that a specimen's `friction` gives; what is not in it keeps its default."""
+    return FrictionContact(
+        **{name: value for name, value in friction.items() if name in FrictionContact._fields}
+    )
+
+
 def save_specimen(specimen: Specimen, path: str | Path) -> None:
     """Write the checked `specimen` to `path` as YAML without loss of digits, whole or not at all."""
     text = yaml.safe_dump(
@@ -198,6 +213,10 @@ def _check_friction(friction: Mapping[str, float]) -> None:
         if name not in known:
             raise SpecimenError(f'friction.{name} is unknown; known are {", ".join(known)}')
         _check_limits(value, known[name], f'friction.{name}')
+    try:
+        check_coefficients(friction_coefficients(friction))
+    except CoefficientsRefusedError as error:
+        raise SpecimenError(f'friction: {error}') from error
 
 
 def _complete(content: Any, names: list[str], where: str) -> dict[str, Any]:

@@ -205,7 +205,23 @@ def test_a_whole_number_is_taken_as_a_number():
 
 def test_friction_parameters_pass_through():
     assert specimen_from_mapping(changed('friction', {'a_p1': 1})).friction == {'a_p1': 1.0}
-    assert checked_specimen(DEFAULT).friction == {}
+    assert checked_specimen(replace(DEFAULT, friction={})).friction == {}
+
+
+@pytest.mark.parametrize(
+    ('friction', 'sentence'),
+    [
+        ({'a_p1': -5.0}, r'coefficient of friction \(.* at \+10 mm/s'),
+        ({'a_n1': -5.0}, r'coefficient of friction \(0 at -10 mm/s and 40 N\) must lie within 0\.05'),
+        ({'a_p2': 5.0}, r'coefficient of friction .* must lie within 0\.05 \.\. 5'),
+        ({'lowest_normal_force': 200.0}, r'lowest_normal_force \(200 N\) must not exceed'),
+        ({'contact_stiffness': 1.0}, r'friction\.contact_stiffness \(1 N/m\) must lie within'),
+        ({'a_q1': 1.0}, r'friction\.a_q1 is unknown'),
+    ],
+)
+def test_friction_that_is_none_is_refused(friction, sentence):
+    with pytest.raises(SpecimenError, match=sentence):
+        checked_specimen(replace(DEFAULT, friction=friction))
 
 
 TRUTH = {

@@ -21,7 +21,10 @@ from mount_sim.warm_coil import TemperatureCoefficients, coil_at
 FloatArray = NDArray[np.float64]
 
 GAPS = np.linspace(270e-6, 550e-6, 15)
-"""Gaps held one after the other, m (chosen)."""
+"""Gaps held one after the other while the force is taken, m (chosen)."""
+
+RIPPLE_GAPS = np.linspace(250e-6, 550e-6, 16)
+"""Gaps at which the ripple is recorded, m (chosen): a worn contact, pressed, is still on the curves."""
 
 FORCE_CURRENTS = np.linspace(0.1, 3.0, 59)
 """Currents at which the force is taken at each gap, A (chosen)."""
@@ -129,7 +132,7 @@ def write_force(rack: Rack, file: Path) -> Path:
 
 
 def write_ripple(
-    rack: Rack, folder: Path, gaps: Sequence[float] = tuple(GAPS.tolist()), temperature: float = 20.0
+    rack: Rack, folder: Path, gaps: Sequence[float] = tuple(RIPPLE_GAPS.tolist()), temperature: float = 20.0
 ) -> list[Path]:
     """Write `record_ripple` at each gap (m) to a CSV file of its own in `folder`; return them."""
     folder.mkdir(parents=True, exist_ok=True)

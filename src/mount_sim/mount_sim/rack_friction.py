@@ -1,8 +1,7 @@
 """Simulated rack recordings of the friction contact: ramp and hold (Fig. 7), sawtooth (Fig. 8).
 
 The rack is what the authors describe: a linear motor under proportional control moves the contact, a load
-cell
-measures the friction force, another one the clamping force. The contact is the full model.
+cell measures the friction force, another one the clamping force. The contact is the full model.
 """
 
 import csv
@@ -26,6 +25,11 @@ SAWTOOTH_SPEEDS = tuple(0.001 * step for step in range(1, 11))
 """Speeds in m/s: 1 mm/s more after every second turning point, as in Sec. 4."""
 SAWTOOTH_NORMAL_FORCES = (40.0, 60.0, 80.0, 100.0, 120.0)
 _SUBSTEPS = 5
+_DISPLACEMENT_NOISE = 0.5e-6  # m
+_DRAWN = (
+    'b_offset', 'b_1', 'b_2', 'a_p1', 'a_p2', 'a_p3', 'a_n1', 'a_n2', 'a_n3',
+    'alpha_p1', 'alpha_p2', 'alpha_n1', 'alpha_n2', 'beta_1', 'beta_2',
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,7 @@ class RackNoise:
     """
 
     relative: float = 0.01
-    displacement: float = 0.5e-6
+    displacement: float = _DISPLACEMENT_NOISE
     seed: int = 0
 
 
@@ -114,6 +118,36 @@ def sawtooth(
     )
 
 
+def drawn_friction(seed: int) -> tuple[FrictionContact, FrictionCoefficients]:
+    """Return other pads, drawn around the default ones (chosen: springs 30 %, coefficients 10 %)."""
+    random = np.random.default_rng([seed, 4])
+
+    def drawn(value: float, spread: float) -> float:
+        return float(value * (1.0 + spread * random.uniform(-1.0, 1.0)))
+
+    contact, coefs = FrictionContact(), FrictionCoefficients()
+    return (
+        FrictionContact(*(drawn(value, 0.3) for value in contact)),
+        coefs._replace(**{name: drawn(getattr(coefs, name), 0.1) for name in _DRAWN}),
+    )
+
+
+def write_friction(
+    folder: Path, contact: FrictionContact, coefs: FrictionCoefficients, noise: float, seed: int
+) -> list[Path]:
+    """Write friction_ramp.csv and a sawtooth friction_*N.csv for each normal force; return the files."""
+    ramp, *others = (
+        RackNoise(noise, _DISPLACEMENT_NOISE if noise > 0.0 else 0.0, 100 * seed + number)
+        for number in range(1 + len(SAWTOOTH_NORMAL_FORCES))
+    )
+    files = [folder / 'friction_ramp.csv']
+    write_csv(ramp_and_hold(contact, coefs, ramp), files[0], with_desired=True)
+    for load, each in zip(SAWTOOTH_NORMAL_FORCES, others, strict=True):
+        files.append(folder / f'friction_{load:.0f}N.csv')
+        write_csv(sawtooth(contact, coefs, each, normal_force=load), files[-1])
+    return files
+
+
 def write_csv(recording: RackRecording, file: Path, *, with_desired: bool = False) -> None:
     """Write time_s, displacement_mm, friction_force_n, normal_force_n (and desired_displacement_mm)."""
     columns = {
@@ -141,7 +175,7 @@ def _pushed(
 ) -> tuple[FloatArray, FloatArray]:
     """Return displacement and force behind the machine's spring p.
 
-    In series with the contact, p makes one spring with c_Re: the full model is driven by the desired
+    In series with the contact, p makes one spring with c_Re: what drives the full model is the desired
     displacement.
     """
     soft = contact.contact_stiffness * machine_stiffness / (contact.contact_stiffness + machine_stiffness)

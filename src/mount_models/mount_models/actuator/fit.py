@@ -15,6 +15,7 @@ from mount_models.actuator.law import ForceLaw, checked_force, coefficients
 from mount_models.actuator.law_check import check_force_law
 from mount_models.actuator.points import Orders, check_outliers, checked_points, far_points, gap_groups
 from mount_models.compiled import compiled
+from mount_models.single_threaded import single_threaded
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -43,6 +44,7 @@ class ForceLawFit:
     points: int
 
 
+@single_threaded
 def fit_force_law(
     gap: npt.ArrayLike,
     current: npt.ArrayLike,

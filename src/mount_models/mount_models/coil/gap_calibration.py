@@ -16,6 +16,7 @@ from mount_models.coil.gap import (
     evaluate,
     slope,
 )
+from mount_models.single_threaded import single_threaded
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -105,6 +106,7 @@ def measured_point(
     )
 
 
+@single_threaded
 def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) -> GapCalibration:
     """Return the curves through points at one temperature, both ways.
 

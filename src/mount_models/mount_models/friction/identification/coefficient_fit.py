@@ -1,7 +1,6 @@
 """Step 3: Eqs (13), (14) through the lines of step 2, on products that are identifiable.
 
-As printed, nine numbers of a (and six of b) have two scales that no measurement tells apart: (a_1, a_2)
-against
+As printed, nine numbers of a (and six of b) have scales that no measurement tells apart: (a_1, a_2) against
 (alpha_1, alpha_2), (b_1, b_2) against (beta_1, beta_2). Here alpha and beta are 1 at 100 N:
 
     a = [A_1 + A_2 ln(A_3 + |v|)] [1 + s (F_N - 100 N)]      for each direction, |v| in mm/s
@@ -19,6 +18,7 @@ from scipy.optimize import least_squares
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.identification.recording import FloatArray, IdentificationError
 from mount_models.friction.identification.sawtooth import StrokeLine
+from mount_models.single_threaded import single_threaded
 
 NORMALISED_AT = 100.0
 FEWEST_SPEEDS = 4
@@ -26,10 +26,20 @@ FEWEST_SPEEDS = 4
 SPEED_SPREAD = 2.0
 _SAME_SPEED = 0.15  # of the speed: closer ones count as one
 _SAME_LOAD = 0.05
-_TYPICAL_A = (
-    0.005  # error of a that the form of Eq (14) is allowed, chosen: noise alone would trust b of long strokes
-)
+_TYPICAL_A = 0.005
+"""Error of a that the form of Eq (14) is allowed (chosen): noise alone would trust long strokes too much."""
 _TYPICAL_B_MM = 0.3
+
+
+@dataclass(frozen=True)
+class ProductCovariance:
+    """Covariance (P, P) of the numbers that were fitted together, by the names of `FrictionCoefficients`.
+
+    With alpha_2 or beta_2 goes alpha_1 or beta_1, which is 1 - 100 N times it. What was not fitted has 0.
+    """
+
+    names: tuple[str, ...]
+    covariance: FloatArray
 
 
 @dataclass(frozen=True)
@@ -47,8 +57,10 @@ class CoefficientFit:
     b_rms_mm: float
     a_model: FloatArray
     b_model: FloatArray
+    covariances: tuple[ProductCovariance, ...]
 
 
+@single_threaded
 def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> CoefficientFit:
     """Return the coefficients for the lines of step 2.
 
@@ -59,9 +71,15 @@ def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> Coef
     loads = np.array([line.normal_force for line in lines])
     with_load = float(np.ptp(loads)) > _SAME_LOAD * float(loads.mean())
     values: dict[str, float] = {}
+    covariances = []
     for side, sign in (('p', 1.0), ('n', -1.0)):
-        values.update(_offset_values([line for line in lines if line.velocity * sign > 0.0], side, with_load))
-    values.update(_slope_values(lines, variant, with_load))
+        one_way = [line for line in lines if line.velocity * sign > 0.0]
+        found, covariance = _offset_values(one_way, side, with_load)
+        values.update(found)
+        covariances.append(covariance)
+    found, covariance = _slope_values(lines, variant, with_load)
+    values.update(found)
+    covariances.append(covariance)
     speeds = [abs(line.velocity) for line in lines]
     fitted = FrictionCoefficients(
         **values,
@@ -79,6 +97,7 @@ def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> Coef
         1e-3 * float(np.sqrt(np.mean((b - [line.b for line in lines]) ** 2))),
         a,
         b,
+        tuple(covariances),
     )
 
 
@@ -109,7 +128,9 @@ def _check_coverage(lines: Sequence[StrokeLine]) -> None:
             )
 
 
-def _offset_values(lines: Sequence[StrokeLine], side: str, with_load: bool) -> dict[str, float]:
+def _offset_values(
+    lines: Sequence[StrokeLine], side: str, with_load: bool
+) -> tuple[dict[str, float], ProductCovariance]:
     speed = np.array([1e3 * abs(line.velocity) for line in lines])
     load = np.array([line.normal_force for line in lines]) - NORMALISED_AT
     a = np.array([line.a for line in lines])
@@ -121,23 +142,27 @@ def _offset_values(lines: Sequence[StrokeLine], side: str, with_load: bool) -> d
         return np.asarray(((level + gain * np.log(shift + speed)) * factor - a) * weight)
 
     spread = max(float(a.mean()), 0.05)
-    level, gain, shift, rise = _best(
+    (level, gain, shift, rise), covariance = _best(
         residuals,
         [[spread, 0.3 * spread, shift, rise] for shift in (0.1, 0.4, 1.5) for rise in (0.1, 0.4)],
         [-5.0, 1e-4, 1e-3, 0.0],
         [5.0, 5.0, 10.0, 0.9],
     )
     rise = rise if with_load else 0.0
-    return {
+    found = {
         f'a_{side}1': level,
         f'a_{side}2': gain,
         f'a_{side}3': shift,
         f'alpha_{side}1': 1.0 - 0.01 * rise * NORMALISED_AT,
         f'alpha_{side}2': 0.01 * rise,
     }
+    names = (f'a_{side}1', f'a_{side}2', f'a_{side}3', f'alpha_{side}2')
+    return found, _named(names, covariance)
 
 
-def _slope_values(lines: Sequence[StrokeLine], variant: str, with_load: bool) -> dict[str, float]:
+def _slope_values(
+    lines: Sequence[StrokeLine], variant: str, with_load: bool
+) -> tuple[dict[str, float], ProductCovariance]:
     speed = np.array([1e3 * abs(line.velocity) for line in lines])
     load = np.array([line.normal_force for line in lines]) - NORMALISED_AT
     b = np.array([1e-3 * line.b for line in lines])
@@ -152,7 +177,7 @@ def _slope_values(lines: Sequence[StrokeLine], variant: str, with_load: bool) ->
         # without different loads b_offset and B_1 are one number
         return np.asarray(((offset if loaded else 0.0) + (first + second * speed) * factor - b) * weight)
 
-    offset, first, second, rise = _best(
+    (offset, first, second, rise), covariance = _best(
         residuals,
         [[offset, -10.0, -1.0, rise] for offset in (10.0, -10.0) for rise in (0.2, 0.8)],
         [-30.0, -100.0, -10.0, -2.0],
@@ -163,15 +188,28 @@ def _slope_values(lines: Sequence[StrokeLine], variant: str, with_load: bool) ->
     elif not loaded:
         offset = 0.0
     rise = rise if loaded else 0.0
-    return {
+    found = {
         'b_offset': offset,
         'b_1': first,
         'b_2': second,
         'beta_1': 1.0 - 0.01 * rise * NORMALISED_AT,
         'beta_2': 0.01 * rise,
     }
+    return found, _named(('b_offset', 'b_1', 'b_2', 'beta_2'), covariance)
 
 
-def _best(residuals, starts, low, high) -> list[float]:
+def _best(residuals, starts, low, high) -> tuple[list[float], FloatArray]:
+    """Return the best end of searches from all `starts`, and its covariance by the scatter left over."""
     found = [least_squares(residuals, start, bounds=(low, high), x_scale='jac') for start in starts]
-    return [float(value) for value in min(found, key=lambda each: each.cost).x]
+    best = min(found, key=lambda each: each.cost)
+    told = np.linalg.norm(best.jac, axis=0)
+    scale = np.where(told > 0.0, told, 1.0)
+    freedom = max(1, best.fun.size - int(np.count_nonzero(told)))
+    scatter = float(best.fun @ best.fun) / freedom
+    inverse = np.linalg.pinv((best.jac / scale).T @ (best.jac / scale), hermitian=True)
+    return [float(value) for value in best.x], scatter * inverse / np.outer(scale, scale)
+
+
+def _named(names: tuple[str, ...], covariance: FloatArray) -> ProductCovariance:
+    factor = np.array([1.0, 1.0, 1.0, 0.01])  # alpha_2, beta_2 are fitted per 100 N
+    return ProductCovariance(names, covariance * np.outer(factor, factor))

@@ -27,6 +27,7 @@ from mount_models.friction.identification.recording import (
     smoothed_displacement,
     thinned,
 )
+from mount_models.single_threaded import single_threaded
 
 SEARCH_SAMPLES = 1200
 """Samples per recording while starts are compared."""
@@ -119,6 +120,7 @@ def predicted_force(law: FrictionLaw, values: FloatArray, recording: FrictionRec
     return law.simulate(values, smoothed_displacement(recording), recording.dt, recording.normal_force)
 
 
+@single_threaded
 def fit_law(
     law: FrictionLaw,
     training: Sequence[FrictionRecording],

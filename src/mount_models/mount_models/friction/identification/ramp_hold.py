@@ -11,8 +11,7 @@ series with c_Re and with c_R parallel to d_R. After a step X of x_d (derived; E
     c_Re = (p + c_xi) / kappa - p;  c_R = c_xi c_Re / (c_Re - c_xi);  d_R = T (c_R + p c_Re / (p + c_Re))
 
 A real ramp lasts t_r; its response is the mean of the step response over the last t_r, in closed form. All of
-x, F and, where recorded, x_d are fitted at once, so neither the beginning nor the end of the ramp need be
-told.
+x, F and, where recorded, x_d are fitted at once, so neither the beginning nor the end of the ramp is told.
 """
 
 from dataclasses import dataclass
@@ -27,6 +26,7 @@ from mount_models.friction.identification.recording import (
     FrictionRecording,
     IdentificationError,
 )
+from mount_models.single_threaded import single_threaded
 
 LARGEST_MISFIT = 0.08
 """Largest rms misfit over the rms of force or displacement: above, it is no ramp in microslip (chosen)."""
@@ -49,7 +49,7 @@ class PrintedFormulas:
 
 @dataclass(frozen=True)
 class RampHoldFit:
-    """Result of step 1: `contact`, its standard deviations, and all that was fitted on the way.
+    """Result of step 1: `contact`, its standard deviations and covariance, and all fitted on the way.
 
     `machine_stiffness` is p in N/m; `time_constant` T, `ramp_start`, `ramp_time` in s; `asymptote` K and
     `desired` X in m; `kappa` = T_v / T. `printed` is what the printed formulas make of the same numbers.
@@ -59,6 +59,7 @@ class RampHoldFit:
     name: str
     contact: FrictionContact
     deviation: FrictionContact
+    covariance: FloatArray
     machine_stiffness: float
     kappa: float
     time_constant: float
@@ -73,6 +74,7 @@ class RampHoldFit:
     force: FloatArray
 
 
+@single_threaded
 def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     """Return the contact's springs and damper; raises `IdentificationError` where the ramp does not tell."""
     time = recording.time
@@ -114,12 +116,14 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     misfits = _relative(model[0] - x, x), _relative(model[1] - force, force)
     _check_misfit(recording.name, misfits)
     contact = _contact(recording.name, values)
-    deviation = _deviation(values, covariance)
+    covariance = _contact_covariance(values, covariance)
+    deviation = FrictionContact(*(float(value) for value in np.sqrt(covariance.diagonal().clip(0.0))))
     _check_deviation(recording.name, contact, deviation)
     return RampHoldFit(
         name=recording.name,
         contact=contact,
         deviation=deviation,
+        covariance=covariance,
         machine_stiffness=float(values[3]),
         kappa=float(values[1]),
         time_constant=float(values[2]),
@@ -140,6 +144,14 @@ def mean_contact(fits: list[RampHoldFit]) -> FrictionContact:
     values = np.array([fit.contact for fit in fits])
     weights = 1.0 / np.maximum(np.array([fit.deviation for fit in fits]), 1e-9 * values) ** 2
     return FrictionContact(*(float(value) for value in (values * weights).sum(axis=0) / weights.sum(axis=0)))
+
+
+def mean_covariance(fits: list[RampHoldFit]) -> FloatArray:
+    """Return the covariance (3, 3) of `mean_contact`, whose weights are those of single parameters."""
+    weights = 1.0 / np.maximum(np.array([fit.covariance.diagonal() for fit in fits]), 1e-300)
+    shares = weights / weights.sum(axis=0)
+    parts = [np.outer(share, share) * fit.covariance for share, fit in zip(shares, fits, strict=True)]
+    return np.asarray(sum(parts))
 
 
 def ramp_response(
@@ -247,8 +259,8 @@ def _as_printed(values: FloatArray) -> PrintedFormulas:
     return PrintedFormulas(c_re, with_p * c_re / (c_re - with_p), stiff, stiff * lag)
 
 
-def _deviation(values: FloatArray, covariance: FloatArray) -> FrictionContact:
-    """Return standard deviations of c_R, d_R, c_Re by linear propagation."""
+def _contact_covariance(values: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the covariance (3, 3) of c_R, d_R, c_Re by linear propagation."""
     slopes = np.zeros((3, values.size))
     for place in range(5):
         step = 1e-6 * abs(values[place])
@@ -256,8 +268,7 @@ def _deviation(values: FloatArray, covariance: FloatArray) -> FrictionContact:
         up[place] += step
         down[place] -= step
         slopes[:, place] = (np.array(_inverted(up)) - np.array(_inverted(down))) / (2.0 * step)
-    variances = np.einsum('ij,jk,ik->i', slopes, covariance, slopes)
-    return FrictionContact(*(float(value) for value in np.sqrt(np.maximum(variances, 0.0))))
+    return np.asarray(slopes @ covariance @ slopes.T)
 
 
 def _check_misfit(name: str, misfits: tuple[float, float]) -> None:
