@@ -7,9 +7,11 @@ PACKAGES := mount_models mount_ros mount_driver mount_init mount_control mount_s
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 DRIVE_OPTIONS ?=
+RACK := build/rack
+SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test experiments bench lint format setup setup-dev clean
+.PHONY: help drive test experiments identify bench lint format setup setup-dev clean
 
 help: ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
@@ -23,6 +25,12 @@ test: $(VENV)/.ready-dev ## pass all tests
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/experiments.md and docs/figures
 	@$(BIN)/engine-mount experiment all --page docs/experiments.md
+
+identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes the specimen that is shipped
+	@$(BIN)/engine-mount calibrate rack --out $(RACK) --noise 0 --celsius 20 --celsius 80
+	@$(BIN)/engine-mount calibrate actuator $(RACK)/force.csv --name default --out $(RACK)/default.yaml
+	@$(BIN)/engine-mount calibrate inductance $(RACK)/ripple_*.csv --base $(RACK)/default.yaml --out $(RACK)/default.yaml
+	@$(BIN)/engine-mount identify friction --step sawtooth --train $(RACK)/friction_ramp.csv $(RACK)/friction_[46]0N.csv $(RACK)/friction_1?0N.csv --held-out $(RACK)/friction_80N.csv --base $(RACK)/default.yaml --out $(SPECIMEN)
 
 bench: $(VENV)/.ready-dev ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench

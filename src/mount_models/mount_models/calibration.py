@@ -1,12 +1,11 @@
 """Calibrate an actuator on the (simulated) rig: measure it at fixed gaps, fit what the controller needs.
 
 As the authors did: the gap is held, the current stepped, force and coil ripple are measured; Eqs (3), (4)
-and the curves of Fig 4 are fitted. Run ``python -m mount_models.calibration`` to write the default specimen.
+and the curves of Fig 4 are fitted, all from arrays, for experiments and tests. From recordings do the same
+`engine-mount calibrate` and `engine-mount identify`; with them `make identify` writes the default specimen.
 """
 
-import argparse
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,13 +17,9 @@ from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.closing import ClosingMechanics
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import measured_inductance
-from mount_models.coil.gap_calibration import RippleRecording, measured_point
 from mount_models.coil.gap_fit import GapCurvesFit, fit_gap_curves
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
-from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT, TemperatureCompensation
-from mount_models.coil.temperature_fit import COPPER_COEFFICIENT, measured_compensation
-from mount_models.quantity import with_values
-from mount_models.specimen import DEFAULT_SPECIMEN, Specimen, checked_specimen, save_specimen
+from mount_models.specimen import Specimen, checked_specimen
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,9 +31,6 @@ RIG_CURRENTS = np.linspace(0.0, 3.0, 151)
 
 LAW_GAPS = (270e-6, 550e-6)
 """Gaps that the force law is fitted to, m (chosen): it meets 280 .. 540 um with some room on either side."""
-
-RIG_CELSIUS, RIG_WARM_CELSIUS = 20.0, 80.0
-"""Coil temperatures of the rig, degC (chosen)."""
 
 LAW_LOWEST_CURRENT = 0.1
 """Current from which the force law is fitted, A (chosen); below, force sensors see next to nothing."""
@@ -100,12 +92,11 @@ def calibrate(
     rest_current: float = 0.2,
     crossing_inductance: float = 20e-3,
     law_gaps: tuple[float, float] = LAW_GAPS,
-    warm: RigMeasurements | None = None,
     provenance: dict[str, Any] | None = None,
 ) -> Specimen:
     """Return the specimen that the rig's measurements give; stiffnesses are known by design.
 
-    `warm` are measurements at `RIG_WARM_CELSIUS`; without them temperature is not compensated.
+    Temperature is not compensated.
     Raises `CalibrationError`, `ForceLawRefusedError`, `GapCurvesRefusedError` or `CrossingError`.
     """
     design = ClosingMechanics() if mechanics is None else mechanics
@@ -122,47 +113,8 @@ def calibrate(
             rest_current=rest_current,
             crossing_inductance=crossing_inductance,
             current_limit=law_fit.law.current_high,
-            temperature=None
-            if warm is None
-            else _compensation(warm, curves_fit, rest_current, crossing_inductance),
             provenance={**(provenance or {}), **_fit_quality(law_fit, curves_fit)},
         )
-    )
-
-
-def calibrate_default() -> Specimen:
-    """Return the specimen of the simulated actuator with all its defaults, measured without noise."""
-    actuator, coil = ReluctanceActuator(), RippleCoil()
-    difference = RIG_WARM_CELSIUS - RIG_CELSIUS
-    warm = with_values(
-        coil,
-        conductivity=coil.conductivity / (1.0 + CONDUCTIVITY_COEFFICIENT * difference),
-        resistance=coil.resistance * (1.0 + COPPER_COEFFICIENT * difference),
-    )
-    return calibrate(
-        measure_actuator(actuator, coil),
-        name='default',
-        warm=measure_actuator(actuator, warm, currents=RIG_CURRENTS[RIG_CURRENTS <= _WARM_HIGHEST_CURRENT]),
-        provenance={
-            'written_by': 'python -m mount_models.calibration',
-            'measured_on': 'simulated actuator and coil with default parameters, no noise',
-            'actuator': {name: float(value) for name, value in actuator._asdict().items()},
-            'coil': {name: float(value) for name, value in coil._asdict().items()},
-        },
-    )
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Calibrate the default simulated actuator and write its specimen."""
-    parser = argparse.ArgumentParser(
-        description='Calibrate the default simulated actuator; write its specimen.'
-    )
-    parser.add_argument('--output', type=Path, default=DEFAULT_SPECIMEN, help='file to write')
-    output = parser.parse_args(arguments).output
-    specimen = calibrate_default()
-    save_specimen(specimen, output)
-    print(
-        f'{output}: ' + ', '.join(f'{key} {value:.3g}' for key, value in specimen.provenance['fit'].items())
     )
 
 
@@ -175,30 +127,6 @@ def _force_law(measurements: RigMeasurements, law_gaps: tuple[float, float]) -> 
         measurements.currents[columns],
         measurements.force[np.ix_(rows, columns)],
     )
-
-
-_WARM_HIGHEST_CURRENT = 2.5  # A: with warm copper the bridge cannot hold 3 A and still be sampled in time
-
-
-def _compensation(
-    warm: RigMeasurements, curves_fit: GapCurvesFit, rest_current: float, crossing_inductance: float
-) -> TemperatureCompensation:
-    repeated = 40  # a rig without noise needs no more samples, but a recording has many
-    points = [
-        measured_point(
-            RippleRecording(
-                'rig', float(gap), RIG_WARM_CELSIUS, *np.repeat([warm.currents, row], repeated, axis=1)
-            ),
-            rest_current,
-            crossing_inductance,
-            _CROSSING_HALF_WIDTH,
-        )
-        for gap, row in zip(warm.gaps, warm.inductance, strict=True)
-    ]
-    return measured_compensation(curves_fit.curves, RIG_CELSIUS, points)
-
-
-_CROSSING_HALF_WIDTH = 0.1  # A, as that of the curves
 
 
 def _gap_curves(
@@ -226,7 +154,3 @@ def _fit_quality(law_fit: ForceLawFit, curves_fit: GapCurvesFit) -> dict[str, An
         quality[f'{name}_largest_error'] = error
     # four digits say all there is to say; further ones might differ between machines
     return {'fit': {name: float(f'{value:.4g}') for name, value in quality.items()}}
-
-
-if __name__ == '__main__':
-    main()

@@ -66,7 +66,7 @@ class Specimen:
 
 
 def default_specimen() -> Specimen:
-    """Return the specimen that `python -m mount_models.calibration` measured on the simulated actuator."""
+    """Return the specimen that `make identify` measured on the simulated rack."""
     return load_specimen(DEFAULT_SPECIMEN)
 
 
