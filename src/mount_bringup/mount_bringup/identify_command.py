@@ -104,6 +104,80 @@ def friction(
         note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
+DRIFT_EPILOG = """Examples:
+
+`engine-mount identify drift bags/monday bags/tuesday bags/friday --figure wear.png`
+
+`engine-mount identify drift a b c --hours a=120 --hours b=180 --hours c=260` - by a counter
+"""
+
+
+@app.command(epilog=DRIFT_EPILOG)
+def drift(
+    recordings: Annotated[list[Path], typer.Argument(help='runs or recordings with an initialisation')],
+    specimen: Annotated[
+        Path | None, typer.Option(help='specimen file of this actuator; default: the shipped one')
+    ] = None,
+    hours: Annotated[
+        list[str] | None,
+        typer.Option(metavar='RECORDING=H', help='hours of all recordings; default: when sessions began'),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
+    ] = None,
+    figure: Annotated[Path | None, typer.Option(metavar='FILE', help='draw it (PNG)')] = None,
+) -> None:
+    """Tell wear of the pads per hour, with its uncertainty, and the travel left until the law's range ends.
+
+    A line through the contact gaps of all recordings, weighted by the deviations that the initialisations
+    stated; where gaps scatter more than that, by as much less sure. Offset current and, where a rack's load
+    cells are recorded, friction likewise from their scatter.
+    """
+    from mount_bringup.calibrated_specimen import check_targets
+    from mount_bringup.identify_drift import figures, identify_drift
+    from mount_bringup.summary import write_json
+    from mount_models.specimen import chosen_specimen
+
+    console = Console()
+    check_targets(json_file, figure)
+    told = {}
+    for setting in hours or []:
+        named, equals, text = setting.rpartition('=')
+        meant = [path for path in recordings if str(path) == named or path.name == named]
+        try:
+            value = float(text)
+        except ValueError:
+            value = float('nan')
+        if not equals or len(meant) != 1 or value - value != 0.0:
+            raise typer.BadParameter(f'--hours {setting}: write RECORDING=H, as in bags/monday=120')
+        told[meant[0]] = value
+    result = identify_drift(recordings, chosen_specimen(str(specimen) if specimen else ''), told)
+    if figure is not None:
+        from mount_bringup.drift_figure import draw_drift
+
+        draw_drift(result, figure)
+        console.print(f'figure {figure}', highlight=False)
+    if json_file is not None:
+        write_json(figures(result), json_file)
+    lines = [('contact gap', result.gap, 1e6, 'um/h'), ('offset current', result.current, 1e3, 'mA/h')]
+    if result.friction is not None:
+        lines.append(('friction', result.friction, 1.0, '1/h'))
+    for label, line, factor, unit in lines:
+        std = 'unknown' if line.slope_std != line.slope_std else f'{factor * line.slope_std:.2g}'
+        console.print(f'{label}: {factor * line.slope:+.3g} +- {std} {unit} (one deviation)', highlight=False)
+    console.print(
+        f'{1e6 * result.left:.1f} +- {1e6 * result.left_std:.2g} um left until the contact gap reaches '
+        f'{1e6 * result.limit:.1f} um, where the pressed gap leaves the range of the law'
+        + (
+            f'; at this wear in {result.hours_left:.3g} h'
+            if result.hours_left is not None
+            else '; no wear beyond two deviations is seen'
+        ),
+        soft_wrap=True,
+        highlight=False,
+    )
+
+
 def _print(found: Identification, console: Console) -> None:
     from mount_bringup.identify_friction import chosen_fit, figures
 

@@ -1,0 +1,113 @@
+"""`engine-mount identify drift`: wear over recordings made with drifting contact gaps."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mount_bags.writer import BagWriter
+from mount_bringup.command import main
+from mount_bringup.core_run import run_core
+from mount_models.drift import DriftError, fitted_drift
+from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE, TOPICS
+
+HOURS = (0.0, 50.0, 100.0, 150.0)
+WEAR = 0.2e-6  # m/h
+
+
+@pytest.fixture(scope='module')
+def drives(tmp_path_factory):
+    """Return recordings of drives whose contact gap falls by 0.2 um each hour, 1 % noise on the ripple."""
+    folder = tmp_path_factory.mktemp('drives')
+    made = []
+    for seed, hours in enumerate(HOURS):
+        writer = BagWriter(folder / f'{hours:g}h')
+        for topic in TOPICS:
+            if topic.name in (AIR_GAP.name, CURRENT_FORCE_TABLE.name):
+                writer.add_topic(f'/{topic.name}', topic.type, latched=True)
+        sim = {
+            'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.2, 'seed': seed,
+            'electronics.ripple_noise': 0.01, 'mechanics.contact_gap': 349e-6 - WEAR * hours,
+        }  # fmt: skip
+
+        def write(topic, raw, stamp, writer=writer):
+            if topic.name in (AIR_GAP.name, CURRENT_FORCE_TABLE.name):
+                writer.write(f'/{topic.name}', raw, stamp)
+
+        run_core({'mount_sim': sim}, write)
+        writer.close()
+        made.append(folder / f'{hours:g}h')
+    return made
+
+
+def drift(*words):
+    with pytest.raises(SystemExit) as ended:
+        main(['identify', 'drift', *map(str, words)])
+    return ended.value.code
+
+
+def hours_of(drives, hours=HOURS):
+    return [word for path, h in zip(drives, hours, strict=True) for word in ('--hours', f'{path}={h}')]
+
+
+def test_the_wear_comes_back_within_its_uncertainty(drives, tmp_path):
+    assert (
+        drift(*drives, *hours_of(drives), '--json', tmp_path / 'd.json', '--figure', tmp_path / 'd.png') == 0
+    )
+    found = json.loads((tmp_path / 'd.json').read_text())
+    wear, std = found['contact_gap']['per_hour_m'], found['contact_gap']['per_hour_std_m']
+    assert wear == pytest.approx(-WEAR, abs=3.0 * std)
+    assert wear == pytest.approx(-WEAR, rel=0.1)
+    left = found['remaining_travel_m']
+    assert found['least_contact_gap_m'] == pytest.approx(270e-6 + 300.0 / 2e7, abs=2e-6)
+    assert left == pytest.approx(349e-6 - WEAR * 150.0 - found['least_contact_gap_m'], abs=2e-6)
+    assert found['remaining_hours'] == pytest.approx(left / -wear)
+    assert found['friction'] is None
+    assert found['offset_current']['per_hour_a'] > 0.0 or found['offset_current']['per_hour_a'] < 0.0
+    assert (tmp_path / 'd.png').stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ('count', 'hours', 'sentence'),
+    [
+        (1, HOURS[:1], '1 recording tells no drift; at least 2'),
+        (3, (5.0, 5.0, 5.0), 'all 3 recordings are from one time'),
+        (2, None, 'does not tell when it began'),
+    ],
+)
+def test_what_tells_no_drift_is_refused(drives, count, hours, sentence, tmp_path, capsys):
+    told = [] if hours is None else hours_of(drives[:count], hours)
+    assert drift(*drives[:count], *told, '--json', tmp_path / 'd.json') == 1
+    assert sentence in capsys.readouterr().err.replace('\n', ' ')
+    assert not (tmp_path / 'd.json').exists()
+
+
+def test_hours_of_some_recordings_only_are_refused(drives, capsys):
+    assert drift(*drives[:2], '--hours', f'{drives[0]}=3') == 1
+    assert 'for all recordings or none' in capsys.readouterr().err
+
+
+def test_the_stated_deviation_of_the_slope_is_the_scatter_of_repeated_slopes():
+    random = np.random.default_rng(0)
+    hours, stds = np.array([0.0, 1.0, 2.0, 5.0, 9.0]), np.array([1.0, 2.0, 1.0, 3.0, 1.0])
+    fits = [
+        fitted_drift(hours, 3.0 - 0.5 * hours + stds * random.standard_normal(5), stds) for _ in range(400)
+    ]
+    slopes = np.array([fit.slope for fit in fits])
+    assert slopes.mean() == pytest.approx(-0.5, abs=0.03)
+    exact = fitted_drift(hours, 3.0 - 0.5 * hours, stds)
+    assert exact.ratio == 1.0
+    assert slopes.std() == pytest.approx(exact.slope_std, rel=0.1)
+
+
+def test_values_that_scatter_more_than_stated_are_less_sure():
+    hours = np.arange(6.0)
+    values = np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0])
+    stated, wide = (fitted_drift(hours, values, np.full(6, std)) for std in (0.01, 10.0))
+    assert stated.slope_std == pytest.approx(fitted_drift(hours, values).slope_std)
+    assert wide.slope_std == pytest.approx(10.0 / np.sqrt(17.5))
+
+
+def test_a_deviation_of_zero_is_refused():
+    with pytest.raises(DriftError, match='must be above 0'):
+        fitted_drift([0.0, 1.0], [1.0, 2.0], [0.1, 0.0])
