@@ -63,7 +63,8 @@ def test_the_wear_comes_back_within_its_uncertainty(drives, tmp_path):
     assert left == pytest.approx(349e-6 - WEAR * 150.0 - found['least_contact_gap_m'], abs=2e-6)
     assert found['remaining_hours'] == pytest.approx(left / -wear)
     assert found['friction'] is None
-    assert found['offset_current']['per_hour_a'] > 0.0 or found['offset_current']['per_hour_a'] < 0.0
+    first, *_, last = (each['offset_current_a'] for each in found['recordings'])
+    assert found['offset_current']['per_hour_a'] == pytest.approx((last - first) / 150.0, rel=0.1)
     assert (tmp_path / 'd.png').stat().st_size > 10_000
 
 

@@ -1,8 +1,8 @@
 """Wear and other drift: a straight line through values measured at several times, and how sure its slope is.
 
 Noise model: each value has the standard deviation that came with it, independent of the others. Where the
-values scatter more about the line than that explains, all are taken as that much less sure (Birge ratio); where
-they scatter less, the stated ones stand. Without any stated deviation the scatter alone tells.
+values scatter more about the line than that explains, all are taken as that much less sure (Birge ratio);
+where they scatter less, the stated ones stand. Without any stated deviation the scatter alone tells.
 """
 
 import math
