@@ -41,7 +41,8 @@ def friction(
         list[Path] | None, typer.Option(metavar='FILE...', help='recordings that no fit sees, to judge by')
     ] = None,
     file: Annotated[
-        list[Path] | None, typer.Option(metavar='FILE...', help='train on each, predict each other one')
+        list[Path] | None,
+        typer.Option(metavar='FILE...', help='train on each, predict each other one; of one, its halves'),
     ] = None,
     step: Annotated[str, typer.Option(help='auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     channel: Annotated[

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +76,9 @@ def identify(order: IdentifyOrder, progress: Progress | None = None) -> Identifi
     """Return what the recordings tell; raises `IdentificationError` before anything is written."""
     _check_order(order)
     found = Identification()
+    if len(order.pairs) == 1:
+        _try_halves(found, order, progress)
+        return found
     if order.pairs:
         _try_pairs(found, order, progress)
         return found
@@ -185,10 +188,6 @@ def _check_order(order: IdentifyOrder) -> None:
         raise IdentificationError(
             '--file tries all pairs of its files; give it alone, or --train and --held-out'
         )
-    if order.pairs and len(order.pairs) < 2:
-        raise IdentificationError(
-            '--file names 1 recording; at least 2 are needed: one trains, another is held out'
-        )
     if not order.pairs and not order.train:
         raise IdentificationError(
             '0 recordings to train with; give --train FILE..., or --file FILE... for all pairs'
@@ -246,6 +245,29 @@ def _coefficients(
         found.fits.append((fit, error))
     found.coefficients = chosen_fit(found).coefficients
     found.validations = [(each, validate(each, contact, found.coefficients)) for each in found.held_out]
+
+
+def _try_halves(found: Identification, order: IdentifyOrder, progress: Progress | None) -> None:
+    ((whole, kind),) = _read(found, order.pairs, 'first half train, second half held out', order)
+    if kind == RAMP:
+        raise IdentificationError(
+            f'{whole.name} is a ramp that is held, of which one half tells nothing of the other; give it to '
+            '--train, or give --file a recording that moves to and fro'
+        )
+    middle = whole.force.size // 2
+    first, second = (
+        replace(
+            whole, name=f'{whole.name}, {label} half', displacement=whole.displacement[part],
+            force=whole.force[part], normal_force=whole.normal_force[part], desired_displacement=None,
+        )
+        for label, part in (('first', slice(None, middle)), ('second', slice(middle, None)))
+    )  # fmt: skip
+    found.held_out = [second]
+    found.rungs = fit_ladder([first], [second], progress=progress, seed=order.seed)
+    found.notes.append(
+        f'one recording: its first half ({first.force.size * first.dt:.3g} s) trains, its second half is held '
+        'out; that says less than a recording of another day, speed or load would'
+    )
 
 
 def _try_pairs(found: Identification, order: IdentifyOrder, progress: Progress | None) -> None:

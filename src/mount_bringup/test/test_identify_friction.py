@@ -1,16 +1,22 @@
 """`engine-mount identify friction` from files to files."""
 
+import hashlib
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from mount_bringup.command import main
+from mount_bringup.core_chain import friction_model
+from mount_bringup.experiments.friction_rack import move, sawtooth_corners
+from mount_bringup.experiments.rack_recording import record_friction_rack
 from mount_bringup.friction_files import parsed_channels, read_recording
 from mount_bringup.identify_arguments import with_repeated_options
+from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
+from mount_models.friction.contact import FrictionContact
 from mount_models.friction.identification.recording import IdentificationError
+from mount_models.specimen import default_specimen, load_specimen
 from mount_sim.rack_friction import RackNoise, ramp_and_hold, sawtooth, write_csv
 
 RIG = Path(__file__).resolve().parents[4] / 'shared' / 'data' / 'friction_rig'
@@ -62,9 +68,20 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path):
     assert result['best'] == "paper's model"
     assert result['ladder']["paper's model"]['held_out_error'] < 0.05
     assert result['contact']['contact_stiffness'] == pytest.approx(4e6, rel=0.03)
-    written = yaml.safe_load((tmp_path / 'f.yaml').read_text())
-    assert written['coefficients'] == pytest.approx(result['coefficients'])
-    assert len(written['provenance']['recordings']['80.csv']['sha256']) == 64
+    specimen = load_specimen(tmp_path / 'f.yaml')
+    assert specimen.friction == pytest.approx({**result['coefficients'], **result['contact']})
+    assert specimen.force_law == default_specimen().force_law
+    told = specimen.provenance['parts']['friction']
+    digest = hashlib.sha256((rack / '80.csv').read_bytes()).hexdigest()
+    assert {'file': '80.csv', 'part': 'held out', 'kind': 'sawtooth', 'sha256': digest} in told['recordings']
+    assert told['valid']['normal_force'] == pytest.approx([40.0, 120.0], rel=0.01)
+    assert told['residuals']['held_out']['80.csv'] < 0.05
+    for names, matrix in told['covariance'].items():
+        assert np.shape(matrix) == (len(names.split(', ')),) * 2
+        assert (np.diag(matrix) >= 0.0).all()
+    drive = friction_model({'mount_control': {'parameters_file': str(tmp_path / 'f.yaml')}})
+    assert drive[0]._asdict() == pytest.approx(result['coefficients'])
+    assert drive[1]._asdict() == pytest.approx(result['contact'])
     assert (tmp_path / 'f.png').stat().st_size > 10_000
 
 
@@ -90,6 +107,47 @@ def test_bad_files_are_refused_and_nothing_is_written(make, words, tmp_path, cap
     assert ended.value.code == 1
     assert words in capsys.readouterr().err.replace('\n', ' ')
     assert not any(each.exists() for each in outputs)
+
+
+def test_one_file_trains_on_its_first_half_and_is_tried_on_its_second(rack, tmp_path, monkeypatch):
+    from mount_bringup import identify_friction
+    from mount_models.friction.identification.ladder import fit_ladder
+    from mount_models.friction.identification.laws.coulomb import Coulomb
+
+    def quick(training, held_out, **others):
+        assert [each.name for each in training] == ['80.csv, first half']
+        assert [each.name for each in held_out] == ['80.csv, second half']
+        return fit_ladder(training, held_out, laws=[Coulomb()])
+
+    monkeypatch.setattr(identify_friction, 'fit_ladder', quick)
+    _run('identify', 'friction', '--file', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'))
+    result = json.loads((tmp_path / 'f.json').read_text())
+    assert 'second half is held out' in result['notes'][-1]
+    entry = result['ladder']['Coulomb']
+    assert 0.0 < entry['train_error'] < 1.0
+    assert entry['held_out_error'] != entry['train_error']
+
+
+def test_the_recordings_of_the_sawtooth_experiment_are_read_as_the_rack_measured_them(tmp_path):
+    times, positions, _ = sawtooth_corners(2.5e-3, 2e-3, 8e-3, 2e-3)
+    samples = move(
+        FrictionContact(), FrictionCoefficients(), times, positions, 100.0, force_noise=0.5, seed=1
+    )
+    recording = record_friction_rack(tmp_path / 'sawtooth', *samples, {'scenario': 'sawtooth'})
+    read = read_recording(recording)
+    assert read.displacement == pytest.approx(samples.displacement, abs=1e-12)
+    assert read.force == pytest.approx(samples.friction_force, abs=1e-9)
+    assert read.normal_force == pytest.approx(np.full((read.force.size, 2), 100.0))
+    assert read.dt == pytest.approx(1e-3, rel=1e-9)
+    _run(
+        'identify', 'friction', '--step', 'sawtooth', '--train', str(recording), '--json', str(tmp_path / 'f.json')
+    )  # fmt: skip
+    found = json.loads((tmp_path / 'f.json').read_text())
+    assert found['recordings']['sawtooth']['kind'] == 'sawtooth'
+    coefs = FrictionCoefficients(**found['coefficients'])
+    assert offset_coefficient(coefs, 0.006, 100.0) == pytest.approx(
+        offset_coefficient(FrictionCoefficients(), 0.006, 100.0), abs=0.01
+    )
 
 
 def test_a_held_out_recording_must_be_unseen(rack, capsys):
