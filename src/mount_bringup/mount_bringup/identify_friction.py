@@ -265,8 +265,8 @@ def _try_halves(found: Identification, order: IdentifyOrder, progress: Progress 
     found.held_out = [second]
     found.rungs = fit_ladder([first], [second], progress=progress, seed=order.seed)
     found.notes.append(
-        f'one recording: its first half ({first.force.size * first.dt:.3g} s) trains, its second half is held '
-        'out; that says less than a recording of another day, speed or load would'
+        f'one recording: its first half ({first.force.size * first.dt:.3g} s) trains, its second half is '
+        'held out; that says less than a recording of another day, speed or load would'
     )
 
 

@@ -140,7 +140,8 @@ def test_the_recordings_of_the_sawtooth_experiment_are_read_as_the_rack_measured
     assert read.normal_force == pytest.approx(np.full((read.force.size, 2), 100.0))
     assert read.dt == pytest.approx(1e-3, rel=1e-9)
     _run(
-        'identify', 'friction', '--step', 'sawtooth', '--train', str(recording), '--json', str(tmp_path / 'f.json')
+        'identify', 'friction', '--step', 'sawtooth', '--train', str(recording),
+        '--json', str(tmp_path / 'f.json'),
     )  # fmt: skip
     found = json.loads((tmp_path / 'f.json').read_text())
     assert found['recordings']['sawtooth']['kind'] == 'sawtooth'
