@@ -170,6 +170,11 @@ def test_dahl_becomes_coulomb_when_stiff():
     assert stiff[moving] == pytest.approx(coulomb[moving], abs=0.2)
 
 
+def test_a_law_without_any_force_has_an_error_of_one():
+    recording = checked_recording('sine', TIME, X, F, 100.0)
+    assert law_error(Coulomb(), np.zeros(2), [recording]) == pytest.approx(1.0)
+
+
 def test_the_ladder_finds_the_law_that_made_the_data_and_judges_by_held_out_error():
     truth = np.array([0.5, 0.7, 2e5, 0.3e-3])
     train, other = (
