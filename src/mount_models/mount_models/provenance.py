@@ -1,7 +1,8 @@
 """Where a specimen comes from: free in its entries, but nothing in it may be nonsense.
 
 Known entries have a form: `parts` with the `specimen` of each, `recordings` with their hashes, `valid`
-ranges, square `covariance`, `date`. All others hold texts, finite numbers, and lists and mappings of them.
+ranges, square `covariance` (one, or several by the names of what varies together), `date`. All others hold
+texts, finite numbers, and lists and mappings of them.
 """
 
 import datetime
@@ -82,7 +83,7 @@ def _check_recordings(value: Any, where: str) -> None:
 def _check_valid(value: Any, where: str) -> None:
     ranges = value if isinstance(value, Mapping) else {'': value}
     for name, limits in ranges.items():
-        if not (_are_numbers(limits) and len(limits) == 2 and limits[0] < limits[1]):
+        if not (_are_numbers(limits) and len(limits) == 2 and limits[0] <= limits[1]):
             raise ProvenanceError(
                 f'{where}{name and "."}{name} must be two numbers in rising order; instead received '
                 f'{_told(limits)}'
@@ -90,6 +91,15 @@ def _check_valid(value: Any, where: str) -> None:
 
 
 def _check_covariance(value: Any, where: str) -> None:
+    """Check one matrix, or several by the names of what varies together: {'a, b': matrix}."""
+    if isinstance(value, Mapping) and value:
+        for names, matrix in value.items():
+            _check_covariance(matrix, f'{where}.{names}')
+            if len(matrix) != len(names.split(', ')):
+                raise ProvenanceError(
+                    f'{where}.{names} must have one row for each of its names; it has {len(matrix)}'
+                )
+        return
     rows = value if isinstance(value, list) else []
     square = bool(rows) and all(_are_numbers(row) and len(row) == len(rows) for row in rows)
     if not square or not all(rows[k][k] >= 0.0 for k in range(len(rows))):

@@ -75,6 +75,13 @@ NONSENSE = [
     ('parts.force_law.covariance', [[1.0, 2.0]], r'covariance must be a square matrix'),
     ('parts.force_law.covariance', [[-1.0]], r'covariance must be a square matrix of numbers, none below 0'),
     ('parts.force_law.covariance', [[True]], r'covariance must be a square matrix'),
+    (
+        'parts.force_law.covariance',
+        {'a, b': [[1.0]]},
+        r'covariance\.a, b must have one row for each of its names',
+    ),
+    ('parts.force_law.covariance', {'a': [[-1.0]]}, r'covariance\.a must be a square matrix'),
+    ('parts.force_law.covariance', {}, r'covariance must be a square matrix'),
     ('parts.gap_curves.inductance_of_gap.covariance', 2.0, r'inductance_of_gap\.covariance must be a square'),
 ]
 
@@ -87,10 +94,11 @@ def test_nonsense_is_refused_by_its_place(path, value, sentence):
 
 def test_nonsense_written_into_the_file_by_hand_is_refused_when_it_is_loaded(tmp_path):
     content = yaml.safe_load(DEFAULT_SPECIMEN.read_text(encoding='utf-8'))
-    content['provenance']['coil']['turns'] = math.nan
+    content['provenance']['parts']['friction']['residuals']['a_rms'] = math.nan
     file = tmp_path / 'edited.yaml'
     file.write_text(yaml.safe_dump(content), encoding='utf-8')
-    with pytest.raises(SpecimenError, match=r'edited\.yaml: provenance\.coil\.turns must be a finite number'):
+    sentence = r'edited\.yaml: provenance\.parts\.friction\.residuals\.a_rms must be a finite number'
+    with pytest.raises(SpecimenError, match=sentence):
         load_specimen(file)
 
 
