@@ -47,8 +47,7 @@ def identified(folder, seed, noise=0.01):
     file = folder / 'drawn.yaml'
     command('calibrate', 'actuator', folder / 'force.csv', '--name', 'drawn', '--out', file)
     ripple, friction = in_folder(folder, 'ripple_*.csv'), in_folder(folder, 'friction_*.csv')
-    area = drawn_rack(seed).actuator.turns * drawn_rack(seed).actuator.gap_area
-    command('calibrate', 'inductance', *ripple, '--turns-area', area, '--base', file, '--out', file)
+    command('calibrate', 'inductance', *ripple, '--base', file, '--out', file)
     command(
         'identify', 'friction', '--step', 'sawtooth', '--train', *friction, '--base', file, '--out', file,
     )  # fmt: skip
