@@ -208,7 +208,7 @@ def test_a_crossing_that_differs_up_and_down_is_refused(refusal):
 def test_a_rest_gap_that_changes_during_the_ramp_is_refused(refusal):
     error = refusal(distort=inductance_times(lambda n, _: 1.0 if n < SECOND_HALF else 0.98))
     assert isinstance(error, ContradictionError)
-    assert 'rest gap before and after the ramp (507.5 and 53' in str(error)
+    assert 'rest gap before and after the ramp (507.4 and 53' in str(error)
 
 
 def test_a_rest_gap_beyond_the_calibration_is_refused(refusal):
