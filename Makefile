@@ -7,6 +7,8 @@ PACKAGES := mount_models mount_ros mount_driver mount_init mount_control mount_s
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 DRIVE_OPTIONS ?=
+# A real drive, not part of this repository: docs/recorded_drive.md is written anew only where it is there.
+RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 
 .DEFAULT_GOAL := help
 .PHONY: help drive test experiments bench lint format setup setup-dev clean
@@ -23,6 +25,10 @@ test: $(VENV)/.ready-dev ## pass all tests
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/experiments.md and docs/figures
 	@$(BIN)/engine-mount experiment all --page docs/experiments.md
+ifneq ($(RECORDED_DRIVE),)
+	@$(BIN)/engine-mount experiment recorded_drive --set recorded_drive.file=$(RECORDED_DRIVE) \
+		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/recorded_drive.md
+endif
 
 bench: $(VENV)/.ready-dev ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench
