@@ -31,7 +31,7 @@ FRICTION, HYDRO, ELASTOMER = 'friction mount', 'hydromount', 'elastomer alone'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', ELASTOMER: 'elastomer'}
 BANDS = ((1.0, 5.0), (5.0, 12.0), (12.0, 30.0))
 """Hz, chosen: the car's body, the engine on its mounts, above."""
-_SEGMENT = 4.096  # s, chosen: a spectrum with lines 0.24 Hz apart, and some 28 segments in a minute
+_SEGMENT = 4.096  # s, chosen: a spectrum with lines 0.24 Hz apart, and many segments in a minute
 _SHORTEST = 3.0 * _SEGMENT
 _FILTER_ORDER = 4  # chosen, of the band-pass that goes forth and back
 _EVEN = 0.02  # chosen: two rms count as even within so much of each other
@@ -107,10 +107,14 @@ def spectra_of(ridden: Ride) -> Spectra:
 
 
 def rms_in_bands(values: FloatArray) -> list[float]:
-    """Return the rms of what `values` (n,) at 1 kHz hold in each of `BANDS`, in their unit: of the spectrum."""
-    frequency, density = _density(values)
+    """Return the rms of what `values` (n,) at 1 kHz hold in each of `BANDS`, in their unit.
+
+    From one spectrum of all of it: every moment counts the same, as it does not with windows.
+    """
+    amplitude = np.abs(np.fft.rfft(values)) / len(values)
+    frequency = np.fft.rfftfreq(len(values), SAMPLE_TIME)
     inside = [(frequency >= low) & (frequency < high) for low, high in BANDS]
-    return [float(np.sqrt(frequency[1] * np.sum(density[band]))) for band in inside]
+    return [float(np.sqrt(2.0 * np.sum(amplitude[band] ** 2))) for band in inside]
 
 
 def rms_in_bands_within(values: FloatArray, within: BoolArray) -> list[float] | None:
@@ -146,7 +150,7 @@ def _density(values: FloatArray) -> tuple[FloatArray, FloatArray]:
             f'the recorded drive lasts {len(values) * SAMPLE_TIME:.1f} s; a spectrum needs at least '
             f'{_SHORTEST:.1f} s: give a longer one'
         )
-    frequency, density = welch(values, 1.0 / SAMPLE_TIME, 'hann', count)
+    frequency, density = welch(values, 1.0 / SAMPLE_TIME, 'hann', count, 3 * count // 4)  # evenly weighted
     return frequency, density
 
 

@@ -125,10 +125,9 @@ def _bands(figures: dict[str, Any], what: str, name: str, unit: str, scale: floa
 def _parts(figures: dict[str, Any]) -> str:
     return (
         f'Moments of damping are those with the friction damper on, and {figures["events_margin_s"]:.3f} s '
-        f'before and behind: {100.0 * figures["events_share"]:.1f} % of the drive, for all mounts the same. In '
-        'the rest the friction mount is the elastomer alone, and only swings out differently. Whole: from the '
-        'spectra. Both parts: by a band-pass, which takes half the amplitude at the edges of a band, so they do '
-        'not add up to the whole.\n'
+        f'before and behind: {100.0 * figures["events_share"]:.1f} % of the drive, the same ones for all '
+        'mounts. In the rest the friction mount is the elastomer alone. The whole is from its spectrum, the '
+        'parts are by a band-pass that halves the amplitude at the edges of a band; so they do not add up.\n'
     )
 
 
