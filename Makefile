@@ -9,6 +9,8 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 DRIVE_OPTIONS ?=
 RACK := build/rack
 SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
+# A real drive, not part of this repository: docs/recorded_drive.md is written anew only where it is there.
+RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 
 .DEFAULT_GOAL := help
 .PHONY: help drive test experiments identify bench lint format setup setup-dev clean
@@ -25,6 +27,10 @@ test: $(VENV)/.ready-dev ## pass all tests
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/experiments.md and docs/figures
 	@$(BIN)/engine-mount experiment all --page docs/experiments.md
+ifneq ($(RECORDED_DRIVE),)
+	@$(BIN)/engine-mount experiment recorded_drive --set recorded_drive.file=$(RECORDED_DRIVE) \
+		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/recorded_drive.md
+endif
 
 identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes the specimen that is shipped
 	@$(BIN)/engine-mount calibrate rack --out $(RACK) --noise 0 --celsius 20 --celsius 80

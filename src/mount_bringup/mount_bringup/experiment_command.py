@@ -55,7 +55,9 @@ def experiment(
     console = Console()
     if show:
         for known in EXPERIMENTS.values():
-            console.print(f'{known.name:22}{known.reference:15}{known.title}', highlight=False)
+            console.print(
+                f'{known.name:22}{known.reference:15}{known.title}', highlight=False, soft_wrap=True
+            )
         return
     if not names:
         raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')

@@ -64,7 +64,7 @@ def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats():
     for name, experiment in EXPERIMENTS.items():
         assert experiment.name == name
         assert experiment.title
-        assert experiment.reference.startswith('Fig')
+        assert experiment.reference.startswith('Sec' if experiment.needs else 'Fig')
         assert list(experiment.known_settings()) == [name]
 
 

@@ -1,6 +1,8 @@
 """Rack, sweep, gap and their sensitivity on short versions, and the values that the laws lead to."""
 
 import json
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +13,7 @@ from mount_bringup.experiments import bench, motorway_gap, page, sensitivity, sw
 from mount_bringup.experiments.contract import Experiment, ExperimentError, Holds, Order, Outcome
 from mount_bringup.experiments.registry import EXPERIMENTS
 from mount_bringup.experiments.sensitivity_grid import Job, run_all, run_job
-from mount_models.damper import DamperError
+from mount_models.damper import DamperError, damper_curve
 from mount_models.quantity import ParameterError
 
 PNG = b'\x89PNG'
@@ -96,6 +98,19 @@ def test_friction_has_the_harmonics_that_the_dead_zone_asks_for(rack, damper):
     found = np.array(rack.figures['runs'][damper]['friction_harmonics_n'])[[2, 4, 6]]
     # the light pressure of 2 N fills the dead zone a little, the fitted force law bends the rest
     assert found == pytest.approx(exact, rel=0.1)
+
+
+def test_the_page_on_differences_tells_the_harmonics_of_the_law_and_of_this_rack(rack):
+    page = Path(__file__).parents[3] / 'docs' / 'differences.md'
+    rows = re.findall(r'^\| (\d000) \| ([357]) \| ([\d.]+) \| ([\d.]+) \|', page.read_text(), re.MULTILINE)
+    assert len(rows) == 12
+    velocity = 2 * np.pi * 8e-3 * np.cos(2 * np.pi * np.arange(20000) / 20000)
+    for damping, order, told_law, told_here in rows:
+        law = damper_curve(f'viscous_{damping}').force(velocity)
+        exact = np.abs(np.fft.rfft(law))[int(order)] / 10000
+        assert float(told_law) == pytest.approx(exact, abs=0.001)
+        here = rack.figures['runs'][f'viscous_{damping}']['friction_harmonics_n'][int(order) - 1]
+        assert float(told_here) == pytest.approx(here, abs=0.01)
 
 
 def test_odd_harmonics_lie_below_those_of_the_hydromount_up_to_3000(rack):
@@ -301,7 +316,7 @@ def test_a_claim_holds_where_it_came_out_in_all_combinations(share, holds):
 
 def test_closed_loop_experiments_take_the_nodes_parameters_and_the_graph():
     closed = {name for name, each in EXPERIMENTS.items() if each.closed_loop}
-    assert closed == {'bench', 'sweep', 'motorway_gap'}
+    assert closed == {'bench', 'sweep', 'motorway_gap', 'recorded_drive'}
 
 
 def test_an_experiments_own_page_goes_beside_the_page(tmp_path):

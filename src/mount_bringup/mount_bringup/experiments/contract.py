@@ -73,6 +73,7 @@ class Experiment:
 
     `reference` is what it repeats of the paper, `summary` one paragraph on how. `closed_loop`: it drives
     through controller and plant, so parameters of the nodes can be set too and `--graph` makes sense.
+    `needs`: the parameter that only the user can give; such an experiment is not among `all`.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Experiment:
     defaults: NamedTuple
     run: Callable[[Order, Progress], Outcome]
     closed_loop: bool = False
+    needs: str = ''
 
     def known_settings(self) -> dict[str, dict[str, Any]]:
         """Return {name: {parameter: default}} of the experiment's own parameters."""

@@ -40,10 +40,14 @@ def print_outcome(experiment: Experiment, outcome: Outcome, console: Console) ->
 def write_page(outcomes: Sequence[tuple[Experiment, Outcome]], file: Path) -> None:
     """Write the page to `file` (Markdown) and copy all pictures into the folder `figures` beside it.
 
-    The experiments' own pages go beside it too.
+    The experiments' own pages go beside it too. A single one that runs on what the user gave has nothing to
+    do in a page about the paper: its own page becomes `file`.
     """
     folder = file.parent / _FIGURES
     folder.mkdir(parents=True, exist_ok=True)
+    if len(outcomes) == 1 and outcomes[0][0].needs:
+        _write_own_page(outcomes[0][1], file, folder)
+        return
     parts = [_HEAD, _overview(outcomes)]
     for experiment, outcome in outcomes:
         for picture in outcome.pictures:
@@ -52,6 +56,13 @@ def write_page(outcomes: Sequence[tuple[Experiment, Outcome]], file: Path) -> No
             shutil.copyfile(page, file.parent / page.name)
         parts.append(_section(experiment, outcome))
     file.write_text('\n'.join(parts), encoding='utf-8')
+
+
+def _write_own_page(outcome: Outcome, file: Path, folder: Path) -> None:
+    for picture in outcome.pictures:
+        shutil.copyfile(picture, folder / picture.name)
+    (page,) = outcome.pages
+    shutil.copyfile(page, file)
 
 
 def _overview(outcomes: Sequence[tuple[Experiment, Outcome]]) -> str:

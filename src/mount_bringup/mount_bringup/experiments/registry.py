@@ -7,6 +7,7 @@ from mount_bringup.experiments import (
     inductance_map,
     motorway_gap,
     ramp_and_hold,
+    recorded_drive,
     sawtooth,
     sensitivity,
     sweep,
@@ -27,17 +28,20 @@ EXPERIMENTS: dict[str, Experiment] = {
         sweep.EXPERIMENT,
         motorway_gap.EXPERIMENT,
         sensitivity.EXPERIMENT,
+        recorded_drive.EXPERIMENT,
     )
 }
 
 
 def experiments_named(names: list[str]) -> list[Experiment]:
-    """Return the experiments of these names, or all for `all`; raises `ExperimentError` for an unknown "
-    "one."""
-    if ALL in names:
-        return list(EXPERIMENTS.values())
-    unknown = [name for name in names if name not in EXPERIMENTS]
+    """Return the experiments of these names; raises `ExperimentError` for an unknown one.
+
+    `all` stands for every one that needs nothing of the user's own.
+    """
+    unknown = [name for name in names if name not in (*EXPERIMENTS, ALL)]
     if unknown:
         known = ', '.join((*EXPERIMENTS, ALL))
         raise ExperimentError(f'{unknown[0]!r} is no experiment; known are {known}')
-    return [EXPERIMENTS[name] for name in names]
+    if ALL not in names:
+        return [EXPERIMENTS[name] for name in names]
+    return [each for each in EXPERIMENTS.values() if not each.needs or each.name in names]

@@ -34,7 +34,7 @@ _LIMITS = """## Limits
   `engine-mount drive --core --scenario sweep --mount hydro --set mount_sim.sweep.velocity_amplitude=0.06
   --set mount_sim.hydromount.decoupler_resistance=2e7`.
 - A sweep passes each frequency once. What a mount does on a real road in a mixture of all of them, this page
-  does not tell.
+  does not tell; a minute of one is in [recorded_drive.md](recorded_drive.md).
 """
 
 

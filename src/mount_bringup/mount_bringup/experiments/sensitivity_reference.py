@@ -58,7 +58,8 @@ def agreement(maps: Maps) -> str:
     lines = [
         'Another program, written for this project from the same equations, gave the figures below, the '
         'displacements with a viscous damper of 2500 N s/m; so here, for this comparison, with that one too. '
-        f'{agreed} of {len(rows)} agree within {100 * NEAR:.0f} % (counts: exactly).\n',
+        f'{agreed} of {len(rows)} agree within {100 * NEAR:.0f} % (counts: exactly). Where other figures of '
+        'it differ, on rack and gap, and which of the two is wrong: [differences.md](differences.md).\n',
         '| figure | there | here | agrees |',
         '|---|---|---|---|',
     ]
