@@ -176,8 +176,8 @@ def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
     core = Controller(
         ControlParameters(),
         damper_curve('viscous_2000'),
-        FrictionCoefficients(),
-        FrictionContact(),
+        identified(default_specimen(), FrictionCoefficients(), {}, 'friction'),
+        identified(default_specimen(), FrictionContact(), {}, 'contact'),
         resample(*table_rows, 3.0),
     )
     core.restart(displacement[0])
@@ -398,7 +398,7 @@ def test_the_friction_of_a_specimen_is_in_the_parameters_that_the_session_will_t
     assert control.trigger_cleanup() == SUCCESS
     control.set_parameters([Parameter('parameters_file', value='')])
     assert control.trigger_configure() == SUCCESS
-    assert control._friction == FrictionCoefficients()
+    assert control._friction == identified(default_specimen(), FrictionCoefficients(), settings, 'friction')
 
 
 def test_silence_is_told_in_real_time(active, around):

@@ -195,7 +195,7 @@ def test_activation_measures_in_lock_step_and_latches_gaps_and_table(
     assert (table.current == core.table[0]).all()
     assert (table.normal_force == core.table[1]).all()
     verdict = g.init.judge()
-    assert verdict.sentence.startswith('rest gap 507.5 um, contact gap 349.0 um')
+    assert verdict.sentence.startswith('rest gap 507.4 um, contact gap 349.0 um')
     assert verdict.figures['last_stamp'] == stamp
 
 
