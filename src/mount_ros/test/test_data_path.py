@@ -218,27 +218,52 @@ def test_attended_work_is_done_between_messages_and_without_any(pair):
     assert set(doing) == {'data'}
 
 
-def test_work_that_has_something_to_do_is_done_again_before_the_next_message(make_end):
-    end, order = make_end('busy'), []
-    publish = end.path.sender(DISPLACEMENT)
-    end.path.subscribe(DISPLACEMENT, lambda raw: order.append('message'))
-    end.path.start()
-    wait_until(lambda: not end.path.unmatched(), 'connection')
-    left = 5
+def test_work_that_is_never_done_keeps_no_message_waiting(pair):
+    receiver, send = pair
+    receiver.path.attend(lambda: True)
+    for stamp in range(20):
+        send(stamp)
+        wait_until(lambda stamp=stamp: receiver.stamps[-1:] == [stamp], 'arrival')
+    assert receiver.stamps == list(range(20))
+    assert receiver.threads == {'data'}
+
+
+def test_no_message_is_lost_or_doubled_where_work_begins_and_ends(pair):
+    receiver, send = pair
+    for stamp in range(0, 40, 4):
+        send(stamp)
+        receiver.path.attend(lambda: False)
+        send(stamp + 1)
+        send(stamp + 2)
+        receiver.path.leave_work()
+        send(stamp + 3)
+        wait_until(lambda stamp=stamp: receiver.stamps[-1:] == [stamp + 3], 'arrival')
+    assert receiver.stamps == list(range(40))
+
+
+def test_a_sample_passes_through_the_chain_in_one_round(context, make_end):
+    """Who listens was there before who speaks: the source is asked first, then the middle, then the end."""
+    thread = DataThread(context)
+    end, middle, source = make_end('end', thread), make_end('middle', thread), make_end('source', thread)
+    rounds, arrived = [], []
+    pass_on = middle.path.sender(CURRENT_SETPOINT)
+    publish = source.path.sender(DISPLACEMENT)
+    end.path.subscribe(CURRENT_SETPOINT, lambda raw: arrived.append(len(rounds)))
+    middle.path.subscribe(DISPLACEMENT, lambda raw: pass_on(raw))
+    for one in (end, middle, source):
+        one.path.start()
+    wait_until(lambda: not any(one.path.unmatched() for one in (end, middle, source)), 'connection')
 
     def work():
-        nonlocal left
-        if not left:
-            return False
-        if left == 5:
-            publish(end.layout.pack(1, (0.0,)))
-        left -= 1
-        order.append('work')
-        return True
+        rounds.append(None)
+        if len(rounds) == 3:
+            publish(source.layout.pack(1, (0.0,)))
+        return False
 
-    end.path.attend(work)
-    wait_until(lambda: 'message' in order, 'the message')
-    assert order == ['work'] * 5 + ['message']
+    source.path.attend(work)
+    wait_until(lambda: arrived, 'arrival')
+    source.path.leave_work()
+    assert arrived == [3]
 
 
 def test_work_that_raises_ends_neither_the_thread_nor_the_service(pair, capfd):
