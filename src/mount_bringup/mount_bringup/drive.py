@@ -23,7 +23,7 @@ from mount_bringup.core_recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.ending_signals import ending_signals
 from mount_bringup.evaluation import load_drive
-from mount_bringup.graph import LOCKSTEP_TOGETHER, RECORDER, SIM, SIMULATED, URGENT, GraphSettings
+from mount_bringup.graph import RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.preflight import preflight
 from mount_bringup.run_folder import RunFolder, make_run_folder
@@ -55,6 +55,7 @@ class DriveOrder:
     namespace: str = ''
     out: Path | None = None
     priority: int = 0
+    apart: bool = False  # in lock-step too every node has a process of its own
 
 
 @dataclass
@@ -151,9 +152,8 @@ def _drive_graph(
         namespace=order.namespace,
         domain=order.domain,
         parameters=_node_parameters(order, folder),
-        together=LOCKSTEP_TOGETHER if lockstep else (),
-        urgent=() if lockstep else URGENT,
-        priority=order.priority,
+        together=_together(order),
+        priority=0 if lockstep else order.priority,
     )
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
     with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
@@ -233,8 +233,7 @@ def progress_bar(console: Console) -> Progress:
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
     lockstep = order.mode == 'lock-step'
-    # In lock-step both ends of the bus live in one process.
-    can = {'interface': 'virtual' if lockstep else 'udp_multicast', 'port': _port(order)}
+    can = {'interface': 'virtual' if _together(order) else 'udp_multicast', 'port': _port(order)}
     added: dict[str, dict[str, Any]] = {
         'mount_recorder': {'uri': str(folder.recording)},
         'mount_driver': can,
@@ -247,6 +246,10 @@ def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str
         name: {'lockstep': lockstep, **values, **order.parameters.get(name, {})}
         for name, values in added.items()
     }
+
+
+def _together(order: DriveOrder) -> bool:
+    return order.mode == 'lock-step' and not order.apart
 
 
 def _port(order: DriveOrder) -> int:

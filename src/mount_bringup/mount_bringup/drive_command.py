@@ -43,6 +43,10 @@ def drive(
     lockstep: Annotated[
         bool, typer.Option('--lockstep', help='the electronics wait for each answer: deterministic, faster')
     ] = False,
+    apart: Annotated[
+        bool,
+        typer.Option('--apart', help='lock-step: each node in its own process, as in the car; slower'),
+    ] = False,
     core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
     duration: Annotated[
         float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
@@ -76,6 +80,8 @@ def drive(
 
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
+    if apart and not lockstep:
+        raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
     try:
         parameters = settings_of_options(settings or [])
     except ValueError as error:
@@ -103,7 +109,7 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority)
+    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart)
     console = Console()
     outcome = driving.drive(order, console)
     if json_file is not None:

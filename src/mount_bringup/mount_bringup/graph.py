@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 class GraphNode:
     """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without.
 
-    A node that refuses to be activated is asked `activations` times.
+    A node that refuses to be activated is asked `activations` times; those at which the machine was too late
+    for the 1 kHz loop do not count.
     """
 
     name: str
@@ -31,7 +32,7 @@ INIT = GraphNode(
     'mount_init',
     'MountInit',
     ('coil_ripple', 'coil_temperature', 'current_setpoint'),
-    activations=3,  # chosen: the machine may be too busy for one ramp
+    activations=2,  # chosen
 )
 CONTROL = GraphNode(
     'mount_control',
@@ -47,25 +48,18 @@ VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""
 
 
-URGENT: tuple[GraphNode, ...] = (DRIVER, SIM, INIT, CONTROL)
-"""The nodes of the 1 kHz loop."""
-
-LOCKSTEP_TOGETHER: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
-"""The nodes that share a process and its data thread in lock-step: while one of them works the others wait
-for it anyway, and handing over to another thread or process costs more than the work."""
-
-
 @dataclass(frozen=True)
 class GraphSettings:
     """Where the graph lives and with which parameters: {node: {parameter: value}}.
 
-    Nodes named in `together` share one process, all others have one of their own. The processes of the
-    `urgent` nodes run at the real-time `priority` (SCHED_FIFO; 0: off) where the system permits it.
+    The nodes live `together` in one process with one data thread, or each in a process of its own. While one
+    of them works in lock-step the others wait for it anyway, and handing over to another thread or process
+    costs more than the work. Where the system permits it the processes run at the real-time `priority`
+    (SCHED_FIFO; 0: off), the recorder's behind those of the 1 kHz loop.
     """
 
     namespace: str = ''
     domain: int = 0
     parameters: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    together: tuple[GraphNode, ...] = ()
-    urgent: tuple[GraphNode, ...] = ()
+    together: bool = False
     priority: int = 0

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import yaml
 
-from mount_bringup.graph import GraphNode, GraphSettings
+from mount_bringup.graph import RECORDER, GraphNode, GraphSettings
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 _INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that was asked to end is terminated
 _TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
-_RECORDER_NICENESS = -10  # chosen: behind the loop, before the rest of the machine; what it misses is gone
+_RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for what it misses is gone
 
 
 class NodeProcess:
@@ -49,9 +49,9 @@ class NodeProcess:
     def _scheduling(self, settings: GraphSettings) -> Callable[[], None]:
         if not settings.priority:
             return lambda: None
-        if any(node in settings.urgent for node in self.nodes):
-            return partial(os.sched_setscheduler, 0, os.SCHED_FIFO, os.sched_param(settings.priority))
-        return partial(os.setpriority, os.PRIO_PROCESS, 0, _RECORDER_NICENESS)
+        share = _RECORDER_SHARE if RECORDER in self.nodes else 1.0
+        priority = max(1, round(share * settings.priority))
+        return partial(os.sched_setscheduler, 0, os.SCHED_FIFO, os.sched_param(priority))
 
     @property
     def exit_code(self) -> int | None:
@@ -96,16 +96,8 @@ def end_all(processes: list[NodeProcess]) -> list[str]:
 
 
 def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> list[NodeProcess]:
-    """Start the processes of `nodes` in order; a shared one starts where its first node stands."""
-    groups: list[list[GraphNode]] = []
-    shared: list[GraphNode] = []
-    for node in nodes:
-        if node not in settings.together:
-            groups.append([node])
-            continue
-        if not shared:
-            groups.append(shared)
-        shared.append(node)
+    """Start the processes of `nodes` in order."""
+    groups = [nodes] if settings.together else [[node] for node in nodes]
     return [NodeProcess(group, settings, folder) for group in groups]
 
 
