@@ -69,9 +69,9 @@ def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switchin
 
 
 @pytest.mark.real_time
-def test_real_time_drive_records_every_sample_and_damps_the_gap(command, tmp_path):
+def test_real_time_drive_records_every_sample_and_damps_the_gap(drive_in_time, tmp_path):
     figures_file = tmp_path / 'figures.json'
-    result = command.drive(
+    result = drive_in_time(
         '--duration', '3', '--set', 'mount_sim.motorway.gap_time=1.0',
         '--set', 'mount_sim.motorway.gap_depth=0.03', '--json', str(figures_file),
     )  # fmt: skip

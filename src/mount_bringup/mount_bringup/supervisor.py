@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import rclpy
@@ -18,15 +19,18 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph import CONTROL, DRIVER, RECORDER, GraphNode, GraphSettings
+from mount_bringup.graph import CONTROL, DRIVER, RECORDER, SIM, GraphNode, GraphSettings
 from mount_bringup.processes import NodeProcess, end_all, start_processes
 from mount_ros.diagnostics import Level
 from mount_ros.leaving import leave_middleware
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, SESSION
+from mount_sim.diagnosis import LATE_SHARE
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
+_FRESH_DIAGNOSTICS = 1.5  # s, chosen: every node tells its figures once a second
+_LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
 _TRANSITION_LIMIT = 60.0  # s, chosen: activation of mount_init includes its current ramp
 
 
@@ -36,6 +40,20 @@ class GraphError(RuntimeError):
 
 class Interrupted(Exception):  # noqa: N818 - no error: the user wants to end
     """The user asked to end."""
+
+
+@dataclass(frozen=True)
+class _Pace:
+    """How the 1 kHz loop kept its time so far, as driver and simulator tell it."""
+
+    timeouts: int
+    samples: int
+    overruns: int
+
+    def was_late_since(self, earlier: '_Pace') -> bool:
+        """Whether setpoints stopped, or more samples were late than the simulator puts up with."""
+        overruns, samples = self.overruns - earlier.overruns, self.samples - earlier.samples
+        return self.timeouts > earlier.timeouts or overruns > LATE_SHARE * samples
 
 
 class Supervisor:
@@ -84,16 +102,37 @@ class Supervisor:
             self._activate(node, say)
 
     def _activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
-        """Activate a node; one that refuses is asked as often as the graph declares."""
-        for _ in range(node.activations - 1):
+        """Activate a node; one that refuses is asked as often as the graph declares.
+
+        If the machine was late, the refusal tells nothing of the mount: it is asked again for a minute.
+        """
+        begin, asked = time.monotonic(), 0
+        while True:
+            before = self._pace()
             try:
                 self.transition(node, Transition.TRANSITION_ACTIVATE)
-            except GraphError as error:
-                self.notes.append(f'{error}; it was activated again')
-                say(f'activating {node.name} again')
-            else:
                 return
-        self.transition(node, Transition.TRANSITION_ACTIVATE)
+            except GraphError as error:
+                self._serve_for(_FRESH_DIAGNOSTICS)
+                was_late = self._pace().was_late_since(before)
+                asked += not was_late
+                if asked >= node.activations or time.monotonic() - begin > _LATE_PATIENCE:
+                    raise
+                reason = ' (this machine was too late for 1 kHz)' if was_late else ''
+                self.notes.append(f'{error}{reason}; it was activated again')
+                say(f'activating {node.name} again{reason}')
+
+    def _pace(self) -> '_Pace':
+        driver, sim = self.figures(DRIVER), self.figures(SIM)
+        return _Pace(
+            timeouts=int(driver.get('setpoint_timeouts', 0)),
+            samples=int(sim.get('samples', 0)),
+            overruns=int(sim.get('overruns', 0)),
+        )
+
+    def _serve_for(self, duration: float) -> None:
+        end = time.monotonic() + duration
+        self.wait_until(lambda: time.monotonic() >= end, duration + 1.0, 'a pause')
 
     def figures(self, node: GraphNode) -> dict[str, str]:
         """Return the last diagnostics of a node: its figures, `level` and `sentence`; empty if none came."""

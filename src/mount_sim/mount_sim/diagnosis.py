@@ -6,6 +6,7 @@ from mount_sim.loop import LoopFigures
 from mount_sim.simulated_mount import Run
 
 DRIVING, FINISHED = 'driving', 'finished'
+LATE_SHARE = 0.05  # chosen: of the samples; beyond it the machine is too busy for real time
 
 
 def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
@@ -29,11 +30,11 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
         return Verdict(Level.ERROR, figures.failure, values)
     if samples >= run.samples:
         return Verdict(Level.OK, FINISHED, values)
-    if not lockstep and figures.overruns > 0.05 * max(samples, 1000):
+    if not lockstep and figures.overruns > LATE_SHARE * max(samples, 1000):
         return Verdict(
             Level.WARN,
-            f'{figures.overruns} of {samples} samples were late (limit 5 %): this machine is too '
-            'busy for real time; close other programs, or use lock-step',
+            f'{figures.overruns} of {samples} samples were late (limit {100 * LATE_SHARE:g} %): this machine '
+            'is too busy for real time; close other programs, or use lock-step',
             values,
         )
     return Verdict(Level.OK, DRIVING, values)
