@@ -3,9 +3,11 @@
 import json
 
 import numpy as np
+import pytest
 
 import mount_bags
 from mount_bags.session_differences import session_text
+from mount_bringup.command import main
 
 
 def _setpoints(run):
@@ -15,19 +17,26 @@ def _setpoints(run):
 
 
 def test_an_experiment_through_the_nodes_gives_the_setpoints_and_figures_of_the_core(command):
+    core, lockstep = command.folder / 'core', command.folder / 'lock-step'
+    with pytest.raises(SystemExit) as ending:  # the core starts no process, so it needs none of its own
+        main(_order(core))
+    assert ending.value.code == 0
+    process = command.start(*_order(lockstep), '--graph')
+    output, _ = process.communicate(timeout=240.0)
+    assert process.returncode == 0, output
     found = {}
-    for mode, options in (('core', ()), ('lock-step', ('--graph',))):
-        out, figures = command.folder / mode, command.folder / f'{mode}.json'
-        process = command.start(
-            'experiment', 'motorway_gap', '--out', str(out), '--json', str(figures), *options,
-            '--set', 'motorway_gap.duration=2.5', '--set', 'motorway_gap.gap_time=0.5',
-            '--set', 'motorway_gap.compared_depths=0.02,', '--set', 'mount_sim.timeline.start=2.9',
-        )  # fmt: skip
-        output, _ = process.communicate(timeout=240.0)
-        assert process.returncode == 0, output
-        found[mode] = json.loads(figures.read_text())
-        assert found[mode].pop('mode') == mode
-        assert f'mode: {mode}' in session_text(mount_bags.open(out / '20mm_friction' / 'recording'))
-    assert found['core'] == found['lock-step']
+    for out in (core, lockstep):
+        found[out] = json.loads(out.with_suffix('.json').read_text())
+        assert found[out].pop('mode') == out.name
+        assert f'mode: {out.name}' in session_text(mount_bags.open(out / '20mm_friction' / 'recording'))
+    assert found[core] == found[lockstep]
     for run in ('20mm_friction', '20mm_hydromount', '20mm_friction_0A'):
-        assert _setpoints(command.folder / 'core' / run) == _setpoints(command.folder / 'lock-step' / run)
+        assert _setpoints(core / run) == _setpoints(lockstep / run)
+
+
+def _order(out):
+    return [
+        'experiment', 'motorway_gap', '--out', str(out), '--json', str(out.with_suffix('.json')),
+        '--set', 'motorway_gap.duration=2.5', '--set', 'motorway_gap.gap_time=0.5',
+        '--set', 'motorway_gap.compared_depths=0.02,', '--set', 'mount_sim.timeline.start=2.9',
+    ]  # fmt: skip

@@ -90,7 +90,8 @@ def test_a_folder_in_use_is_refused(capsys, tmp_path):
 
 
 def test_a_can_interface_that_does_not_open_is_refused(command):
-    result = command.drive('--duration', '1', '--set', 'mount_driver.interface=socketcan')
+    # one process in lock-step, five in real time: the node, its refusal and who tells it are the same
+    result = command.drive('--lockstep', '--duration', '1', '--set', 'mount_driver.interface=socketcan')
     assert result.code == 1
     _expect_words(result.output, "CAN interface 'socketcan'", 'does not open', 'ip link set')
 

@@ -47,7 +47,7 @@ def swept(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def gaps(tmp_path_factory):
-    return run(motorway_gap, tmp_path_factory.mktemp('gap'), duration=4.0)
+    return run(motorway_gap, tmp_path_factory.mktemp('gap'), duration=2.5, gap_time=0.5)
 
 
 # Rack.
@@ -143,7 +143,8 @@ def test_what_the_experiment_sets_itself_cannot_be_set_on_a_node(tmp_path):
         run(bench, tmp_path, {'mount_sim': {'mount': 'hydro'}})
 
 
-def test_other_parameters_of_nodes_reach_the_run(tmp_path):
+def test_other_parameters_of_nodes_reach_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench, 'FAMILY', ('viscous_2000',))  # one characteristic tells it
     loose = {'mount_sim': {'friction.scale': 0.5}}
     outcome = run(bench, tmp_path, loose, settling=0.5, periods=4)
     assert outcome.figures['runs']['viscous_2000']['loss_stiffness_n_per_m'] < 70e3

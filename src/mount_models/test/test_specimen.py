@@ -1,6 +1,7 @@
 """The specimen file: nothing is lost, nothing is guessed, and no truth of the plant comes near it."""
 
 import ast
+import copy
 import math
 from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
@@ -22,11 +23,12 @@ from mount_models.specimen import (
 )
 
 DEFAULT = default_specimen()
+CONTENT = yaml.safe_load(DEFAULT_SPECIMEN.read_text())
 
 
 def changed(path, value):
     """Return the default specimen as a mapping, the entry at dotted `path` changed, or dropped for None."""
-    content = yaml.safe_load(DEFAULT_SPECIMEN.read_text())
+    content = copy.deepcopy(CONTENT)
     *outer, last = path.split('.')
     inside = content
     for name in outer:

@@ -1,5 +1,6 @@
 """Fit the force law (Eqs 3, 4) to measured forces, as the authors did for Table 1."""
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -205,8 +206,20 @@ def _law_from(
 
 def _plain(mapped: FloatArray, domain: tuple[float, float], order: int) -> tuple[float, ...]:
     """Return coefficients in powers of the gap in micrometres from those in the mapped gap."""
-    plain = Polynomial(mapped, domain=domain, window=(-1.0, 1.0)).convert(kind=Polynomial).coef
-    return tuple(float(value) for value in np.pad(plain, (0, order - plain.size)))
+    return tuple((_unmapping(domain, order) @ mapped).tolist())
+
+
+@functools.lru_cache(maxsize=32)
+def _unmapping(domain: tuple[float, float], order: int) -> FloatArray:
+    """Return the matrix from coefficients in the mapped gap to those in the gap, shape (order, order).
+
+    It is the same at each step of a search, and to derive it takes longer than all else in the step.
+    """
+    columns = []
+    for unit in np.eye(order):
+        plain = Polynomial(unit, domain=domain, window=(-1.0, 1.0)).convert(kind=Polynomial).coef
+        columns.append(np.pad(plain, (0, order - plain.size)))
+    return np.stack(columns, axis=1)
 
 
 def _judged(

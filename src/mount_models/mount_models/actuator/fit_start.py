@@ -43,6 +43,8 @@ def starts(
 _KNEES = (0.3, 0.45, 0.6, 0.8)  # chosen: current of the knee over the largest one, at the mean gap
 _LEANS = (0.1, 0.3)  # chosen: the knee moves to higher currents with the gap
 _SHARPNESSES = (4.0, 9.0, 18.0)  # chosen: a3 times the largest current
+_GRID_KNEES = np.linspace(0.2, 0.9, 15)  # chosen, of each gap alone: a fine grid
+_GRID_SHARPNESSES = np.array([3.0, 5.0, 8.0, 12.0, 18.0])
 _TRIED = 3
 _RIDGE = 1e-9
 
@@ -66,7 +68,7 @@ def _completed(
     ]
     solution, misfit = _solved(np.concatenate(columns, axis=1), force / tolerance)
     a1, a2, a5 = np.split(solution, np.cumsum([orders[0], orders[1]]))
-    return misfit, np.concatenate([a1, a2, sharp, at, a5])
+    return float(misfit), np.concatenate([a1, a2, sharp, at, a5])
 
 
 def _gap_by_gap(
@@ -74,18 +76,18 @@ def _gap_by_gap(
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return polynomials a3 and a4 through the best knee of each gap on a grid, or None for too few gaps."""
     highest = float(current.max())
+    grid = np.array(list(itertools.product(_GRID_KNEES, _GRID_SHARPNESSES)))
+    grid = grid * (highest, 1.0 / highest)
     places, knees, sharpnesses = [], [], []
     for group in gap_groups(mapped_gap):
-        trials = []
-        for knee, sharpness in itertools.product(np.linspace(0.2, 0.9, 15), (3.0, 5.0, 8.0, 12.0, 18.0)):
-            lines, parabolas = _shapes(current[group], sharpness / highest, knee * highest)
-            columns = np.stack([lines, lines * current[group], parabolas], axis=1)
-            misfit = _solved(columns / tolerance[group, np.newaxis], force[group] / tolerance[group])[1]
-            trials.append((misfit, knee * highest, sharpness / highest))
-        _, knee, sharpness = min(trials)
+        # all trials of a gap at once: to solve them one by one takes about as long as the search that follows
+        lines, parabolas = _shapes(current[group], grid[:, 1:], grid[:, :1])
+        columns = np.stack([lines, lines * current[group], parabolas], axis=2)
+        misfits = _solved(columns / tolerance[group, np.newaxis], force[group] / tolerance[group])[1]
+        knee, sharpness = grid[np.argmin(misfits)]
         places.append(float(mapped_gap[group].mean()))
-        knees.append(knee)
-        sharpnesses.append(sharpness)
+        knees.append(float(knee))
+        sharpnesses.append(float(sharpness))
     if len(places) < 3:
         return None
     return (
@@ -102,14 +104,19 @@ def _shapes(
     return low + bend, current**2 * (low - bend)
 
 
-def _solved(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
-    """Return a linear fit, slightly held back where columns are alike, and its sum of squares."""
-    scale = np.linalg.norm(columns, axis=0)
+def _solved(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return linear fits, slightly held back where columns are alike, and their sums of squares.
+
+    `columns` has shape (..., points, unknowns), `values` (points,).
+    """
+    scale = np.linalg.norm(columns, axis=-2)
     scale[scale == 0.0] = 1.0
-    scaled = columns / scale
-    normal = scaled.T @ scaled + _RIDGE * np.eye(scaled.shape[1])
-    solution = np.linalg.solve(normal, scaled.T @ values)
-    return solution / scale, float(np.sum((scaled @ solution - values) ** 2))
+    scaled = columns / scale[..., np.newaxis, :]
+    across = np.swapaxes(scaled, -1, -2)
+    normal = across @ scaled + _RIDGE * np.eye(scaled.shape[-1])
+    solution = np.linalg.solve(normal, (across @ values)[..., np.newaxis])
+    left = (scaled @ solution)[..., 0] - values
+    return solution[..., 0] / scale, np.asarray(np.sum(left**2, axis=-1))
 
 
 def _padded(values: list[float], order: int) -> FloatArray:
