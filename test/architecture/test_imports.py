@@ -1,6 +1,8 @@
 """The arrows between the packages point one way."""
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,6 +49,12 @@ def test_only_the_node_and_its_verdict_touch_ros(package: str):
 
 def test_models_know_no_ros():
     assert not [str(file) for file, name in _imports('mount_models') if name in ROS]
+
+
+def test_the_command_loads_what_it_needs_once_it_knows_what_is_wanted():
+    tell = 'import sys, mount_bringup.command; print(*sys.modules)'
+    loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
+    assert not {'numpy', 'scipy', 'numba', 'matplotlib', 'plotly', 'rclpy', 'mcap'} & set(loaded.split())
 
 
 def test_the_controller_never_sees_the_truth():

@@ -1,13 +1,14 @@
 """`engine-mount identify`: from recordings of a rack to parameters."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from mount_bringup.identify_friction import Identification, IdentifyOrder
+if TYPE_CHECKING:
+    from mount_bringup.identify_friction import Identification
 
 app = typer.Typer(
     name='identify',
@@ -76,7 +77,7 @@ def friction(
     from mount_bringup.calibrate_command import note_foreign
     from mount_bringup.calibrated_specimen import check_targets, foreign_parts, with_friction
     from mount_bringup.friction_files import parsed_channels
-    from mount_bringup.identify_friction import figures, identify
+    from mount_bringup.identify_friction import IdentifyOrder, figures, identify
     from mount_bringup.summary import write_json
     from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
 
@@ -179,7 +180,7 @@ def drift(
     )
 
 
-def _print(found: Identification, console: Console) -> None:
+def _print(found: 'Identification', console: Console) -> None:
     from mount_bringup.identify_friction import chosen_fit, figures
 
     for note in found.notes:
