@@ -1,11 +1,9 @@
 """Fig. 7: the sticking contact is pulled by a ramp and held; its relaxation gives the linear parameters."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from mount_bags.reading import open_recording
 from mount_bringup.experiments.contract import (
@@ -23,9 +21,12 @@ from mount_bringup.experiments.rack_recording import record_friction_rack
 from mount_bringup.experiments.sawtooth_evaluation import RackRecording, read_rack
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
+from mount_models.friction.identification.ramp_hold import contact_of_response, printed_formulas
+from mount_models.friction.identification.relaxation import Relaxation, fit_relaxation
 from mount_models.quantity import Quantity, flattened
 
 NAME = 'ramp_and_hold'
+_NAMES = {'contact_stiffness': 'c_Re', 'tangential_stiffness': 'c_R', 'tangential_damping': 'd_R'}
 
 
 class RampParameters(NamedTuple):
@@ -54,19 +55,6 @@ class RampParameters(NamedTuple):
     contact: FrictionContact = FrictionContact()
 
 
-@dataclass(frozen=True)
-class Relaxation:
-    """x(t) = asymptote - amplitude exp(-t/T), t from the start of the ramp."""
-
-    asymptote: float
-    amplitude: float
-    time_constant: float
-
-    def at(self, time: FloatArray) -> FloatArray:
-        """Return the displacement (m) at `time` (s)."""
-        return self.asymptote - self.amplitude * np.exp(-time / self.time_constant)
-
-
 def run(order: Order, progress: Progress) -> Outcome:
     """Pull the sticking pads, record it, and take the linear parameters from the recording."""
     parameters = parameters_of(order, NAME, RampParameters())
@@ -79,42 +67,6 @@ def run(order: Order, progress: Progress) -> Outcome:
     results = _figures(rack, time, relaxation, parameters)
     picture = _draw(rack, time, relaxation, results, parameters, order.out / 'ramp_and_hold.png')
     return Outcome(results, [picture], [recording], _statements(results, parameters))
-
-
-def fit_relaxation(time: FloatArray, displacement: FloatArray, fit_from: float) -> Relaxation:
-    """Return the relaxation that meets `displacement` (m) best from `fit_from` (s) on."""
-    shown = time >= fit_from
-    t, x = time[shown], displacement[shown]
-    scale = abs(x[-1])
-
-    def error(unknown: FloatArray) -> FloatArray:
-        return np.asarray(unknown[0] - unknown[1] * np.exp(-t / unknown[2]) - x / scale, np.float64)
-
-    found = least_squares(error, (1.0, 0.2, 0.2 * t[-1]), bounds=((-10, -10, 1e-3), (10, 10, 100))).x
-    return Relaxation(float(found[0]) * scale, float(found[1]) * scale, float(found[2]))
-
-
-def linear_parameters(
-    joint_stiffness: float, motor_stiffness: float, lead: float, time_constant: float
-) -> dict[str, float]:
-    """Return c_Re, c_R, d_R from c_xi = F/x at the end, p, T_v/T and T, Eq (11) in its right form (derived).
-
-    With p in series, x(t) = X p/(p + c_xi) [1 - (1 - T_v/T) exp(-t/T)] after a step, T_v = d_R/(c_Re + c_R),
-    T = d_R/(c_R + p c_Re/(p + c_Re)); `lead` is T_v/T.
-    """
-    c_re = (motor_stiffness + joint_stiffness) / lead - motor_stiffness
-    c_r = joint_stiffness * c_re / (c_re - joint_stiffness)
-    d_r = time_constant * (c_r + motor_stiffness * c_re / (motor_stiffness + c_re))
-    return {'contact_stiffness': c_re, 'tangential_stiffness': c_r, 'tangential_damping': d_r}
-
-
-def printed_parameters(
-    joint_stiffness: float, motor_stiffness: float, k: float, time_constant: float
-) -> dict[str, float]:
-    """Return c_Re, c_R, d_R as Eq (11) stands in print, with k the first force over the last."""
-    c_re = k * joint_stiffness * motor_stiffness / (motor_stiffness - k * joint_stiffness)
-    c_r = joint_stiffness * c_re / (c_re - joint_stiffness)
-    return {'contact_stiffness': c_re, 'tangential_stiffness': c_r, 'tangential_damping': c_r * time_constant}
 
 
 def _record(order: Order, parameters: RampParameters) -> Path:
@@ -152,10 +104,7 @@ def _figures(
         'parameters': _of_relaxation(relaxation, final_force, p, parameters.ramp_time),
         'parameters_without_ramp_correction': _of_relaxation(relaxation, final_force, p, 0.0),
         'parameters_fitted_from_end_of_ramp': _of_relaxation(whole, final_force, p, parameters.ramp_time),
-        # with p in series, the force over the wanted displacement: so read, the first formula is right
-        'parameters_as_printed': printed_parameters(
-            final_force / parameters.way, p, first_force / final_force, relaxation.time_constant
-        ),
+        'parameters_as_printed': _as_printed(relaxation, final_force, first_force, p, parameters.way),
     }
     true = {name: float(getattr(parameters.contact, name)) for name in readings['parameters']}
     errors = {
@@ -189,13 +138,24 @@ def _figures(
 def _of_relaxation(
     relaxation: Relaxation, final_force: float, motor_stiffness: float, ramp_time: float
 ) -> dict[str, float]:
-    """Return c_Re, c_R, d_R; a ramp leaves a larger amplitude than the step that Eq (10) is about."""
-    share = relaxation.amplitude / relaxation.asymptote
-    if ramp_time > 0.0:
-        ratio = ramp_time / relaxation.time_constant
-        share *= ratio / np.expm1(ratio)
     joint = final_force / relaxation.asymptote
-    return linear_parameters(joint, motor_stiffness, 1.0 - share, relaxation.time_constant)
+    found = contact_of_response(joint, motor_stiffness, relaxation.kappa(ramp_time), relaxation.time_constant)
+    return {name: getattr(found, name) for name in _NAMES}
+
+
+def _as_printed(
+    relaxation: Relaxation, final_force: float, first_force: float, motor_stiffness: float, way: float
+) -> dict[str, float]:
+    """Return c_Re, c_R, d_R as printed, c_xi being the force over the wanted displacement in all three.
+
+    So read, with p in series, the first formula is right.
+    """
+    lag = relaxation.time_constant
+    printed = printed_formulas(
+        final_force / relaxation.asymptote, final_force / way, motor_stiffness, first_force / final_force, lag
+    )
+    c_r = printed.tangential_stiffness_with_p
+    return dict(zip(_NAMES, (printed.contact_stiffness, c_r, c_r * lag), strict=True))
 
 
 def _draw(
@@ -288,8 +248,7 @@ def _statements(results: dict[str, Any], parameters: RampParameters) -> list[Sta
 
 
 def _told(errors: dict[str, float]) -> str:
-    names = {'contact_stiffness': 'c_Re', 'tangential_stiffness': 'c_R', 'tangential_damping': 'd_R'}
-    return ', '.join(f'{names[name]} {100 * error:+.1f} %' for name, error in errors.items())
+    return ', '.join(f'{_NAMES[name]} {100 * error:+.1f} %' for name, error in errors.items())
 
 
 EXPERIMENT = Experiment(

@@ -139,6 +139,35 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     )
 
 
+def contact_of_response(
+    joint_stiffness: float, machine_stiffness: float, kappa: float, time_constant: float
+) -> FrictionContact:
+    """Return the contact from c_xi, p (N/m), kappa = T_v / T and T (s): Eq (11) put right (derived)."""
+    c_re = (machine_stiffness + joint_stiffness) / kappa - machine_stiffness
+    c_r = joint_stiffness * c_re / (c_re - joint_stiffness)
+    d_r = time_constant * (c_r + machine_stiffness * c_re / (machine_stiffness + c_re))
+    return FrictionContact(c_r, d_r, c_re)
+
+
+def printed_formulas(
+    joint_stiffness: float,
+    stiffness_with_p: float,
+    machine_stiffness: float,
+    first_over_last: float,
+    time_constant: float,
+) -> PrintedFormulas:
+    """Return Eq (11) word for word, k being the first force over the last.
+
+    `joint_stiffness` is c_xi without the spring p, `stiffness_with_p` (the last force over the desired
+    displacement) contains it; N/m, T in s.
+    """
+    k, p = first_over_last, machine_stiffness
+    c_re = k * stiffness_with_p * p / (p - k * stiffness_with_p)
+    without_p = joint_stiffness * c_re / (c_re - joint_stiffness)
+    with_p = stiffness_with_p * c_re / (c_re - stiffness_with_p)
+    return PrintedFormulas(c_re, with_p, without_p, without_p * time_constant)
+
+
 def mean_contact(fits: list[RampHoldFit]) -> FrictionContact:
     """Return the contact of several ramps: each parameter's mean, weighted by its uncertainty."""
     values = np.array([fit.contact for fit in fits])
@@ -242,21 +271,14 @@ def _contact(name: str, values: FloatArray) -> FrictionContact:
 
 def _inverted(values: FloatArray) -> FrictionContact:
     asymptote, kappa, lag, p, desired = (float(value) for value in values[:5])
-    c_xi = p * (desired - asymptote) / asymptote
-    c_re = (p + c_xi) / kappa - p
-    c_r = c_xi * c_re / (c_re - c_xi)
-    return FrictionContact(c_r, lag * (c_r + p * c_re / (p + c_re)), c_re)
+    return contact_of_response(p * (desired - asymptote) / asymptote, p, kappa, lag)
 
 
 def _as_printed(values: FloatArray) -> PrintedFormulas:
-    """Return Eq (11) word for word, k = F(0+) / F(inf), c_xi with p in the first formula."""
     asymptote, kappa, lag, p, desired = (float(value) for value in values[:5])
-    without = p * (desired - asymptote) / asymptote
-    with_p = without * p / (without + p)
-    k = (desired - kappa * asymptote) / (desired - asymptote)
-    c_re = k * with_p * p / (p - k * with_p)
-    stiff = without * c_re / (c_re - without)
-    return PrintedFormulas(c_re, with_p * c_re / (c_re - with_p), stiff, stiff * lag)
+    joint = p * (desired - asymptote) / asymptote
+    first_over_last = (desired - kappa * asymptote) / (desired - asymptote)
+    return printed_formulas(joint, joint * p / (joint + p), p, first_over_last, lag)
 
 
 def _contact_covariance(values: FloatArray, covariance: FloatArray) -> FloatArray:
