@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -20,9 +19,7 @@ from mount_bringup.experiments import (
     sawtooth,
 )
 from mount_bringup.experiments.contract import Experiment, Holds, Order, Outcome, Statement
-from mount_bringup.experiments.friction_rack import move, sawtooth_corners
 from mount_bringup.experiments.registry import EXPERIMENTS
-from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 
 PNG = b'\x89PNG'
@@ -121,25 +118,6 @@ def test_the_page_puts_pictures_beside_statements_and_counts_the_answers(tmp_pat
     assert '| [A thing](#a) | Fig. 1 | 1 |  | 1 |  |' in text
     assert '| Fig. 1 | it is so | it was not | no |' in text
     assert (tmp_path / 'docs' / 'figures' / 'a.png').exists()
-
-
-# The rack.
-
-
-def test_the_saw_tooth_grows_faster_after_every_second_turning_point():
-    times, positions, speeds = sawtooth_corners(2.5e-3, 1e-3, 3e-3, 1e-3)
-    assert speeds == pytest.approx([1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])
-    assert np.abs(np.diff(positions)) == pytest.approx(speeds * np.diff(times))
-    assert positions[1:] == pytest.approx([-2.5e-3, 2.5e-3] * 3 + [-2.5e-3])
-
-
-def test_a_motor_that_gives_way_leaves_its_share_of_the_way():
-    contact, coefs = FrictionContact(), FrictionCoefficients()
-    stiff = move(contact, coefs, [0.0, 0.01, 0.1], [0.0, 1e-6, 1e-6], 100.0)
-    soft = move(contact, coefs, [0.0, 0.01, 0.1], [0.0, 1e-6, 1e-6], 100.0, motor_stiffness=2e6)
-    assert stiff.displacement[-1] == pytest.approx(1e-6, rel=1e-12)
-    assert soft.friction_force[-1] == pytest.approx(2e6 * (1e-6 - soft.displacement[-1]), rel=1e-9)
-    assert soft.friction_force[-1] < 0.6 * stiff.friction_force[-1]
 
 
 def test_without_noise_the_ramp_gives_the_true_parameters(tmp_path):

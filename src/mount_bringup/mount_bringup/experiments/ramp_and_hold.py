@@ -16,14 +16,15 @@ from mount_bringup.experiments.contract import (
     parameters_of,
 )
 from mount_bringup.experiments.drawing import BLUE, GREY, RED, finish, new_figure
-from mount_bringup.experiments.friction_rack import FloatArray, move
-from mount_bringup.experiments.rack_recording import record_friction_rack
+from mount_bringup.experiments.rack_recording import SUBSTEPS, record_friction_rack
 from mount_bringup.experiments.sawtooth_evaluation import RackRecording, read_rack
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.identification.ramp_hold import contact_of_response, printed_formulas
+from mount_models.friction.identification.recording import FloatArray
 from mount_models.friction.identification.relaxation import Relaxation, fit_relaxation
 from mount_models.quantity import Quantity, flattened
+from mount_sim.rack_friction import move, with_noise
 
 NAME = 'ramp_and_hold'
 _NAMES = {'contact_stiffness': 'c_Re', 'tangential_stiffness': 'c_R', 'tangential_damping': 'd_R'}
@@ -71,19 +72,18 @@ def run(order: Order, progress: Progress) -> Outcome:
 
 def _record(order: Order, parameters: RampParameters) -> Path:
     corners = np.cumsum([0.0, parameters.rest_time, parameters.ramp_time, parameters.hold_time])
-    samples = move(
+    rack = move(
         parameters.contact,
         parameters.friction,
         corners,
         [0.0, 0.0, parameters.way, parameters.way],
         parameters.normal_force,
-        motor_stiffness=parameters.motor_stiffness,
-        force_noise=parameters.force_noise,
-        displacement_noise=parameters.displacement_noise,
-        seed=parameters.seed,
+        machine_stiffness=parameters.motor_stiffness,
+        substeps=SUBSTEPS,
     )
+    measured = with_noise(rack, parameters.force_noise, parameters.displacement_noise, parameters.seed)
     session = {'scenario': NAME, 'mode': 'rack', 'parameters': {NAME: flattened(parameters)}}
-    return record_friction_rack(order.out / NAME, *samples, session)
+    return record_friction_rack(order.out / NAME, measured, session)
 
 
 def _wanted(time: FloatArray, parameters: RampParameters) -> FloatArray:

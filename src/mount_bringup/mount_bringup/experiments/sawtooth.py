@@ -18,13 +18,7 @@ from mount_bringup.experiments.contract import (
     Statement,
     parameters_of,
 )
-from mount_bringup.experiments.friction_rack import (
-    FloatArray,
-    full_model_force,
-    move,
-    sawtooth_corners,
-)
-from mount_bringup.experiments.rack_recording import record_friction_rack
+from mount_bringup.experiments.rack_recording import SUBSTEPS, record_friction_rack
 from mount_bringup.experiments.sawtooth_evaluation import (
     RackRecording,
     Stroke,
@@ -35,8 +29,11 @@ from mount_bringup.experiments.sawtooth_evaluation import (
 )
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
+from mount_models.friction.full import full_response
+from mount_models.friction.identification.recording import FloatArray
 from mount_models.friction.simplified import simplified_response
 from mount_models.quantity import Quantity, flattened
+from mount_sim.rack_friction import move, sawtooth_corners, with_noise
 
 NAME = 'sawtooth'
 
@@ -114,18 +111,12 @@ def _normal_forces(parameters: SawtoothParameters) -> list[float]:
 
 
 def _record(order: Order, parameters: SawtoothParameters, load: float, number: int) -> Path:
-    times, positions, _ = sawtooth_corners(
-        parameters.amplitude, parameters.lowest_speed, parameters.highest_speed, parameters.speed_step
-    )
-    samples = move(
-        parameters.contact,
-        parameters.friction,
-        times,
-        positions,
-        load,
-        force_noise=parameters.force_noise,
-        displacement_noise=parameters.displacement_noise,
-        seed=parameters.seed + number,
+    step = parameters.speed_step
+    speeds = np.arange(parameters.lowest_speed, parameters.highest_speed + 0.5 * step, step)
+    corners = sawtooth_corners(-parameters.amplitude, speeds)
+    rack = move(parameters.contact, parameters.friction, *corners, load, substeps=SUBSTEPS)
+    measured = with_noise(
+        rack, parameters.force_noise, parameters.displacement_noise, parameters.seed + number
     )
     session = {
         'scenario': NAME,
@@ -133,15 +124,25 @@ def _record(order: Order, parameters: SawtoothParameters, load: float, number: i
         'normal_force': load,
         'parameters': {NAME: flattened(parameters)},
     }
-    return record_friction_rack(order.out / f'sawtooth_{load:.0f}N', *samples, session)
+    return record_friction_rack(order.out / f'sawtooth_{load:.0f}N', measured, session)
 
 
 def _evaluated(recording: Path, parameters: SawtoothParameters) -> Run:
     rack = read_rack(open_recording(recording))
     contact, coefs, dt = parameters.contact, parameters.friction, rack.sample_time
-    full = full_model_force(contact, coefs, rack.displacement, rack.normal_force)
+    full = _full_model_force(contact, coefs, rack)
     simplified, _ = simplified_response(contact, coefs, rack.velocity, rack.normal_force, dt)
     return Run(rack, deflection(rack, contact), strokes(rack, contact), full, simplified)
+
+
+def _full_model_force(
+    contact: FrictionContact, coefs: FrictionCoefficients, rack: RackRecording
+) -> FloatArray:
+    """Return the force (N) of the full model on the recorded displacement, straight between samples."""
+    samples = np.arange(rack.displacement.size)
+    fine = np.arange((samples.size - 1) * SUBSTEPS + 1) / SUBSTEPS
+    x, load = (np.interp(fine, samples, each) for each in (rack.displacement, rack.normal_force))
+    return np.asarray(full_response(contact, coefs, x, load, rack.sample_time / SUBSTEPS)[0][::SUBSTEPS])
 
 
 def _figures(runs: list[Run], shown: Run, parameters: SawtoothParameters) -> dict[str, Any]:
