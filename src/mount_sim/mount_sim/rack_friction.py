@@ -83,8 +83,8 @@ def move(
     series = contact._replace(contact_stiffness=stiffness)
     force, _, _ = full_response(series, coefs, desired, np.full(fine.size, normal_force), fine[1])
     displacement = desired - force / machine_stiffness
-    time, *sampled = (values[::substeps] for values in (fine, displacement, desired, force))
-    return RackRecording(time, *sampled, np.full(time.size, normal_force))
+    time, x, x_desired, measured = (values[::substeps] for values in (fine, displacement, desired, force))
+    return RackRecording(time, x, x_desired, measured, np.full(time.size, normal_force))
 
 
 def with_noise(

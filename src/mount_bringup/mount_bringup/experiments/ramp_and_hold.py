@@ -5,7 +5,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mount_bags.reading import open_recording
 from mount_bringup.experiments.contract import (
     Experiment,
     Holds,
@@ -17,11 +16,11 @@ from mount_bringup.experiments.contract import (
 )
 from mount_bringup.experiments.drawing import BLUE, GREY, RED, finish, new_figure
 from mount_bringup.experiments.rack_recording import SUBSTEPS, record_friction_rack
-from mount_bringup.experiments.sawtooth_evaluation import RackRecording, read_rack
+from mount_bringup.friction_files import read_recording
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.identification.ramp_hold import contact_of_response, printed_formulas
-from mount_models.friction.identification.recording import FloatArray
+from mount_models.friction.identification.recording import FloatArray, FrictionRecording
 from mount_models.friction.identification.relaxation import Relaxation, fit_relaxation
 from mount_models.quantity import Quantity, flattened
 from mount_sim.rack_friction import move, with_noise
@@ -61,7 +60,7 @@ def run(order: Order, progress: Progress) -> Outcome:
     parameters = parameters_of(order, NAME, RampParameters())
     progress(0.1, 'ramp and hold')
     recording = _record(order, parameters)
-    rack = read_rack(open_recording(recording))
+    rack = read_recording(recording)
     progress(0.7, 'evaluation')
     time = rack.time - parameters.rest_time
     relaxation = fit_relaxation(time, rack.displacement, parameters.fit_from)
@@ -92,14 +91,14 @@ def _wanted(time: FloatArray, parameters: RampParameters) -> FloatArray:
 
 
 def _figures(
-    rack: RackRecording, time: FloatArray, relaxation: Relaxation, parameters: RampParameters
+    rack: FrictionRecording, time: FloatArray, relaxation: Relaxation, parameters: RampParameters
 ) -> dict[str, Any]:
     held = time > 0.0
     yielding = _wanted(time, parameters) - rack.displacement
-    final_force = float(np.mean(rack.friction_force[time > time[-1] - 1.0]))
-    p = float(np.polyfit(yielding[held], rack.friction_force[held], 1)[0])
+    final_force = float(np.mean(rack.force[time > time[-1] - 1.0]))
+    p = float(np.polyfit(yielding[held], rack.force[held], 1)[0])
     whole = fit_relaxation(time, rack.displacement, parameters.ramp_time)
-    first_force = float(np.max(rack.friction_force[held]))
+    first_force = float(np.max(rack.force[held]))
     readings = {
         'parameters': _of_relaxation(relaxation, final_force, p, parameters.ramp_time),
         'parameters_without_ramp_correction': _of_relaxation(relaxation, final_force, p, 0.0),
@@ -159,7 +158,7 @@ def _as_printed(
 
 
 def _draw(
-    rack: RackRecording,
+    rack: FrictionRecording,
     time: FloatArray,
     relaxation: Relaxation,
     results: dict[str, Any],
@@ -168,7 +167,7 @@ def _draw(
 ) -> Path:
     figure = new_figure('Ramp and hold in microslip: step one of the identification (Fig. 7)', 4.2)
     left, middle, right = figure.subplots(1, 3)
-    x, force = 1e6 * rack.displacement, rack.friction_force
+    x, force = 1e6 * rack.displacement, rack.force
     left.plot(x, force, color=BLUE, linewidth=0.8, label='recorded')
     reach = np.array([0.0, x[-1]])
     stiffness = results['joint_stiffness_n_per_m']
