@@ -205,8 +205,8 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
             'a logarithm, both directions apart.',
             f'a comes back with {results["a_rms_error"]:.4f} rms, b with '
             f'{results["b_rms_error_per_mm"]:.2f} 1/mm rms of the curves the simulated pads have, at the '
-            'speed of the slider: it is a little slower than the pads, because the creeping element takes its '
-            'part. What is left is noise.',
+            'speed of the slider, a little slower than the pads because the creeping element takes its part. '
+            'What is left is noise.',
             Holds.YES if results['a_rms_error'] < 5e-3 and results['b_rms_error_per_mm'] < 1.0 else Holds.NO,
         ),
         Statement(
