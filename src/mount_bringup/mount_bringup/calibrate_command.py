@@ -40,8 +40,8 @@ _INDUCTANCE_EPILOG = """Examples:
 `engine-mount calibrate inductance cold/*.csv warm/*.csv` - two temperatures: compensation is measured
 
 CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
-`flux_rate_t_per_s`;
-`gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`) tells them.
+`flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
+tells them.
 """
 _RACK_EPILOG = """Example:
 
@@ -123,8 +123,7 @@ def actuator(
     _say(
         console,
         f'{fit.points} points; error rms {fit.relative_rms:.2%} of the force above 20 N, worst '
-        f'{fit.worst:.2%}; '
-        f'rms {fit.rms_error:.2f} N, largest {fit.largest_error:.2f} N',
+        f'{fit.worst:.2%}; rms {fit.rms_error:.2f} N, largest {fit.largest_error:.2f} N',
     )
     _say(
         console,

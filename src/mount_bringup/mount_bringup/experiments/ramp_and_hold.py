@@ -211,8 +211,7 @@ def _statements(results: dict[str, Any], parameters: RampParameters) -> list[Sta
             'Sec. 4',
             'The whole test stays in microslip: nothing slides.',
             f'The force peaks at {results["highest_force_n"]:.1f} N; at {parameters.normal_force:g} N '
-            'normal force '
-            f'the pads break away at {results["breakaway_force_n"]:.1f} N (positive direction).',
+            f'normal force the pads break away at {results["breakaway_force_n"]:.1f} N (positive direction).',
             Holds.YES if microslip else Holds.NO,
         ),
         Statement(
@@ -235,12 +234,11 @@ def _statements(results: dict[str, Any], parameters: RampParameters) -> list[Sta
         Statement(
             'Eq (11) as printed',
             'The same three formulas, taken literally.',
-            'With k as first over last force and c_xi as force over the wanted displacement, which makes the '
-            f'first formula right but for the ramp: {_told(printed)}. The second is right only with c_xi '
-            'over '
-            'the measured displacement, where the first is wrong; the third forgets p: with the right c_R '
-            f'it gives d_R {100 * results["damping_error_as_printed"]:+.1f} %. No reading makes all three '
-            'right.',
+            'With k as first over last force and c_xi as force over the wanted displacement, which makes '
+            f'the first formula right but for the ramp: {_told(printed)}. The second is right only with '
+            'c_xi over the measured displacement, where the first is wrong; the third forgets p: with the '
+            f'right c_R it gives d_R {100 * results["damping_error_as_printed"]:+.1f} %. No reading makes '
+            'all three right.',
             Holds.NO if max(abs(error) for error in printed.values()) > 0.05 else Holds.YES,
         ),
     ]
@@ -258,8 +256,8 @@ EXPERIMENT = Experiment(
         'The motor of the rack, a spring p in series with the pads, pulls them by a short ramp and holds. '
         'Nothing slides; the parallel pair of spring and damper relaxes. The joint stiffness comes from the '
         'last second, p from the force over what the motor gives way, T and the amplitude from an '
-        'exponential '
-        'fitted to the displacement. Normal force, p and ramp are chosen: the paper gives none of them.'
+        'exponential fitted to the displacement. Normal force, p and ramp are chosen: the paper gives none '
+        'of them.'
     ),
     defaults=RampParameters(),
     run=run,

@@ -1,5 +1,4 @@
-"""Figs. 8 to 11: the friction contact alone on a saw tooth that grows faster after every second turning "
-"point."""
+"""Figs. 8 to 11: the friction contact alone on a saw tooth, faster after every second turning point."""
 
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -180,8 +179,8 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
             f'b is negative on {falling} of {count} strokes'
             + (
                 f'; on the others (normal force up to {rising:g} N) it is positive. That is b_offset = +14 '
-                '1/mm '
-                'as Table 2 prints it, with a unit that cannot be right; with -14 b is negative everywhere.'
+                '1/mm as Table 2 prints it, with a unit that cannot be right; with -14 b is negative '
+                'everywhere.'
                 if rising is not None
                 else '.'
             ),
@@ -257,11 +256,9 @@ EXPERIMENT = Experiment(
     summary=(
         'The simulated pads (full model) are moved between two turning points at constant speed and constant '
         'normal force; after every second turning point the speed grows by 1 mm/s. Displacement, friction '
-        'force '
-        'and normal force are recorded at 1 kHz with noisy instruments; everything below is computed from '
-        'the recordings: u from the force through the linear part of the contact, a line of mu over u for '
-        'each '
-        'stroke, and both friction models driven by the recorded displacement.'
+        'force and normal force are recorded at 1 kHz with noisy instruments; everything below is computed '
+        'from the recordings: u from the force through the linear part of the contact, a line of mu over u '
+        'for each stroke, and both friction models driven by the recorded displacement.'
     ),
     defaults=SawtoothParameters(),
     run=run,

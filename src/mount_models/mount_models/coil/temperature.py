@@ -111,8 +111,7 @@ def check_compensation(compensation: TemperatureCompensation, curves: GapCurves)
     if not 1.0 + c.conductivity_coefficient * (c.lowest_celsius - c.calibration_celsius) > 0.1:
         raise CompensationError(
             f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a '
-            'resistivity '
-            f'at {c.lowest_celsius:g} degC; lower it, or raise lowest_celsius'
+            f'resistivity at {c.lowest_celsius:g} degC; lower it, or raise lowest_celsius'
         )
     curve = curves.inductance_of_gap
     gaps = np.linspace(curve.low, curve.high, 61)

@@ -229,9 +229,8 @@ def _start(
     rising = np.flatnonzero(smooth_force[: top + 1] > 0.1 * smooth_force[top])
     if force_end <= 0.0 or x_end <= 0.0 or top < 2 or not rising.size or top > 0.8 * count:
         raise IdentificationError(
-            f'{name}: force ends at {force_end:.3g} N and displacement at {x_end:.3g} m; step 1 needs a '
-            'ramp that '
-            'is held afterwards, force and displacement to the same side: check signs, or record ramp '
+            f'{name}: force ends at {force_end:.3g} N and displacement at {x_end:.3g} m; step 1 needs a ramp '
+            'that is held afterwards, force and displacement to the same side: check signs, or record ramp '
             'and hold'
         )
     begin = int(rising[0])
@@ -245,8 +244,8 @@ def _start(
     if not stiffness > 0.0:
         raise IdentificationError(
             f'{name}: while held, force and displacement change by {stiffness:.3g} N/m together; a rack '
-            'gives way '
-            'against the force (above 0 N/m): record the desired displacement as well, or hold longer'
+            'gives way against the force (above 0 N/m): record the desired displacement as well, or hold '
+            'longer'
         )
     height = np.clip(smooth_x[hold][0] / x_end, 0.1, 0.98)
     passed = (smooth_x[hold] - smooth_x[hold][0]) > 0.63 * (x_end - smooth_x[hold][0])
@@ -259,12 +258,10 @@ def _contact(name: str, values: FloatArray) -> FrictionContact:
     contact = _inverted(values)
     if not all(value > 0.0 and np.isfinite(value) for value in contact):
         raise IdentificationError(
-            f'{name}: c_R {contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} '
-            'N s/m, c_Re '
-            f'{contact.contact_stiffness:.3g} N/m must all be above 0: the displacement does not creep '
-            'as the '
-            'contact does (kappa '
-            f'{values[1]:.3f} must lie below 1); ramp faster, hold longer, and stay in microslip'
+            f'{name}: c_R {contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} N '
+            f's/m, c_Re {contact.contact_stiffness:.3g} N/m must all be above 0: the displacement does not '
+            f'creep as the contact does (kappa {values[1]:.3f} must lie below 1); ramp faster, hold longer, '
+            'and stay in microslip'
         )
     return contact
 
@@ -298,9 +295,8 @@ def _check_misfit(name: str, misfits: tuple[float, float]) -> None:
         if misfit > LARGEST_MISFIT:
             raise IdentificationError(
                 f'{name}: the fitted ramp misses the {channel} by {100 * misfit:.1f} % rms (at most '
-                f'{100 * LARGEST_MISFIT:.0f} %): the contact slides, or it is no ramp that is held; use '
-                'a smaller '
-                'displacement'
+                f'{100 * LARGEST_MISFIT:.0f} %): the contact slides, or it is no ramp that is held; use a '
+                'smaller displacement'
             )
 
 

@@ -1,8 +1,7 @@
 """Step 2: mu over the deflection u at constant speeds and normal force (Figs. 8, 9, Eq 12).
 
 The measured force drives the linear part, xi' = (F_F - c_R xi) / d_R; u = sign(F_F) xi. In every stroke
-between
-two turning points mu = |F_F| / F_N is a straight line over u: mu = a + b u.
+between two turning points mu = |F_F| / F_N is a straight line over u: mu = a + b u.
 """
 
 from dataclasses import dataclass
@@ -75,16 +74,14 @@ def stroke_lines(recording: FrictionRecording, contact: FrictionContact) -> list
             lines.append(line)
     if not lines:
         raise IdentificationError(
-            f'{recording.name}: no stroke slides for {SHORTEST_WINDOW:g} s or more at constant speed; '
-            'use longer '
-            'strokes or lower speeds'
+            f'{recording.name}: no stroke slides for {SHORTEST_WINDOW:g} s or more at constant speed; use '
+            'longer strokes or lower speeds'
         )
     return lines
 
 
 def strokes(recording: FrictionRecording) -> list[tuple[int, int, float]]:
-    """Return (first sample, last sample, velocity m/s) between turning points; incomplete and short ones
-    too."""
+    """Return (first sample, last sample, velocity m/s) of all strokes, incomplete and short ones too."""
     x = smoothed_displacement(recording)
     turns = [0, *turning_points(x), x.size - 1]
     found = []
@@ -137,8 +134,7 @@ def turning_points(displacement: FloatArray) -> list[int]:
 
 @compiled
 def deflection_from_force(force, dt, tangential_stiffness, tangential_damping):
-    """Return xi (m) of the linear part for `force` (N), (n,), from rest, the force straight between
-    samples."""
+    """Return xi (m) of the linear part, from rest, for a `force` (N), (n,), straight between samples."""
     xi = np.zeros(force.size)
     z = tangential_stiffness * dt / tangential_damping
     fade = np.exp(-z)
