@@ -203,9 +203,9 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
             'a and b of each stroke lie on the analytic curves over speed and normal force, a with '
             'a logarithm, both directions apart.',
             f'a comes back with {results["a_rms_error"]:.4f} rms, b with '
-            f'{results["b_rms_error_per_mm"]:.2f} 1/mm rms of the curves the simulated pads have, at the '
-            'speed of the slider, a little slower than the pads because the creeping element takes its part. '
-            'What is left is noise.',
+            f'{results["b_rms_error_per_mm"]:.2f} 1/mm rms of the curves the simulated pads have, taken at '
+            'the mean speed of the slider, a little slower than the pads because the creeping element '
+            'takes its part.',
             Holds.YES if results['a_rms_error'] < 5e-3 and results['b_rms_error_per_mm'] < 1.0 else Holds.NO,
         ),
         Statement(
