@@ -2,12 +2,15 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn
 from rich.table import Table
+
+if TYPE_CHECKING:
+    from mount_models.specimen import Specimen
 
 app = typer.Typer(
     name='calibrate',
@@ -37,8 +40,8 @@ _INDUCTANCE_EPILOG = """Examples:
 `engine-mount calibrate inductance cold/*.csv warm/*.csv` - two temperatures: compensation is measured
 
 CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
-`flux_rate_t_per_s`;
-`gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`) tells them.
+`flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
+tells them.
 """
 _RACK_EPILOG = """Example:
 
@@ -85,11 +88,10 @@ def actuator(
     and falling with the gap within the measured range. Then no file is written.
     """
     from mount_bringup.calibrate_figure import draw_force_law
-    from mount_bringup.calibrated_specimen import check_targets, foreign_parts, with_force_law
+    from mount_bringup.calibrated_specimen import check_targets, with_force_law
     from mount_bringup.rack_recordings import GivenValues, read_force
-    from mount_bringup.summary import write_json
     from mount_models.actuator.fit import fit_force_law
-    from mount_models.specimen import chosen_specimen, save_specimen
+    from mount_models.specimen import chosen_specimen
 
     console = Console()
     check_targets(out, json_file, figure)
@@ -121,8 +123,7 @@ def actuator(
     _say(
         console,
         f'{fit.points} points; error rms {fit.relative_rms:.2%} of the force above 20 N, worst '
-        f'{fit.worst:.2%}; '
-        f'rms {fit.rms_error:.2f} N, largest {fit.largest_error:.2f} N',
+        f'{fit.worst:.2%}; rms {fit.rms_error:.2f} N, largest {fit.largest_error:.2f} N',
     )
     _say(
         console,
@@ -145,12 +146,7 @@ def actuator(
     if figure is not None:
         draw_force_law(points, law, figure)
         console.print(f'figure     {figure}', highlight=False)
-    if json_file is not None:
-        write_json(figures, json_file)
-    if out is not None:
-        save_specimen(specimen, out)
-        console.print(f'specimen   {out}', highlight=False)
-    note_foreign(console, foreign_parts(specimen), specimen.name)
+    _write(console, specimen, figures, json_file, out)
 
 
 @app.command(epilog=_INDUCTANCE_EPILOG)
@@ -189,11 +185,10 @@ def inductance(
     """
     from mount_bringup.calibrate_figure import draw_gap_curves
     from mount_bringup.calibrate_inductance import GapOrder, calibrate_inductance
-    from mount_bringup.calibrated_specimen import check_targets, foreign_parts, with_gap_curves
+    from mount_bringup.calibrated_specimen import check_targets, with_gap_curves
     from mount_bringup.rack_recordings import read_ripple
-    from mount_bringup.summary import write_json
     from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
-    from mount_models.specimen import chosen_specimen, save_specimen
+    from mount_models.specimen import chosen_specimen
 
     console = Console()
     check_targets(out, json_file, figure)
@@ -231,12 +226,7 @@ def inductance(
     if figure is not None:
         draw_gap_curves(result, order, figure)
         console.print(f'figure     {figure}', highlight=False)
-    if json_file is not None:
-        write_json({'specimen': specimen.name, **result.figures()}, json_file)
-    if out is not None:
-        save_specimen(specimen, out)
-        console.print(f'specimen   {out}', highlight=False)
-    note_foreign(console, foreign_parts(specimen), specimen.name)
+    _write(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)
 
 
 @app.command(epilog=_RACK_EPILOG)
@@ -365,6 +355,22 @@ def _split(values: Any, orders: tuple[int, ...]) -> dict[str, list[float]]:
 
 def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def _write(
+    console: Console, specimen: 'Specimen', figures: dict[str, Any], json_file: Path | None, out: Path | None
+) -> None:
+    """Write figures and specimen where they are wanted, and say which parts are of other specimens."""
+    from mount_bringup.calibrated_specimen import foreign_parts
+    from mount_bringup.summary import write_json
+    from mount_models.specimen import save_specimen
+
+    if json_file is not None:
+        write_json(figures, json_file)
+    if out is not None:
+        save_specimen(specimen, out)
+        console.print(f'specimen   {out}', highlight=False)
+    note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
 def _progress(console: Console) -> Progress:

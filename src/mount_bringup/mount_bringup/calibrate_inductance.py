@@ -52,13 +52,11 @@ class InductanceResult:
         inductance, crossing = self.calibration.inductance, self.calibration.crossing
         curve = inductance.polynomial
         return [
-            f'valid within {curve.low * 1e6:.1f} .. {curve.high * 1e6:.1f} um; largest standard '
-            'deviation of a '
-            f'gap by the curve alone {inductance.largest_gap_std * 1e6:.2f} um at rest, '
+            f'valid within {curve.low * 1e6:.1f} .. {curve.high * 1e6:.1f} um; largest standard deviation '
+            f'of a gap by the curve alone {inductance.largest_gap_std * 1e6:.2f} um at rest, '
             f'{crossing.largest_gap_std * 1e6:.2f} um at contact',
-            f'the inductance tells the gap at {_intervals(self.region.falling, 1.0)} A (falls with the '
-            'gap) and '
-            f'{_intervals(self.region.rising, 1.0)} A (rises), and by its current at '
+            f'the inductance tells the gap at {_intervals(self.region.falling, 1.0)} A (falls with the gap) '
+            f'and {_intervals(self.region.rising, 1.0)} A (rises), and by its current at '
             f'{_intervals(self.region.levels, 1e3)} mH; elsewhere it is ambiguous or unknown',
             f'temperature compensation: {self.compensated_by}',
             *([_OPTIMISTIC] if any(row['source'] == 'predicted' for row in self.left) else []),
@@ -212,9 +210,8 @@ def _how(measured_at_two: bool, compensation: TemperatureCompensation) -> str:
             f'between by the coefficient of the core, {coefficient}'
         )
     return (
-        f'stated: coefficient of the core {coefficient}, share of the core from the force law; '
-        'recordings at a '
-        f'second temperature would measure it'
+        f'stated: coefficient of the core {coefficient}, share of the core from the force law; recordings at '
+        'a second temperature would measure it'
     )
 
 
@@ -235,9 +232,8 @@ def _inside(law: ForceLaw, points: Sequence[GapPoint]) -> list[GapPoint]:
     found = [point for point in points if law.gap_low <= point.gap <= law.gap_high]
     if len(found) < 4:
         raise GapCurvesRefusedError(
-            f'the force law of the base holds for {law.gap_low * 1e6:.0f} .. {law.gap_high * 1e6:.0f} '
-            'um, where '
-            f'only {len(found)} recordings are, 4 are needed; calibrate the actuator first and give it '
+            f'the force law of the base holds for {law.gap_low * 1e6:.0f} .. {law.gap_high * 1e6:.0f} um, '
+            f'where only {len(found)} recordings are, 4 are needed; calibrate the actuator first and give it '
             'as --base'
         )
     return found

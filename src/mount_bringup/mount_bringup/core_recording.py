@@ -12,6 +12,7 @@ from mount_bringup.core_chain import Parameters
 from mount_bringup.core_run import CoreOutcome, run_core
 from mount_ros.cdr import serialised
 from mount_ros.topics import SESSION, TOPICS, Delivery, Topic
+from mount_sim.excitation import Excitation
 
 
 def record_core(
@@ -20,12 +21,14 @@ def record_core(
     session: str,
     progress: Callable[[float], None] = lambda share: None,
     *,
+    excitation: Excitation | None = None,
     namespace: str = '',
     split: SplitRule = WHOLE,
 ) -> CoreOutcome:
     """Run the scenario in `parameters`, write it to the recording `folder`, and return what happened.
 
-    `session` is the text of the session message; `progress` takes the share that is done.
+    `session` is the text of the session message; `progress` takes the share that is done. `excitation`
+    is that of the scenario where it is built already.
     """
     writer = BagWriter(folder, split=split)
     prefix = f'/{namespace.strip("/")}/' if namespace else '/'
@@ -42,6 +45,7 @@ def record_core(
             lambda columns, stamps: writer.write_columns(
                 [names[topic.name] for topic, _ in columns], [rows for _, rows in columns], begin + stamps
             ),
+            excitation,
         )
     finally:
         writer.close()

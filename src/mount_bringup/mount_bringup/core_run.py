@@ -15,6 +15,7 @@ from mount_driver.quantisation import quantised_coil_temperature, quantised_setp
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_sim.electronics import STATUS_EVERY, Reading
+from mount_sim.excitation import Excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.scenario import build_excitation
 from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
@@ -49,21 +50,26 @@ def run_core(
     write: Write,
     progress: Callable[[float], None] = lambda share: None,
     write_columns: WriteColumns | None = None,
+    excitation: Excitation | None = None,
 ) -> CoreOutcome:
     """Run the scenario in `parameters` to its end and hand every message to `write`.
 
-    With `write_columns` those of the samples go there, many at a time.
+    With `write_columns` those of the samples go there, many at a time. `excitation` is that of the scenario
+    where it is built already.
     """
     messages = CoreMessages(write, _coil_temperature(_sim_parameters(parameters)), write_columns)
-    return run_core_into(messages, parameters, progress)
+    return run_core_into(messages, parameters, progress, excitation)
 
 
 def run_core_into(
-    messages: Sink, parameters: Parameters, progress: Callable[[float], None] = lambda share: None
+    messages: Sink,
+    parameters: Parameters,
+    progress: Callable[[float], None] = lambda share: None,
+    excitation: Excitation | None = None,
 ) -> CoreOutcome:
     """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
     sim = _sim_parameters(parameters)
-    mount = SimulatedMount(sim.plant, build_excitation(sim), sim.seed)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
     chain = CoreChain(parameters)
     celsius = _coil_temperature(sim)
     samples = Samples(_BLOCK)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from mount_bags.audit import audit
 from mount_bags.audit_report import as_table, sentences
@@ -26,6 +25,7 @@ from mount_bringup.evaluation import load_drive
 from mount_bringup.graph import RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.preflight import preflight
+from mount_bringup.progress_bar import progress_bar
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import (
     print_summary,
@@ -89,7 +89,7 @@ def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[s
     folder = make_run_folder(order.out, order.scenario)
     complaints: list[str] = []
     if order.mode == 'core':
-        return folder, _drive_in_core(order, folder, console), complaints
+        return folder, _drive_in_core(order, excitation, folder, console), complaints
     return folder, _drive_graph(order, excitation, folder, console, complaints), complaints
 
 
@@ -203,7 +203,9 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
         supervisor.wait_until(finished, limit, 'the end of the drive')
 
 
-def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> dict[str, Any]:
+def _drive_in_core(
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console
+) -> dict[str, Any]:
     with progress_bar(console) as progress:
         task = progress.add_task(f'driving ({order.scenario})', total=1.0)
         outcome = record_core(
@@ -211,6 +213,7 @@ def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> di
             order.parameters,
             _session(order, order.parameters),
             lambda share: progress.update(task, completed=share),
+            excitation=excitation,
             namespace=order.namespace,
             split=split_of(_recorder_parameters(order)),
         )
@@ -223,12 +226,6 @@ def _drive_in_core(order: DriveOrder, folder: RunFolder, console: Console) -> di
         'latency_median_s': float('nan'),
         'latency_p99_s': float('nan'),
     }
-
-
-def progress_bar(console: Console) -> Progress:
-    """Return the bar that shows how far a run has come."""
-    columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=console)
 
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:

@@ -145,9 +145,8 @@ def _mcap(path: Path, channels: dict[str, Channel]) -> FrictionRecording:
             factor = channels[name].factor or 1.0
         if topic not in recording:
             raise IdentificationError(
-                f'{path} has no topic {topic} (for {name}); it has {", ".join(recording) or "none"}: '
-                'name one as in '
-                f'--channel {name}=/topic.field'
+                f'{path} has no topic {topic} (for {name}); it has {", ".join(recording) or "none"}: name '
+                f'one as in --channel {name}=/topic.field'
             )
         one = recording[topic]
         if not len(one):
@@ -162,20 +161,17 @@ def _mcap(path: Path, channels: dict[str, Channel]) -> FrictionRecording:
 
 
 def _rig(path: Path, clamp: str) -> FrictionRecording:
-    """Return a test of the measured friction damper: a band round a drum, pulled by an actuator at either
-    end.
+    """Return a test of the measured friction damper: a band round a drum, an actuator pulls at either end.
 
-    Columns: time s, displacement inch, friction force kip, velocity inch/s (not used), ..., the two
-    actuators' pull
-    in lb (the last two). The force's zero is that of the rest before the motion.
+    Columns: time s, displacement inch, friction force kip, velocity inch/s (not used), ..., and last the pull
+    of the two actuators in lb. The force's zero is that of the rest before the motion.
 
     What presses the band onto the drum is its tension. At rest that is the clamp that was set, but a band
     tightens itself while it slides: the taut end then carries the friction force, with a factor that depends
     on the surfaces of the day. `clamp` says what counts as normal force:
 
     - 'sliding': for each direction the median pull of its taut end over the whole test: two numbers, which
-    say how
-      strongly the band holds in this test, and nothing of when or how the force turns. An independent
+      say how strongly the band holds in this test, and nothing of when or how the force turns. An independent
       sensor measures them, but only during the test: the level of the force is then measured, not foretold;
     - 'rest': the two pulls together before the motion, known beforehand;
     - 'none': nothing is known of the clamp (1 N; coefficients are then forces in N).
@@ -213,9 +209,9 @@ def _rig_table(path: Path) -> FloatArray:
         table = np.array(content['data'], float)
     except (ValueError, KeyError, TypeError) as error:
         raise IdentificationError(
-            f'{path.name} is no recording of the friction damper ({error!r}); expected is '
-            f'{{"data": [[time s, '
-            'displacement inch, friction force kip, velocity inch/s, actuator 1 lb, actuator 2 lb], ...]}'
+            f'{path.name} is no recording of the friction damper ({error!r}); expected is {{"data": [['
+            'time s, displacement inch, friction force kip, velocity inch/s, actuator 1 lb, actuator 2 lb], '
+            '...]}'
         ) from None
     if table.ndim != 2 or table.shape[0] < 2 or table.shape[1] < 6:
         raise IdentificationError(

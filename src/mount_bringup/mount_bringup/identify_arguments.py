@@ -1,5 +1,4 @@
-"""Several paths after one option: `--train a b --held-out c` as the command line knows it from other
-tools."""
+"""Several paths after one option: `--train a b --held-out c`, as one knows it from other tools."""
 
 from collections.abc import Sequence
 

@@ -56,9 +56,8 @@ def read_columns(
         elif channel in channels:
             names = ' or '.join(f'{channel.name}_{unit}' for unit in channel.units)
             raise RackRecordingError(
-                f'{file} has no column {names}; its columns are {", ".join(table.header)}: rename one, '
-                'or choose '
-                f'it with --column {channel.name}=HEADER:UNIT'
+                f'{file} has no column {names}; its columns are {", ".join(table.header)}: rename one, or '
+                f'choose it with --column {channel.name}=HEADER:UNIT'
             )
     places = [place for place, _ in found.values()]
     rows = table.columns(*places)
@@ -82,9 +81,9 @@ def check_alive(file: Path, name: str, unit: str, values: FloatArray, driven: Fl
     if longest > _LONGEST_STUCK:
         start = int(ends[np.argmax(np.diff(ends))])
         raise RackRecordingError(
-            f'{file}: {name} stayed at {values[start]:g} {unit} for {longest} rows from row {start + 1} '
-            'on while '
-            f'the current changed, more than {_LONGEST_STUCK}; the sensor is stuck: leave these rows out'
+            f'{file}: {name} stayed at {values[start]:g} {unit} for {longest} rows from row {start + 1} on '
+            f'while the current changed, more than {_LONGEST_STUCK}; the sensor is stuck: leave these rows '
+            'out'
         )
 
 

@@ -144,9 +144,8 @@ def _gap_of(file: Path, given: Mapping[Path, float]) -> float:
     if named is None:
         kind = '' if file.is_dir() else file.suffix
         raise RackRecordingError(
-            f'{file}: its air gap is not known; add --gap {file.name}=UM, a column gap_um, or the gap '
-            'to its name, '
-            f'as in ripple_349um{kind}'
+            f'{file}: its air gap is not known; add --gap {file.name}=UM, a column gap_um, or the gap to its '
+            f'name, as in ripple_349um{kind}'
         )
     return float(named[1]) * 1e-6
 
@@ -270,9 +269,8 @@ def _force_from_bag(
     both = np.isfinite(matched) & np.isfinite(current) & (current >= 0.0)
     if both.sum() < _FEWEST:
         raise RackRecordingError(
-            f'{file}: {topic} and {COIL_RIPPLE.name} have {int(both.sum())} samples of the same time, '
-            'needed are '
-            f'{_FEWEST}; are they of one recording?'
+            f'{file}: {topic} and {COIL_RIPPLE.name} have {int(both.sum())} samples of the same time, needed '
+            f'are {_FEWEST}; are they of one recording?'
         )
     current, matched = current[both], matched[both]
     places = np.minimum((current / current.max() * _BINS).astype(int), _BINS - 1)
@@ -284,9 +282,8 @@ def _force_from_bag(
 def _topic(recording: Recording, name: str) -> Any:
     if name not in recording:
         raise RackRecordingError(
-            f'{recording.path} has no topic {name}; it holds {", ".join(sorted(recording)) or "none"}: '
-            'is it a '
-            f'recording of the rack?'
+            f'{recording.path} has no topic {name}; it holds {", ".join(sorted(recording)) or "none"}: is it '
+            'a recording of the rack?'
         )
     return recording[name]
 

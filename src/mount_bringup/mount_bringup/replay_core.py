@@ -89,14 +89,7 @@ def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
 def run_ramp(ramp: Ramp, parameters: Parameters) -> RampAnswers:
     """Return setpoints and result of an initialisation from its recorded samples."""
     core = initialisation({node: dict(values) for node, values in parameters.items()}, ramp.temperatures)
-    samples = zip(
-        ramp.stamps.tolist(),
-        ramp.coil_current.tolist(),
-        ramp.current_rate.tolist(),
-        ramp.flux_rate.tolist(),
-        strict=True,
-    )
-    setpoints = np.array([core.step(*sample) for sample in samples])
+    setpoints = np.array([core.step(*sample) for sample in ramp.samples()])
     try:
         result = core.result()
     except InitialisationError as error:

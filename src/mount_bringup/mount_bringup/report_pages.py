@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from mount_bags.alignment import ComparisonError
 from mount_bags.compare import compare
 from mount_bags.reading import Recording
 from mount_bags.report.report import ReportError, make_report, subjects_of
+from mount_bringup.progress_bar import progress_bar
 from mount_bringup.run_facts import run_facts
 
 PAGE = 'report.html'
@@ -36,8 +36,7 @@ def write_report(
     With `other`, it shares the figures and its differences from the first recording are told. Raises
     `ReportError`.
     """
-    columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
+    with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
 
         def on_step(what: str, share: float) -> None:

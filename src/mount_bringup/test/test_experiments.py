@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -20,14 +19,7 @@ from mount_bringup.experiments import (
     sawtooth,
 )
 from mount_bringup.experiments.contract import Experiment, Holds, Order, Outcome, Statement
-from mount_bringup.experiments.friction_rack import move, sawtooth_corners
-from mount_bringup.experiments.ramp_and_hold import (
-    fit_relaxation,
-    linear_parameters,
-    printed_parameters,
-)
 from mount_bringup.experiments.registry import EXPERIMENTS
-from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 
 PNG = b'\x89PNG'
@@ -128,54 +120,12 @@ def test_the_page_puts_pictures_beside_statements_and_counts_the_answers(tmp_pat
     assert (tmp_path / 'docs' / 'figures' / 'a.png').exists()
 
 
-# The rack.
-
-
-def test_the_saw_tooth_grows_faster_after_every_second_turning_point():
-    times, positions, speeds = sawtooth_corners(2.5e-3, 1e-3, 3e-3, 1e-3)
-    assert speeds == pytest.approx([1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])
-    assert np.abs(np.diff(positions)) == pytest.approx(speeds * np.diff(times))
-    assert positions[1:] == pytest.approx([-2.5e-3, 2.5e-3] * 3 + [-2.5e-3])
-
-
-def test_a_motor_that_gives_way_leaves_its_share_of_the_way():
-    contact, coefs = FrictionContact(), FrictionCoefficients()
-    stiff = move(contact, coefs, [0.0, 0.01, 0.1], [0.0, 1e-6, 1e-6], 100.0)
-    soft = move(contact, coefs, [0.0, 0.01, 0.1], [0.0, 1e-6, 1e-6], 100.0, motor_stiffness=2e6)
-    assert stiff.displacement[-1] == pytest.approx(1e-6, rel=1e-12)
-    assert soft.friction_force[-1] == pytest.approx(2e6 * (1e-6 - soft.displacement[-1]), rel=1e-9)
-    assert soft.friction_force[-1] < 0.6 * stiff.friction_force[-1]
-
-
-# The identification of the linear part: published example.
-
-
-def test_step_one_recovers_the_published_example_exactly():
-    found = linear_parameters(2.857142857e6, 2e6, 1.0 - 0.19047619, 0.4411764706)
-    assert found['contact_stiffness'] == pytest.approx(4.0e6, rel=1e-6)
-    assert found['tangential_stiffness'] == pytest.approx(1.0e7, rel=1e-6)
-    assert found['tangential_damping'] == pytest.approx(5.0e6, rel=1e-6)
-
-
-def test_the_printed_formulas_give_the_published_wrong_answers():
-    series = 1.0 / (1.0 / 4e6 + 1.0 / 1e7 + 1.0 / 2e6)
-    first_over_last = (1.0 / (1.0 / 4e6 + 1.0 / 2e6)) / series
-    found = printed_parameters(series, 2e6, first_over_last, 0.4411764706)
-    assert found['contact_stiffness'] == pytest.approx(4.0e6, rel=1e-6)
-    assert found['tangential_stiffness'] == pytest.approx(1.67e6, abs=5e3)
-    assert pytest.approx(4.41e6, abs=5e3) == 1e7 * 0.4411764706
-
-
 def test_without_noise_the_ramp_gives_the_true_parameters(tmp_path):
     outcome = run(ramp_and_hold, tmp_path, force_noise=0.0, displacement_noise=0.0)
     check(outcome)
     assert outcome.figures['time_constant_s'] == pytest.approx(0.44118, abs=2e-4)
     assert max(map(abs, outcome.figures['errors'].values())) < 5e-3
     assert abs(outcome.figures['errors_without_ramp_correction']['tangential_stiffness']) > 0.1
-    # raw amplitude of the published example
-    assert fit_relaxation(
-        np.arange(0.0, 5.0, 1e-3), 1e-6 * (1 - 0.24099 * np.exp(-np.arange(0.0, 5.0, 1e-3) / 0.44118)), 1.0
-    ).amplitude == pytest.approx(0.24099e-6, rel=1e-5)
 
 
 def test_sliding_pads_are_told(tmp_path):

@@ -9,7 +9,6 @@ import pytest
 
 from mount_bringup.command import main
 from mount_bringup.core_chain import friction_model
-from mount_bringup.experiments.friction_rack import move, sawtooth_corners
 from mount_bringup.experiments.rack_recording import record_friction_rack
 from mount_bringup.friction_files import parsed_channels, read_recording
 from mount_bringup.identify_arguments import with_repeated_options
@@ -17,7 +16,15 @@ from mount_models.friction.coefficient import FrictionCoefficients, offset_coeff
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.identification.recording import IdentificationError
 from mount_models.specimen import default_specimen, load_specimen
-from mount_sim.rack_friction import RackNoise, ramp_and_hold, sawtooth, write_csv
+from mount_sim.rack_friction import (
+    RackNoise,
+    move,
+    ramp_and_hold,
+    sawtooth,
+    sawtooth_corners,
+    with_noise,
+    write_csv,
+)
 
 RIG = Path(__file__).resolve().parents[4] / 'shared' / 'data' / 'friction_rig'
 SPEEDS = (0.002, 0.004, 0.006, 0.010)
@@ -129,11 +136,11 @@ def test_one_file_trains_on_its_first_half_and_is_tried_on_its_second(rack, tmp_
 
 
 def test_the_recordings_of_the_sawtooth_experiment_are_read_as_the_rack_measured_them(tmp_path):
-    times, positions, _ = sawtooth_corners(2.5e-3, 2e-3, 8e-3, 2e-3)
-    samples = move(
-        FrictionContact(), FrictionCoefficients(), times, positions, 100.0, force_noise=0.5, seed=1
+    rack = move(
+        FrictionContact(), FrictionCoefficients(), *sawtooth_corners(2.5e-3, (2e-3, 4e-3, 6e-3, 8e-3)), 100.0
     )
-    recording = record_friction_rack(tmp_path / 'sawtooth', *samples, {'scenario': 'sawtooth'})
+    samples = with_noise(rack, force_noise=0.5, displacement_noise=0.0, seed=1)
+    recording = record_friction_rack(tmp_path / 'sawtooth', samples, {'scenario': 'sawtooth'})
     read = read_recording(recording)
     assert read.displacement == pytest.approx(samples.displacement, abs=1e-12)
     assert read.force == pytest.approx(samples.friction_force, abs=1e-9)

@@ -171,8 +171,7 @@ class MountControl(SafeLifecycleNode):
         if not self._table_refusal and not self._stream.holds(self._activation):
             self._table_refusal = (
                 'the measurements were interrupted for more than 1 s since the table was made, or their time '
-                'went back; '
-                'deactivate mount_control and activate mount_init again'
+                'went back; deactivate mount_control and activate mount_init again'
             )
         return bool(self._table_refusal)
 

@@ -93,9 +93,8 @@ def load_specimen(path: str | Path, name: str = '') -> Specimen:
         raise SpecimenError(f'specimen file {path}: {error}') from error
     if name and specimen.name != name:
         raise SpecimenError(
-            f'specimen file {path} is for the specimen {specimen.name!r}, {name!r} is asked for; give '
-            'the file '
-            f'of {name!r}, or ask for {specimen.name!r}'
+            f'specimen file {path} is for the specimen {specimen.name!r}, {name!r} is asked for; give the '
+            f'file of {name!r}, or ask for {specimen.name!r}'
         )
     return specimen
 
@@ -203,9 +202,8 @@ def _check_version(content: Any) -> None:
     version = content.get('schema_version') if isinstance(content, Mapping) else SCHEMA_VERSION
     if version != SCHEMA_VERSION or isinstance(version, bool):
         raise SpecimenError(
-            f'schema_version ({_told(version)}) must be {SCHEMA_VERSION}; the file is of another '
-            'version of this '
-            f'software, or none of its specimens: calibrate again'
+            f'schema_version ({_told(version)}) must be {SCHEMA_VERSION}; the file is of another version of '
+            'this software, or none of its specimens: calibrate again'
         )
 
 

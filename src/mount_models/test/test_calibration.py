@@ -1,4 +1,4 @@
-"""Calibration on the simulated rig: it carries noise as it should; the default specimen meets its targets."""
+"""The simulated rig carries noise as it should; the default specimen meets its targets."""
 
 import math
 
@@ -10,21 +10,15 @@ from mount_models.actuator.reluctance import ReluctanceActuator, force
 from mount_models.calibration import (
     RIG_CURRENTS,
     RIG_GAPS,
-    CalibrationError,
     RigNoise,
-    calibrate,
     measure_actuator,
 )
 from mount_models.closing import ClosingMechanics
-from mount_models.coil.crossing import CrossingError
 from mount_models.coil.gap import (
     crossing_current_from_gap,
-    gap_from_crossing_current,
     inductance_from_gap,
-    rest_gap_from_inductance,
 )
 from mount_models.coil.ripple import RippleCoil, incremental_inductance
-from mount_models.quantity import with_values
 from mount_models.specimen import default_specimen
 
 MAGNET, COIL = ReluctanceActuator(), RippleCoil()
@@ -87,40 +81,3 @@ def test_noise_of_the_rig_is_seeded_and_of_the_stated_size(measured):
     assert np.std(one.inductance / measured.inductance - 1.0) == pytest.approx(0.01, rel=0.05)
     other = measure_actuator(MAGNET, COIL, noise=RigNoise(0.5, 0.01, seed=8))
     assert not (one.force == other.force).any()
-
-
-def test_a_noisy_rig_still_gives_a_usable_specimen(measured):
-    noisy = measure_actuator(MAGNET, COIL, noise=RigNoise(force=0.5, inductance_ratio=0.002, seed=1))
-    specimen = calibrate(noisy, 'noisy')
-    rows, columns = slice(3, 29), slice(5, None)
-    truth = measured.force[rows, columns]
-    estimate = checked_force(specimen.force_law, RIG_CURRENTS[columns], RIG_GAPS[rows, np.newaxis])
-    strong = truth > 20.0
-    assert math.sqrt(np.mean((estimate / truth - 1.0)[strong] ** 2)) <= 0.005
-    gaps = np.linspace(300e-6, 520e-6, 12)
-    at_rest = [incremental_inductance(COIL, MAGNET, 0.2, gap) for gap in gaps]
-    assert rest_gap_from_inductance(specimen.gap_curves, at_rest) == pytest.approx(gaps, abs=4e-6)
-    exact = crossing_current_from_gap(default_specimen().gap_curves, gaps)
-    assert gap_from_crossing_current(specimen.gap_curves, exact) == pytest.approx(gaps, abs=2e-6)
-
-
-def test_another_actuator_gives_another_specimen():
-    magnet = with_values(MAGNET, saturation_polarisation=1.5)
-    specimen = calibrate(measure_actuator(magnet, COIL), 'other', ClosingMechanics(spring_stiffness=1.2e5))
-    assert specimen.spring_stiffness == 1.2e5
-    truth = force(magnet, 2.0, 349e-6)
-    assert checked_force(specimen.force_law, 2.0, 349e-6) == pytest.approx(truth, rel=0.01)
-
-
-def test_a_core_without_crossing_cannot_be_calibrated():
-    solid = with_values(COIL, plate_half_thickness=3.9e-3, conductivity=1e7)
-    with pytest.raises(CrossingError, match='must fall through'):
-        calibrate(measure_actuator(MAGNET, solid), 'solid')
-
-
-def test_a_rest_current_that_was_not_measured_is_refused():
-    late = measure_actuator(MAGNET, COIL, currents=np.linspace(0.3, 3.0, 136))
-    with pytest.raises(
-        CalibrationError, match=r'rest current \(0\.200 A\) must lie within the measured 0\.300'
-    ):
-        calibrate(late, 'late')

@@ -21,7 +21,7 @@ from mount_models.coil.gap import (
     measured_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.coil.gap_fit import fit_gap_curves
+from mount_models.coil.gap_calibration import GapPoint, calibrate_gap_curves
 from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.quantity import with_values
 
@@ -40,26 +40,27 @@ def crossing(gap, coil=COIL):
 
 INDUCTANCES = np.array([at_rest(gap) for gap in GAPS])
 CROSSINGS = np.array([crossing(gap) for gap in GAPS])
-FIT = fit_gap_curves(GAPS, INDUCTANCES, CROSSINGS)
+
+
+def fitted(inductances):
+    """Return the calibration through points without noise."""
+    rows = zip(GAPS.tolist(), inductances, CROSSINGS, strict=True)
+    return calibrate_gap_curves(
+        [GapPoint(f'{gap * 1e6:.0f} um', gap, 20.0, each, 0.0, i20, 0.0, -0.02) for gap, each, i20 in rows]
+    )
+
+
+FIT = fitted(INDUCTANCES)
 CURVES = FIT.curves
 
 
 def test_every_curve_meets_its_measurements_within_a_tenth_of_a_micrometre():
-    assert max(FIT.largest_gap_error.values()) <= 0.1e-6
+    assert max(np.abs(fit.gap_errors).max() for fit in (FIT.inductance, FIT.crossing)) <= 0.1e-6
     between = np.linspace(255e-6, 545e-6, 30)
     from_rest = rest_gap_from_inductance(CURVES, [at_rest(gap) for gap in between])
     from_crossing = gap_from_crossing_current(CURVES, [crossing(gap) for gap in between])
     assert from_rest == pytest.approx(between, abs=0.1e-6)
     assert from_crossing == pytest.approx(between, abs=0.1e-6)
-
-
-def test_cubics_are_kept_where_they_suffice_and_raised_where_not():
-    assert FIT.degree['gap_of_inductance'] == 3
-    assert FIT.degree['crossing_current_of_gap'] == 3
-    assert FIT.degree['gap_of_crossing_current'] == 4
-    generous = fit_gap_curves(GAPS, INDUCTANCES, CROSSINGS, gap_error=0.5e-6)
-    assert set(generous.degree.values()) == {3}
-    assert generous.largest_gap_error['gap_of_crossing_current'] > 0.1e-6
 
 
 @settings(deadline=None)
@@ -133,35 +134,10 @@ def test_measured_inductance_normalises_by_turns_and_area():
     assert math.isnan(rates[1])
 
 
-def test_noisy_measurements_are_smoothed_rather_than_followed():
-    noise = np.random.default_rng(3).standard_normal(GAPS.size)
-    noisy = fit_gap_curves(GAPS, INDUCTANCES * (1.0 + 1e-3 * noise), CROSSINGS)
-    assert noisy.degree['gap_of_inductance'] == 3
-    assert noisy.largest_gap_error['gap_of_inductance'] > 1e-6
-    inside = np.linspace(270e-6, 530e-6, 27)
-    found = rest_gap_from_inductance(noisy.curves, [at_rest(gap) for gap in inside])
-    assert found == pytest.approx(inside, abs=1e-6)
-
-
 def test_an_ambiguous_curve_is_refused():
     at_0_8 = [incremental_inductance(COIL, MAGNET, 0.8, gap) for gap in GAPS]
-    with pytest.raises(GapCurvesRefusedError, match='must be monotone'):
-        fit_gap_curves(GAPS, at_0_8, CROSSINGS)
-
-
-def test_too_few_gaps_are_refused():
-    with pytest.raises(GapCurvesRefusedError, match='at least 8 different air gaps; 5 are given'):
-        fit_gap_curves(GAPS[:5], INDUCTANCES[:5], CROSSINGS[:5])
-
-
-def test_measurements_that_failed_are_refused():
-    with pytest.raises(GapCurvesRefusedError, match='finite'):
-        fit_gap_curves(GAPS, INDUCTANCES, np.where(GAPS > 500e-6, np.nan, CROSSINGS))
-
-
-def test_rows_of_different_length_are_refused():
-    with pytest.raises(GapCurvesRefusedError, match='one length'):
-        fit_gap_curves(GAPS, INDUCTANCES[1:], CROSSINGS)
+    with pytest.raises(GapCurvesRefusedError, match='must rise or fall steadily with the gap'):
+        fitted(at_0_8)
 
 
 def test_curves_that_contradict_their_inverse_are_refused():

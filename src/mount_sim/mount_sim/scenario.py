@@ -7,7 +7,7 @@ from mount_models.quantity import ParameterError, Quantity
 from mount_models.road import Gap, RandomRoad, Sweep
 from mount_sim import excitation
 from mount_sim.excitation import Excitation, Seat
-from mount_sim.recorded import load_signal, resample
+from mount_sim.recorded import RecordedSignal, load_signal, resample
 
 SCENARIO_NAMES = ('motorway', 'bench', 'sweep', 'recorded')
 STEP_TIME = 5e-5  # s, chosen: step of the plant, 20 in each sample
@@ -88,6 +88,11 @@ class IdleForce(NamedTuple):
     ] = 0.4
 
 
+AccelerationScale = Annotated[
+    float, Quantity('1', 'factor to m/s^2 upwards; -1 for an axis that points down', -1e4, 1e4, 'chosen')
+]
+
+
 class RecordedScenario(NamedTuple):
     """A recorded vertical acceleration of the chassis, upwards."""
 
@@ -95,9 +100,7 @@ class RecordedScenario(NamedTuple):
     column: str = ''
     time_column: str = ''
     topic: str = ''
-    scale: Annotated[
-        float, Quantity('1', 'factor to m/s^2 upwards; -1 for an axis that points down', -1e4, 1e4, 'chosen')
-    ] = 1.0
+    scale: AccelerationScale = 1.0
 
 
 _DEFAULT_DURATION = 15.0  # s, chosen
@@ -145,6 +148,16 @@ def build_excitation(scenarios: Scenarios) -> Excitation:
         idle.amplitude, idle.frequency, idle.second_share, len(shaken.values), shaken.step_time
     )
     return replace(shaken, engine_forces=forces)
+
+
+def recorded_signal(recorded: RecordedScenario) -> RecordedSignal:
+    """Return the signal as it was recorded, not yet scaled; raises what `load_signal` raises."""
+    return load_signal(
+        recorded.file,
+        column=recorded.column,
+        time_column=recorded.time_column,
+        topic=recorded.topic,
+    )
 
 
 def _scenario(scenarios: Scenarios) -> Excitation:
@@ -207,12 +220,7 @@ def _recorded(scenarios: Scenarios) -> Excitation:
     timeline, recorded = scenarios.timeline, scenarios.recorded
     if not recorded.file:
         raise ParameterError('scenario recorded needs a file: CSV, NPY or MCAP (recorded.file, or --file)')
-    signal = load_signal(
-        recorded.file,
-        column=recorded.column,
-        time_column=recorded.time_column,
-        topic=recorded.topic,
-    )
+    signal = recorded_signal(recorded)
     values = recorded.scale * resample(signal, STEP_TIME)
     if timeline.duration:
         available = len(values) * STEP_TIME

@@ -21,8 +21,10 @@ class Run:
 
 
 class Ahead(NamedTuple):
-    """What the next n samples are made of: the plant, excitation and force on the engine, both (n, steps),
-    whether the coil's driver is open, and numbers for the noise (n, 4).
+    """What the next n samples are made of.
+
+    The plant, excitation and force on the engine, both (n, steps), whether the coil's driver is open, and
+    numbers for the noise (n, 4).
     """
 
     memory: Memory

@@ -1,5 +1,4 @@
-"""Fig. 3: how far the ripple's field enters the iron at different mean currents, in one and in two "
-"dimensions."""
+"""Fig. 3: how far the ripple's field enters the iron at different currents, in one and in two dimensions."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -192,8 +191,7 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
             'The ripples move the field only near the surface of the iron; it enters at a rate in the '
             'region of um per us.',
             f'At {currents[0]:g} A the field has come {1e6 * results["characteristic_depth_m"][0]:.0f} um '
-            'in 18 us, '
-            f'{rate:.1f} um per us on average; conductivity and plates are chosen.',
+            f'in 18 us, {rate:.1f} um per us on average; conductivity and plates are chosen.',
             Holds.YES if 0.1 < rate < 10.0 else Holds.NO,
         ),
         Statement(
@@ -202,17 +200,16 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
             'permeability.',
             'The depth that would hold the whole change at its surface value grows from '
             f'{1e6 * depth[0]:.0f} um at {currents[0]:g} A to {1e6 * depth[-1]:.0f} um at {currents[-1]:g} '
-            'A in one '
-            f'dimension, from {1e6 * other[0]:.0f} to {1e6 * other[-1]:.0f} um with finite elements.',
+            f'A in one dimension, from {1e6 * other[0]:.0f} to {1e6 * other[-1]:.0f} um with finite '
+            'elements.',
             Holds.YES if rising and depth[-1] > 3.0 * depth[0] else Holds.NO,
         ),
         Statement(
             'Fig. 3',
             'The authors computed the field by finite elements.',
             'Here by finite elements in the plane of one plate with gap, air and winding, as a check of the '
-            'one-dimensional diffusion that the simulated coil uses. Equivalent depth against one '
-            'dimension, in '
-            f'the middle of the plate: {_told(currents, middle)}; averaged along the plate: '
+            'one-dimensional diffusion that the simulated coil uses. Equivalent depth against one dimension, '
+            f'in the middle of the plate: {_told(currents, middle)}; averaged along the plate: '
             f'{_told(currents, along)}. Geometry of core and winding are chosen, so the pictures cannot be '
             'laid '
             "over the authors'.",
@@ -234,11 +231,10 @@ EXPERIMENT = Experiment(
     reference='Fig. 3',
     summary=(
         'Lines: diffusion into a plate in one dimension with the permeability of the mean current, in the '
-        'periodic '
-        'state of the switched bridge. Dots: the same from a finite-element computation in two dimensions '
-        '(scikit-fem, mesh of this project): nonlinear steady field of one plate with its air gap, then '
-        'the alternating field about it with eddy currents. Both are driven with the same mean flux in the '
-        'middle of the plate.'
+        'periodic state of the switched bridge. Dots: the same from a finite-element computation in two '
+        'dimensions (scikit-fem, mesh of this project): nonlinear steady field of one plate with its air '
+        'gap, then the alternating field about it with eddy currents. Both are driven with the same mean '
+        'flux in the middle of the plate.'
     ),
     defaults=PenetrationParameters(),
     run=run,

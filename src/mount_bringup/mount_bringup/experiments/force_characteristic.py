@@ -138,22 +138,19 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
         Statement(
             'Sec. 3.1, Eqs (3), (4)',
             'One nonlinear function with 18 parameters replaces the large lookup table.',
-            f'Fitted to other gaps than most of these, it meets the true force within '
-            f'{100 * results["law_relative_rms"]:.2f} % rms and {100 * results["law_relative_worst"]:.1f} '
-            '% at worst '
-            f'above {_WEIGHED:g} N ({results["law_rms_error_n"]:.2f} N rms, '
-            f'{results["law_largest_error_n"]:.1f} N at '
-            'worst, from 0.1 A on).',
+            'Fitted to other gaps than most of these, it meets the true force within '
+            f'{100 * results["law_relative_rms"]:.2f} % rms and {100 * results["law_relative_worst"]:.1f} % '
+            f'at worst above {_WEIGHED:g} N ({results["law_rms_error_n"]:.2f} N rms, '
+            f'{results["law_largest_error_n"]:.1f} N at worst, from 0.1 A on).',
             Holds.YES if results['law_relative_rms'] < 0.01 else Holds.NO,
         ),
         Statement(
             'Table 1',
             'Its 18 numbers describe the force of the prototype.',
             'The simulated actuator was fitted to Table 1 and differs from it by '
-            f'{results["table_1_rms_error_n"]:.1f} N '
-            f'rms and {results["table_1_largest_error_n"]:.0f} N at worst (300 .. 492 um): no single '
-            'magnetisation '
-            'curve bends as sharply. So the controller uses the law fitted to the actuator it drives.',
+            f'{results["table_1_rms_error_n"]:.1f} N rms and {results["table_1_largest_error_n"]:.0f} N at '
+            'worst (300 .. 492 um): no single magnetisation curve bends as sharply. So the controller uses '
+            'the law fitted to the actuator it drives.',
             Holds.NOT_COMPARABLE,
         ),
     ]
@@ -188,10 +185,9 @@ EXPERIMENT = Experiment(
     reference='Fig. 2',
     summary=(
         'The gap of the simulated actuator is held, the current stepped, the force measured with a noisy '
-        'load '
-        'cell (dots). Solid lines are the law of the shipped specimen, Eqs (3), (4) fitted to a '
-        'calibration at 10 um '
-        'steps without noise; dashed ones are Table 1. Errors are taken against the force without noise.'
+        'load cell (dots). Solid lines are the law of the shipped specimen, Eqs (3), (4) fitted to a '
+        'calibration at 10 um steps without noise; dashed ones are Table 1. Errors are taken against the '
+        'force without noise.'
     ),
     defaults=ForceParameters(),
     run=run,

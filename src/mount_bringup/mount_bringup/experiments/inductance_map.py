@@ -1,5 +1,4 @@
-"""Fig. 4: incremental inductance over current at held gaps, on the assembled actuator, and its two "
-"sections."""
+"""Fig. 4: incremental inductance over current, at held gaps and on the assembled actuator; its sections."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -254,18 +253,17 @@ def _statements(results: dict[str, Any], parameters: InductanceParameters) -> li
             'each, the '
             f"specimen's polynomials give the held gaps within {1e6 * rest:.1f} um at 0.2 A and "
             f'{1e6 * level:.2f} um at 20 mH. That a crossing at 20 mH exists is due to the chosen core '
-            'plates '
-            'and conductivity.',
+            'plates and conductivity.',
             Holds.YES if unique_at_rest and max(rest, level) < 5e-6 else Holds.PARTLY,
         ),
         Statement(
             'Fig. 4, left',
             'On the assembled damper the ramp shows 492 um at low current and 349 um when the pads touch.',
             f'The recorded ramp gives {1e6 * at_rest:.1f} um at 0.2 A (true: {1e6 * true_rest:.1f}) and '
-            f'{1e6 * at_crossing:.1f} um at 20 mH. There the pads are already compressed; carried back to no '
-            f'load the initialisation finds {1e6 * found["contact_gap"]:.1f} um (true: '
-            f'{1e6 * true_contact:.1f}). '
-            'Both gaps were put into the simulated actuator; what is shown is that they are found.',
+            f'{1e6 * at_crossing:.1f} um at 20 mH. There the pads are already compressed; carried back to '
+            f'no load the initialisation finds {1e6 * found["contact_gap"]:.1f} um (true: '
+            f'{1e6 * true_contact:.1f}). Both gaps were put into the simulated actuator; what is shown is '
+            'that they are found.',
             Holds.YES
             if abs(at_rest - true_rest) < 4e-6 and abs(found['contact_gap'] - true_contact) < 2e-6
             else Holds.NO,
@@ -275,8 +273,7 @@ def _statements(results: dict[str, Any], parameters: InductanceParameters) -> li
             'From the difference of both gaps (printed: 153 um) follows an offset current that presses '
             'the pads lightly against the rod.',
             f'492 - 349 is 143. Here the halves go {1e6 * (found["rest_gap"] - found["contact_gap"]):.0f} '
-            'um from '
-            f'0 A to contact, which takes {found["contact_force"]:.1f} N; the offset current is '
+            f'um from 0 A to contact, which takes {found["contact_force"]:.1f} N; the offset current is '
             f'{found["offset_current"]:.3f} A, for 2 N of light pressure.',
             Holds.YES,
         ),
@@ -293,11 +290,9 @@ EXPERIMENT = Experiment(
     reference='Fig. 4',
     summary=(
         'Thin lines: the gap of the simulated actuator is held on the rig and the current stepped; each '
-        'point '
-        'averages 50 ripples. Thick line: the current ramp of the initialisation on the assembled '
-        'actuator, from '
-        'a recording of `coil_ripple` (1 kHz, one ripple each, averaged in bins of 40 mA). Right: the two '
-        'sections '
+        'point averages 50 ripples. Thick line: the current ramp of the initialisation on the assembled '
+        'actuator, from a recording of `coil_ripple` (1 kHz, one ripple each, averaged in bins of 40 mA). '
+        'Right: the two sections '
         "with the specimen's polynomials, and where the ramp lies on them."
     ),
     defaults=InductanceParameters(),

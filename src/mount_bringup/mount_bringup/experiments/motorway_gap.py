@@ -180,16 +180,14 @@ def _on_switching_on(figures: dict[str, Any]) -> Statement:
 
 
 def _on_effect(figures: dict[str, Any]) -> Statement:
-    shares = {gap: _share(found, OFF) for gap, found in figures['gaps'].items()}
-    known = [share < _CLEAR for share in shares.values() if share is not None]
-    told = ', '.join(f'{gap}: {_number(share)}' for gap, share in shares.items())
+    known, told = _shares(figures, OFF)
     return Statement(
         'Fig. 15',
         'A significant effect of damping can be seen.',
         f'Rms of the displacement from {_WINDOW[0]:g} to {_WINDOW[1]:g} s behind that moment over that '
         f'of the same mount without current, by depth of the gap, {told}; counted as significant below '
         f'{_CLEAR:g} (chosen). The first peak comes before damping and is the same.',
-        _verdict(known),
+        _verdict([share < _CLEAR for share in known]),
     )
 
 
@@ -221,11 +219,9 @@ def _delays(delays: dict[str, float | None]) -> str:
 
 
 def _on_hydro(figures: dict[str, Any]) -> Statement:
-    shares = {gap: _share(found, HYDRO) for gap, found in figures['gaps'].items()}
+    known, told = _shares(figures, HYDRO)
     peaks = {gap: found['peak_m'] for gap, found in figures['gaps'].items() if found['peak_m']}
-    known = [share for share in shares.values() if share is not None]
     clear, less = _verdict([share < _CLEAR for share in known]), any(share < 1.0 for share in known)
-    told = ', '.join(f'{gap}: {_number(share)}' for gap, share in shares.items())
     first = ', '.join(f'{gap}: {p[FRICTION] / p[HYDRO]:.2f}' for gap, p in peaks.items())
     return Statement(
         'Sec. 7',
@@ -237,8 +233,14 @@ def _on_hydro(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _share(found: dict[str, Any], other: str) -> float | None:
-    return found['rms_m'][FRICTION] / found['rms_m'][other] if found['rms_m'] else None
+def _shares(figures: dict[str, Any], other: str) -> tuple[list[float], str]:
+    """Return the rms over that of the `other` mount where it is known, and all of it told by gap."""
+    shares = {
+        gap: found['rms_m'][FRICTION] / found['rms_m'][other] if found['rms_m'] else None
+        for gap, found in figures['gaps'].items()
+    }
+    told = ', '.join(f'{gap}: {_number(share)}' for gap, share in shares.items())
+    return [share for share in shares.values() if share is not None], told
 
 
 def _verdict(answers: list[bool]) -> Holds:

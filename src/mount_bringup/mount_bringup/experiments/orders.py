@@ -1,5 +1,4 @@
-"""From names and options to orders, all checked before the first experiment runs; and through them one by "
-"one."""
+"""From names and options to orders, all checked before the first experiment runs; then one by one."""
 
 from pathlib import Path
 from typing import Any
@@ -21,8 +20,7 @@ def orders(experiments: list[Experiment], options: list[str], out: Path | None, 
             if not experiment.closed_loop:
                 raise ExperimentError(
                     f'{experiment.name} has no graph to run through: neither controller nor CAN bus take '
-                    'part in '
-                    f'it; leave out --graph'
+                    'part in it; leave out --graph'
                 )
     known: dict[str, dict[str, Any]] = {}
     for experiment in experiments:

@@ -29,21 +29,18 @@ from mount_ros.topics import (
     Delivery,
 )
 from mount_sim.electronics import STATUS_EVERY
+from mount_sim.rack_friction import RackRecording
 
 FloatArray = npt.NDArray[np.float64]
 
+SUBSTEPS = 10
+"""Steps of the simulation in each sample of an experiment's rack (chosen): 0.1 ms."""
 _SAMPLE_NANOSECONDS = round(1e9 / SAMPLE_RATE)
 _TOPICS = (SESSION, DISPLACEMENT, SIM_MOUNT_FORCE, SIM_CLAMP_FORCE)
 
 
-def record_friction_rack(
-    folder: Path,
-    displacement: FloatArray,
-    friction_force: FloatArray,
-    normal_force: FloatArray,
-    session: Mapping[str, Any],
-) -> Path:
-    """Write what the friction rack measured at 1 kHz and return the recording; arrays (n,), m and N.
+def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping[str, Any]) -> Path:
+    """Write what the friction rack measured at 1 kHz and return the recording.
 
     The rack has no elastomer, so its `sim/mount_force` is the friction force alone. `session` says what was
     done; times and versions are added.
@@ -56,7 +53,8 @@ def record_friction_rack(
         writer.write(f'/{SESSION.name}', _session(session), begin)
         positions = ScalarsLayout(DISPLACEMENT)
         forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
-        rows = zip(displacement.tolist(), friction_force.tolist(), normal_force.tolist(), strict=True)
+        channels = measured.displacement, measured.friction_force, measured.normal_force
+        rows = zip(*(channel.tolist() for channel in channels), strict=True)
         for sample, (x, friction, clamp) in enumerate(rows):
             stamp = sample * _SAMPLE_NANOSECONDS
             at = begin + stamp

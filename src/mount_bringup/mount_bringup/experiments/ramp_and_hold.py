@@ -1,13 +1,10 @@
 """Fig. 7: the sticking contact is pulled by a ramp and held; its relaxation gives the linear parameters."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from mount_bags.reading import open_recording
 from mount_bringup.experiments.contract import (
     Experiment,
     Holds,
@@ -18,14 +15,18 @@ from mount_bringup.experiments.contract import (
     parameters_of,
 )
 from mount_bringup.experiments.drawing import BLUE, GREY, RED, finish, new_figure
-from mount_bringup.experiments.friction_rack import FloatArray, move
-from mount_bringup.experiments.rack_recording import record_friction_rack
-from mount_bringup.experiments.sawtooth_evaluation import RackRecording, read_rack
+from mount_bringup.experiments.rack_recording import SUBSTEPS, record_friction_rack
+from mount_bringup.friction_files import read_recording
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
+from mount_models.friction.identification.ramp_hold import contact_of_response, printed_formulas
+from mount_models.friction.identification.recording import FloatArray, FrictionRecording
+from mount_models.friction.identification.relaxation import Relaxation, fit_relaxation
 from mount_models.quantity import Quantity, flattened
+from mount_sim.rack_friction import move, with_noise
 
 NAME = 'ramp_and_hold'
+_NAMES = {'contact_stiffness': 'c_Re', 'tangential_stiffness': 'c_R', 'tangential_damping': 'd_R'}
 
 
 class RampParameters(NamedTuple):
@@ -54,25 +55,12 @@ class RampParameters(NamedTuple):
     contact: FrictionContact = FrictionContact()
 
 
-@dataclass(frozen=True)
-class Relaxation:
-    """x(t) = asymptote - amplitude exp(-t/T), t from the start of the ramp."""
-
-    asymptote: float
-    amplitude: float
-    time_constant: float
-
-    def at(self, time: FloatArray) -> FloatArray:
-        """Return the displacement (m) at `time` (s)."""
-        return self.asymptote - self.amplitude * np.exp(-time / self.time_constant)
-
-
 def run(order: Order, progress: Progress) -> Outcome:
     """Pull the sticking pads, record it, and take the linear parameters from the recording."""
     parameters = parameters_of(order, NAME, RampParameters())
     progress(0.1, 'ramp and hold')
     recording = _record(order, parameters)
-    rack = read_rack(open_recording(recording))
+    rack = read_recording(recording)
     progress(0.7, 'evaluation')
     time = rack.time - parameters.rest_time
     relaxation = fit_relaxation(time, rack.displacement, parameters.fit_from)
@@ -81,57 +69,20 @@ def run(order: Order, progress: Progress) -> Outcome:
     return Outcome(results, [picture], [recording], _statements(results, parameters))
 
 
-def fit_relaxation(time: FloatArray, displacement: FloatArray, fit_from: float) -> Relaxation:
-    """Return the relaxation that meets `displacement` (m) best from `fit_from` (s) on."""
-    shown = time >= fit_from
-    t, x = time[shown], displacement[shown]
-    scale = abs(x[-1])
-
-    def error(unknown: FloatArray) -> FloatArray:
-        return np.asarray(unknown[0] - unknown[1] * np.exp(-t / unknown[2]) - x / scale, np.float64)
-
-    found = least_squares(error, (1.0, 0.2, 0.2 * t[-1]), bounds=((-10, -10, 1e-3), (10, 10, 100))).x
-    return Relaxation(float(found[0]) * scale, float(found[1]) * scale, float(found[2]))
-
-
-def linear_parameters(
-    joint_stiffness: float, motor_stiffness: float, lead: float, time_constant: float
-) -> dict[str, float]:
-    """Return c_Re, c_R, d_R from c_xi = F/x at the end, p, T_v/T and T, Eq (11) in its right form (derived).
-
-    With p in series, x(t) = X p/(p + c_xi) [1 - (1 - T_v/T) exp(-t/T)] after a step, T_v = d_R/(c_Re + c_R),
-    T = d_R/(c_R + p c_Re/(p + c_Re)); `lead` is T_v/T.
-    """
-    c_re = (motor_stiffness + joint_stiffness) / lead - motor_stiffness
-    c_r = joint_stiffness * c_re / (c_re - joint_stiffness)
-    d_r = time_constant * (c_r + motor_stiffness * c_re / (motor_stiffness + c_re))
-    return {'contact_stiffness': c_re, 'tangential_stiffness': c_r, 'tangential_damping': d_r}
-
-
-def printed_parameters(
-    joint_stiffness: float, motor_stiffness: float, k: float, time_constant: float
-) -> dict[str, float]:
-    """Return c_Re, c_R, d_R as Eq (11) stands in print, with k the first force over the last."""
-    c_re = k * joint_stiffness * motor_stiffness / (motor_stiffness - k * joint_stiffness)
-    c_r = joint_stiffness * c_re / (c_re - joint_stiffness)
-    return {'contact_stiffness': c_re, 'tangential_stiffness': c_r, 'tangential_damping': c_r * time_constant}
-
-
 def _record(order: Order, parameters: RampParameters) -> Path:
     corners = np.cumsum([0.0, parameters.rest_time, parameters.ramp_time, parameters.hold_time])
-    samples = move(
+    rack = move(
         parameters.contact,
         parameters.friction,
         corners,
         [0.0, 0.0, parameters.way, parameters.way],
         parameters.normal_force,
-        motor_stiffness=parameters.motor_stiffness,
-        force_noise=parameters.force_noise,
-        displacement_noise=parameters.displacement_noise,
-        seed=parameters.seed,
+        machine_stiffness=parameters.motor_stiffness,
+        substeps=SUBSTEPS,
     )
+    measured = with_noise(rack, parameters.force_noise, parameters.displacement_noise, parameters.seed)
     session = {'scenario': NAME, 'mode': 'rack', 'parameters': {NAME: flattened(parameters)}}
-    return record_friction_rack(order.out / NAME, *samples, session)
+    return record_friction_rack(order.out / NAME, measured, session)
 
 
 def _wanted(time: FloatArray, parameters: RampParameters) -> FloatArray:
@@ -140,22 +91,19 @@ def _wanted(time: FloatArray, parameters: RampParameters) -> FloatArray:
 
 
 def _figures(
-    rack: RackRecording, time: FloatArray, relaxation: Relaxation, parameters: RampParameters
+    rack: FrictionRecording, time: FloatArray, relaxation: Relaxation, parameters: RampParameters
 ) -> dict[str, Any]:
     held = time > 0.0
     yielding = _wanted(time, parameters) - rack.displacement
-    final_force = float(np.mean(rack.friction_force[time > time[-1] - 1.0]))
-    p = float(np.polyfit(yielding[held], rack.friction_force[held], 1)[0])
+    final_force = float(np.mean(rack.force[time > time[-1] - 1.0]))
+    p = float(np.polyfit(yielding[held], rack.force[held], 1)[0])
     whole = fit_relaxation(time, rack.displacement, parameters.ramp_time)
-    first_force = float(np.max(rack.friction_force[held]))
+    first_force = float(np.max(rack.force[held]))
     readings = {
         'parameters': _of_relaxation(relaxation, final_force, p, parameters.ramp_time),
         'parameters_without_ramp_correction': _of_relaxation(relaxation, final_force, p, 0.0),
         'parameters_fitted_from_end_of_ramp': _of_relaxation(whole, final_force, p, parameters.ramp_time),
-        # with p in series, the force over the wanted displacement: so read, the first formula is right
-        'parameters_as_printed': printed_parameters(
-            final_force / parameters.way, p, first_force / final_force, relaxation.time_constant
-        ),
+        'parameters_as_printed': _as_printed(relaxation, final_force, first_force, p, parameters.way),
     }
     true = {name: float(getattr(parameters.contact, name)) for name in readings['parameters']}
     errors = {
@@ -189,17 +137,28 @@ def _figures(
 def _of_relaxation(
     relaxation: Relaxation, final_force: float, motor_stiffness: float, ramp_time: float
 ) -> dict[str, float]:
-    """Return c_Re, c_R, d_R; a ramp leaves a larger amplitude than the step that Eq (10) is about."""
-    share = relaxation.amplitude / relaxation.asymptote
-    if ramp_time > 0.0:
-        ratio = ramp_time / relaxation.time_constant
-        share *= ratio / np.expm1(ratio)
     joint = final_force / relaxation.asymptote
-    return linear_parameters(joint, motor_stiffness, 1.0 - share, relaxation.time_constant)
+    found = contact_of_response(joint, motor_stiffness, relaxation.kappa(ramp_time), relaxation.time_constant)
+    return {name: getattr(found, name) for name in _NAMES}
+
+
+def _as_printed(
+    relaxation: Relaxation, final_force: float, first_force: float, motor_stiffness: float, way: float
+) -> dict[str, float]:
+    """Return c_Re, c_R, d_R as printed, c_xi being the force over the wanted displacement in all three.
+
+    So read, with p in series, the first formula is right.
+    """
+    lag = relaxation.time_constant
+    printed = printed_formulas(
+        final_force / relaxation.asymptote, final_force / way, motor_stiffness, first_force / final_force, lag
+    )
+    c_r = printed.tangential_stiffness_with_p
+    return dict(zip(_NAMES, (printed.contact_stiffness, c_r, c_r * lag), strict=True))
 
 
 def _draw(
-    rack: RackRecording,
+    rack: FrictionRecording,
     time: FloatArray,
     relaxation: Relaxation,
     results: dict[str, Any],
@@ -208,7 +167,7 @@ def _draw(
 ) -> Path:
     figure = new_figure('Ramp and hold in microslip: step one of the identification (Fig. 7)', 4.2)
     left, middle, right = figure.subplots(1, 3)
-    x, force = 1e6 * rack.displacement, rack.friction_force
+    x, force = 1e6 * rack.displacement, rack.force
     left.plot(x, force, color=BLUE, linewidth=0.8, label='recorded')
     reach = np.array([0.0, x[-1]])
     stiffness = results['joint_stiffness_n_per_m']
@@ -252,8 +211,7 @@ def _statements(results: dict[str, Any], parameters: RampParameters) -> list[Sta
             'Sec. 4',
             'The whole test stays in microslip: nothing slides.',
             f'The force peaks at {results["highest_force_n"]:.1f} N; at {parameters.normal_force:g} N '
-            'normal force '
-            f'the pads break away at {results["breakaway_force_n"]:.1f} N (positive direction).',
+            f'normal force the pads break away at {results["breakaway_force_n"]:.1f} N (positive direction).',
             Holds.YES if microslip else Holds.NO,
         ),
         Statement(
@@ -276,20 +234,18 @@ def _statements(results: dict[str, Any], parameters: RampParameters) -> list[Sta
         Statement(
             'Eq (11) as printed',
             'The same three formulas, taken literally.',
-            'With k as first over last force and c_xi as force over the wanted displacement, which makes the '
-            f'first formula right but for the ramp: {_told(printed)}. The second is right only with c_xi '
-            'over '
-            'the measured displacement, where the first is wrong; the third forgets p: with the right c_R '
-            f'it gives d_R {100 * results["damping_error_as_printed"]:+.1f} %. No reading makes all three '
-            'right.',
+            'With k as first over last force and c_xi as force over the wanted displacement, which makes '
+            f'the first formula right but for the ramp: {_told(printed)}. The second is right only with '
+            'c_xi over the measured displacement, where the first is wrong; the third forgets p: with the '
+            f'right c_R it gives d_R {100 * results["damping_error_as_printed"]:+.1f} %. No reading makes '
+            'all three right.',
             Holds.NO if max(abs(error) for error in printed.values()) > 0.05 else Holds.YES,
         ),
     ]
 
 
 def _told(errors: dict[str, float]) -> str:
-    names = {'contact_stiffness': 'c_Re', 'tangential_stiffness': 'c_R', 'tangential_damping': 'd_R'}
-    return ', '.join(f'{names[name]} {100 * error:+.1f} %' for name, error in errors.items())
+    return ', '.join(f'{_NAMES[name]} {100 * error:+.1f} %' for name, error in errors.items())
 
 
 EXPERIMENT = Experiment(
@@ -300,8 +256,8 @@ EXPERIMENT = Experiment(
         'The motor of the rack, a spring p in series with the pads, pulls them by a short ramp and holds. '
         'Nothing slides; the parallel pair of spring and damper relaxes. The joint stiffness comes from the '
         'last second, p from the force over what the motor gives way, T and the amplitude from an '
-        'exponential '
-        'fitted to the displacement. Normal force, p and ramp are chosen: the paper gives none of them.'
+        'exponential fitted to the displacement. Normal force, p and ramp are chosen: the paper gives none '
+        'of them.'
     ),
     defaults=RampParameters(),
     run=run,

@@ -24,7 +24,7 @@ from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity, with_flattened
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.recorded import RecordedSignal, load_signal
+from mount_sim.scenario import AccelerationScale, RecordedScenario, recorded_signal
 
 NAME = 'recorded_drive'
 FRICTION, HYDRO, ELASTOMER = 'friction mount', 'hydromount', 'elastomer alone'
@@ -44,9 +44,7 @@ class RecordedDriveParameters(NamedTuple):
     column: str = ''
     time_column: str = ''
     topic: str = ''
-    scale: Annotated[
-        float, Quantity('1', 'factor to m/s^2 upwards; -1 for an axis that points down', -1e4, 1e4)
-    ] = 1.0
+    scale: AccelerationScale = 1.0
     duration: Annotated[float, Quantity('s', 'so much from its beginning; 0: all of it', 0.0, 3600.0)] = 0.0
     damper: str = DEFAULT_DAMPER
 
@@ -81,7 +79,7 @@ def run(order: Order, progress: Progress) -> Outcome:
             'or 0 for all of the recording'
         )
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
-    rate = _recorded(parameters).rate  # refuses what cannot be read
+    rate = recorded_signal(_scenario(parameters)).rate  # refuses what cannot be read
     control = with_flattened(ControlParameters(), order.settings.get('mount_control', {}))
     rides = {}
     for number, (name, mount) in enumerate(_MOUNTS.items()):
@@ -154,13 +152,8 @@ def _density(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return frequency, density
 
 
-def _recorded(parameters: RecordedDriveParameters) -> RecordedSignal:
-    return load_signal(
-        parameters.file,
-        column=parameters.column,
-        time_column=parameters.time_column,
-        topic=parameters.topic,
-    )
+def _scenario(parameters: RecordedDriveParameters) -> RecordedScenario:
+    return RecordedScenario(*(getattr(parameters, name) for name in RecordedScenario._fields))
 
 
 def _own(parameters: RecordedDriveParameters, mount: str) -> dict[str, dict[str, Any]]:
@@ -169,11 +162,8 @@ def _own(parameters: RecordedDriveParameters, mount: str) -> dict[str, dict[str,
             'scenario': 'recorded',
             'mount': mount,
             'timeline.duration': parameters.duration,
+            **{f'recorded.{name}': value for name, value in _scenario(parameters)._asdict().items()},
             'recorded.file': str(Path(parameters.file).absolute()),
-            'recorded.column': parameters.column,
-            'recorded.time_column': parameters.time_column,
-            'recorded.topic': parameters.topic,
-            'recorded.scale': parameters.scale,
         },
         'mount_control': {'damper': parameters.damper},
     }

@@ -20,7 +20,7 @@ _BEFORE, _AFTER = 1.0, 4.0  # s round the largest displacement
 
 def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
     """Draw displacement and chassis-side force of all mounts over frequency, the bands behind them."""
-    from mount_bringup.experiments.recorded_drive import BANDS, ELASTOMER, FRICTION, HYDRO
+    from mount_bringup.experiments.recorded_drive import BANDS
 
     figure = new_figure('A recorded drive: displacement of the mount and its force on the chassis', 7.5)
     panels = figure.subplots(2, 1, sharex=True)
@@ -28,11 +28,7 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
         (panels[0], 'displacement', 1e6, 'displacement (um/$\\sqrt{\\mathrm{Hz}}$)'),
         (panels[1], 'force', 1.0, 'force on the chassis (N/$\\sqrt{\\mathrm{Hz}}$)'),
     ):
-        for mount, colour, dash, width in (
-            (ELASTOMER, GREY, ':', 1.6),
-            (HYDRO, RED, '--', 1.4),
-            (FRICTION, BLUE, '-', 1.4),
-        ):
+        for (mount, colour, dash), width in zip(_styles(), (1.6, 1.4, 1.4), strict=True):
             each = spectra[mount]
             shown = (each.frequency >= _LOWEST) & (each.frequency <= _HIGHEST)
             values = scale * getattr(each, name)[shown]
@@ -53,7 +49,7 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
 
 def draw_traces(rides: dict[str, Ride], control: ControlParameters, file: Path) -> Path:
     """Draw the whole drive above, the seconds round its largest displacement below."""
-    from mount_bringup.experiments.recorded_drive import ELASTOMER, FRICTION, HYDRO
+    from mount_bringup.experiments.recorded_drive import FRICTION
 
     friction = rides[FRICTION]
     seen = friction.seen
@@ -62,11 +58,7 @@ def draw_traces(rides: dict[str, Ride], control: ControlParameters, file: Path) 
     upper, lower = figure.subplots(2, 1)
     upper.plot(friction.time, 1e3 * friction.displacement, color=BLUE, linewidth=0.6, label=FRICTION)
     begin, end = max(0.0, middle - _BEFORE), middle + _AFTER
-    for name, colour, dash, width in (
-        (ELASTOMER, GREY, ':', 1.4),
-        (HYDRO, RED, '--', 1.2),
-        (FRICTION, BLUE, '-', 1.8),
-    ):
+    for (name, colour, dash), width in zip(_styles(), (1.4, 1.2, 1.8), strict=True):
         each = rides[name]
         shown = (each.time >= begin) & (each.time <= end)
         lower.plot(
@@ -92,3 +84,10 @@ def draw_traces(rides: dict[str, Ride], control: ControlParameters, file: Path) 
     upper.set_xlim(0.0, float(friction.time[-1]))
     lower.set_xlim(begin, end)
     return finish(figure, file)
+
+
+def _styles() -> list[tuple[str, str, str]]:
+    """Return mount, colour and dash, the one that lies on top last."""
+    from mount_bringup.experiments.recorded_drive import ELASTOMER, FRICTION, HYDRO
+
+    return [(ELASTOMER, GREY, ':'), (HYDRO, RED, '--'), (FRICTION, BLUE, '-')]

@@ -1,28 +1,24 @@
 """Pictures of the saw tooth, Figs. 8 to 11."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from mount_bringup.experiments.drawing import BLUE, GREY, RED, family, finish, new_figure
+from mount_bringup.experiments.sawtooth_evaluation import Run
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
-
-if TYPE_CHECKING:
-    from mount_bringup.experiments.sawtooth import Run
+from mount_models.friction.identification.sawtooth import StrokeLine
 
 
 def draw_time(run: Run, file: Path) -> Path:
     """Draw force and deflection u over time, Fig. 8."""
     figure = new_figure(f'Saw tooth at {run.strokes[0].normal_force:g} N: force and deflection (Fig. 8)')
     upper, lower = figure.subplots(2, 1, sharex=True)
-    force = run.rack.friction_force
-    upper.plot(run.rack.time, force, color=BLUE, linewidth=0.6)
+    force = run.recording.force
+    upper.plot(run.recording.time, force, color=BLUE, linewidth=0.6)
     upper.set_ylabel('friction force (N)')
-    lower.plot(run.rack.time, 1e6 * np.sign(force) * run.deflection, color=RED, linewidth=0.8)
+    lower.plot(run.recording.time, 1e6 * np.sign(force) * run.deflection, color=RED, linewidth=0.8)
     lower.set_ylabel('deflection u (um)')
     lower.set_xlabel('time (s)')
     return finish(figure, file)
@@ -35,17 +31,11 @@ def draw_lines(run: Run, file: Path) -> Path:
     for axes, direction in zip(figure.subplots(1, 2), (1.0, -1.0), strict=True):
         chosen = [stroke for stroke in run.strokes if stroke.velocity * direction > 0.0]
         for stroke, colour in zip(chosen, family(len(chosen)), strict=True):
-            force, xi = run.rack.friction_force[stroke.samples], run.deflection[stroke.samples]
-            u = np.sign(force) * xi
-            step = max(u.size // 150, 1)
-            axes.plot(
-                1e6 * u[::step], np.abs(force[::step]) / load, '.', color=colour, markersize=2, alpha=0.6
-            )
-            ends = np.array([u.min(), u.max()])
-            label = f'{1e3 * abs(stroke.velocity):.3g} mm/s'
-            axes.plot(
-                1e6 * ends, stroke.offset + stroke.slope * ends, color=colour, linewidth=1.5, label=label
-            )
+            step = max(stroke.u.size // 150, 1)
+            axes.plot(1e6 * stroke.u[::step], stroke.mu[::step], '.', color=colour, markersize=2, alpha=0.6)
+            ends = np.array([stroke.u.min(), stroke.u.max()])
+            label = f'{1e3 * _speed(stroke):.3g} mm/s'
+            axes.plot(1e6 * ends, stroke.a + stroke.b * ends, color=colour, linewidth=1.5, label=label)
         axes.set_title('positive direction' if direction > 0.0 else 'negative direction', fontsize='medium')
         axes.set_xlabel('deflection u (um)')
         axes.set_ylabel('coefficient of both pads, mu_dyn (1)')
@@ -65,8 +55,8 @@ def draw_parameters(runs: list[Run], coefs: FrictionCoefficients, file: Path) ->
     for run, colour in zip(runs, family(len(runs)), strict=True):
         load = run.strokes[0].normal_force
         found = 1e3 * np.array([stroke.velocity for stroke in run.strokes])
-        left.plot(found, [1e-3 * s.slope for s in run.strokes], 'o', color=colour, markersize=4)
-        right.plot(found, [s.offset for s in run.strokes], 'o', color=colour, markersize=4)
+        left.plot(found, [1e-3 * s.b for s in run.strokes], 'o', color=colour, markersize=4)
+        right.plot(found, [s.a for s in run.strokes], 'o', color=colour, markersize=4)
         b = [1e-3 * slope_coefficient(coefs, v, load) for v in velocity]
         a = [offset_coefficient(coefs, v, load) for v in velocity]
         gap = np.isnan(velocity)
@@ -88,16 +78,16 @@ def draw_models(run: Run, file: Path) -> Path:
         f'Both friction models on the recorded displacement, {run.strokes[0].normal_force:g} N (Fig. 11)', 6.5
     )
     rows = figure.subplot_mosaic([['whole', 'whole'], ['slow', 'fast']])
-    time = run.rack.time
+    time = run.recording.time
     slow, fast = run.strokes[1], run.strokes[-1]
     windows = {
         'whole': (time[0], time[-1]),
-        'slow': _around(time[slow.whole.start], abs(slow.velocity)),
-        'fast': _around(time[fast.whole.start], abs(fast.velocity)),
+        'slow': _around(time[slow.stroke.start], _speed(slow)),
+        'fast': _around(time[fast.stroke.start], _speed(fast)),
     }
     for name, axes in rows.items():
         shown = (time >= windows[name][0]) & (time <= windows[name][1])
-        axes.plot(time[shown], run.rack.friction_force[shown], color=GREY, linewidth=1.6, label='recorded')
+        axes.plot(time[shown], run.recording.force[shown], color=GREY, linewidth=1.6, label='recorded')
         axes.plot(
             time[shown], run.simplified_force[shown], color=RED, linewidth=0.9, label='simplified model'
         )
@@ -106,10 +96,14 @@ def draw_models(run: Run, file: Path) -> Path:
         )
         axes.set_ylabel('friction force (N)')
         axes.set_xlabel('time (s)')
-    rows['slow'].set_title(f'turning point at {1e3 * abs(slow.velocity):.3g} mm/s', fontsize='medium')
-    rows['fast'].set_title(f'turning point at {1e3 * abs(fast.velocity):.3g} mm/s', fontsize='medium')
+    rows['slow'].set_title(f'turning point at {1e3 * _speed(slow):.3g} mm/s', fontsize='medium')
+    rows['fast'].set_title(f'turning point at {1e3 * _speed(fast):.3g} mm/s', fontsize='medium')
     figure.legend(*rows['whole'].get_legend_handles_labels(), loc='outside lower center', ncols=3)
     return finish(figure, file)
+
+
+def _speed(stroke: StrokeLine) -> float:
+    return abs(stroke.displacement_velocity)
 
 
 def _around(turn: float, speed: float) -> tuple[float, float]:

@@ -63,9 +63,8 @@ class Maps:
     `peak` (level, resistance, asymmetry, idle): largest displacement from 3 to 14 Hz. `rms` (band, level,
     resistance, asymmetry, idle): chassis acceleration; NaN where the sweep ends before. `friction_peak`
     (level, idle) in m. Of each (resistance, asymmetry) on the rack, `hydro_harmonics` are those of the
-    hydromount in N,
-    `below` the orders in which the friction mount is lower. `peak_as_there`
-    {level: m} is the friction mount's without idle force, with the damper of the independent computation.
+    hydromount in N, `below` the orders in which the friction mount is lower. `peak_as_there` {level: m} is
+    the friction mount's without idle force, with the damper of the independent computation.
     """
 
     axes: Axes

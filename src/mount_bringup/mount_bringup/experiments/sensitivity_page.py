@@ -181,12 +181,12 @@ def _where(maps: Maps, place: tuple[np.intp, ...]) -> str:
 
 def _peak_table(maps: Maps) -> str:
     axes = maps.axes
-    lines = [
+    lines = _head(
         "Over all decouplers and chambers: the friction mount's largest displacement, and the range of its "
-        'ratio to the hydromount.\n',
-        '| V0 (m/s) | ' + ' | '.join(f'F_i = {force:g} N' for force in axes.idle_forces) + ' |',
-        '|---|' + '---|' * len(axes.idle_forces),
-    ]
+        'ratio to the hydromount.',
+        'V0 (m/s)',
+        [f'F_i = {force:g} N' for force in axes.idle_forces],
+    )
     for k, level in enumerate(axes.levels):
         cells = [
             f'{1e3 * maps.friction_peak[k, i]:.2f} mm; {_range(maps.peak[k, :, :, i])}'
@@ -198,12 +198,12 @@ def _peak_table(maps: Maps) -> str:
 
 def _share_table(maps: Maps) -> str:
     axes = maps.axes
-    lines = [
-        'Over all road levels, decouplers and chambers: in how many the friction mount is lower, and '
-        'the range of the ratio.\n',
-        '| band | ' + ' | '.join(f'F_i = {force:g} N' for force in axes.idle_forces) + ' |',
-        '|---|' + '---|' * len(axes.idle_forces),
-    ]
+    lines = _head(
+        'Over all road levels, decouplers and chambers: in how many the friction mount is lower, and the '
+        'range of the ratio.',
+        'band',
+        [f'F_i = {force:g} N' for force in axes.idle_forces],
+    )
     for band, (low, high) in enumerate(ISOLATION_BANDS):
         cells = []
         for i in range(len(axes.idle_forces)):
@@ -227,11 +227,11 @@ def _asymmetry(maps: Maps) -> str:
 
 def _harmonics_table(maps: Maps) -> str:
     axes = maps.axes
-    lines = [
-        'Harmonics in which the friction mount is lower.\n',
-        '| R_d (Pa s/m^3) | ' + ' | '.join(f'asymmetry {value:g}' for value in axes.asymmetries) + ' |',
-        '|---|' + '---|' * len(axes.asymmetries),
-    ]
+    lines = _head(
+        'Harmonics in which the friction mount is lower.',
+        'R_d (Pa s/m^3)',
+        [f'asymmetry {value:g}' for value in axes.asymmetries],
+    )
     for resistance in axes.resistances:
         cells = [_orders(maps.below[resistance, asymmetry]) for asymmetry in axes.asymmetries]
         lines.append(f'| {resistance:.0e} | ' + ' | '.join(cells) + ' |')
@@ -241,6 +241,11 @@ def _harmonics_table(maps: Maps) -> str:
         'model so that there are even harmonics; an advantage in them is therefore no finding.'
     )
     return '\n'.join(lines) + '\n'
+
+
+def _head(sentence: str, first: str, columns: list[str]) -> list[str]:
+    """Return the first lines of a table under a sentence."""
+    return [f'{sentence}\n', f'| {first} | ' + ' | '.join(columns) + ' |', '|---|' + '---|' * len(columns)]
 
 
 def _largest_even(maps: Maps, asymmetry: float) -> float:

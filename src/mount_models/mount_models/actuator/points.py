@@ -64,9 +64,8 @@ def check_outliers(
     if far.size > _MANY * force.size:
         raise ForceLawRefusedError(
             f'{far.size} of {force.size} points lie far from any law of this form, the worst at '
-            f'{_point(gap, current, force, expected, far[np.argmax(misfit[far])])}: are gap, current '
-            'and force '
-            f'of the same actuator, in the units of their columns, and taken at the same time?'
+            f'{_point(gap, current, force, expected, far[np.argmax(misfit[far])])}: are gap, current and '
+            'force of the same actuator, in the units of their columns, and taken at the same time?'
         )
     worst = far[np.argsort(-misfit[far], kind='stable')][:_NAMED]
     named = '; '.join(_point(gap, current, force, expected, place) for place in worst)
@@ -127,6 +126,5 @@ def _point(
 ) -> str:
     return (
         f'{gap[place] * 1e6:.1f} um, {current[place]:.3f} A: {force[place]:.1f} N, where '
-        f'{expected[place]:.1f} N '
-        f'would fit'
+        f'{expected[place]:.1f} N would fit'
     )

@@ -116,30 +116,24 @@ def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) ->
     points = sorted(points, key=lambda point: point.gap)
     gaps = np.array([point.gap for point in points])
     _check_gaps(gaps)
-    inductance = _fit(
-        'inductance at the rest current',
-        points,
-        np.array([point.inductance for point in points]),
-        np.array([point.inductance_std for point in points]),
-        highest_degree,
-    )
-    crossing = _fit(
-        'crossing current',
-        points,
-        np.array([point.crossing_current for point in points]),
-        np.array([point.crossing_std for point in points]),
-        highest_degree,
-    )
+
+    def fitted(what: str, value: str, std: str) -> CurveFit:
+        values, stds = (np.array([getattr(point, name) for point in points]) for name in (value, std))
+        return _fit(what, points, values, stds, highest_degree)
+
+    inductance = fitted(_INDUCTANCE, 'inductance', 'inductance_std')
+    crossing = fitted(_CROSSING, 'crossing_current', 'crossing_std')
     curves = GapCurves(
         inductance.polynomial,
-        _inverse('inductance at the rest current', inductance.polynomial),
+        _inverse(_INDUCTANCE, inductance.polynomial),
         crossing.polynomial,
-        _inverse('crossing current', crossing.polynomial),
+        _inverse(_CROSSING, crossing.polynomial),
     )
     check_gap_curves(curves)
     return GapCalibration(curves, inductance, crossing, tuple(points))
 
 
+_INDUCTANCE, _CROSSING = 'inductance at the rest current', 'crossing current'
 _FEWEST_SAMPLES = 50  # chosen: fewer are no recording
 _FEWEST_AT_REST = 20  # chosen
 _REST_HALF_WIDTH = 0.02  # A, chosen: there the inductance is straight over the current
@@ -157,9 +151,8 @@ def _rest_inductance(
     near = np.abs(current - rest_current) <= _REST_HALF_WIDTH
     if near.sum() < _FEWEST_AT_REST:
         raise GapCurvesRefusedError(
-            f'{name}: samples within {_REST_HALF_WIDTH:.2f} A of the rest current ({rest_current:.2f} '
-            'A) must '
-            f'be at least {_FEWEST_AT_REST}, {int(near.sum())} are; hold that current for longer'
+            f'{name}: samples within {_REST_HALF_WIDTH:.2f} A of the rest current ({rest_current:.2f} A) '
+            f'must be at least {_FEWEST_AT_REST}, {int(near.sum())} are; hold that current for longer'
         )
     z, values = (current[near] - rest_current) / _REST_HALF_WIDTH, inductance[near]
     deviation = np.abs(values - np.median(values))

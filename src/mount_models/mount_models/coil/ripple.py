@@ -66,9 +66,9 @@ def skin_factor(coil, diffusion_time, duty):
     """Return S, the core's reluctance against the ripple over that against slow changes; at least 1.
 
     `diffusion_time` tau (s) is that of one plate, `duty` D the share of positive voltage. Derived: in the
-    periodic steady state the plate answers with
-    S = 1 + 2/(1-D) sum_k exp(-l_k t) (1 - exp(-l_k (1-D) T)) / (1 - exp(-l_k T)),  l_k = (k pi)^2 / tau.
-    NaN where the sample would fall outside the positive phase, or the bridge cannot hold the current.
+    periodic steady state the plate answers with S = 1 + 2/(1-D) sum_k exp(-l_k t) (1 - exp(-l_k (1-D) T)) /
+    (1 - exp(-l_k T)), l_k = (k pi)^2 / tau. NaN where the sample would fall outside the positive phase, or
+    the bridge cannot hold the current.
     """
     if not (0.0 < duty < 1.0 and coil.sample_delay < duty * coil.pwm_period):
         return math.nan

@@ -61,12 +61,12 @@ def inductance_at_calibration(
     if share == 0.0:
         return inductance
 
-    def reluctance(gap: float) -> float:
-        at_gap = 1.0 / float(evaluate(curves.inductance_of_gap, gap))
-        return at_gap + share * _shift(compensation.reluctance_shift, gap)
+    curve, shift = curves.inductance_of_gap, compensation.reluctance_shift
 
-    gap = _gap_at(reluctance, 1.0 / inductance, curves.inductance_of_gap)
-    return 1.0 / (1.0 / inductance - share * _shift(compensation.reluctance_shift, gap))
+    def reluctance(gap: float) -> float:
+        return 1.0 / float(evaluate(curve, gap))
+
+    return 1.0 / _without_shift(1.0 / inductance, reluctance, share, shift, curve)
 
 
 def crossing_at_calibration(
@@ -80,12 +80,12 @@ def crossing_at_calibration(
     if share == 0.0:
         return current
 
-    def crossing(gap: float) -> float:
-        at_gap = float(evaluate(curves.crossing_current_of_gap, gap))
-        return at_gap + share * _shift(compensation.crossing_shift, gap)
+    curve, shift = curves.crossing_current_of_gap, compensation.crossing_shift
 
-    gap = _gap_at(crossing, current, curves.crossing_current_of_gap)
-    return current - share * _shift(compensation.crossing_shift, gap)
+    def crossing(gap: float) -> float:
+        return float(evaluate(curve, gap))
+
+    return _without_shift(current, crossing, share, shift, curve)
 
 
 def check_compensation(compensation: TemperatureCompensation, curves: GapCurves) -> None:
@@ -111,8 +111,7 @@ def check_compensation(compensation: TemperatureCompensation, curves: GapCurves)
     if not 1.0 + c.conductivity_coefficient * (c.lowest_celsius - c.calibration_celsius) > 0.1:
         raise CompensationError(
             f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a '
-            'resistivity '
-            f'at {c.lowest_celsius:g} degC; lower it, or raise lowest_celsius'
+            f'resistivity at {c.lowest_celsius:g} degC; lower it, or raise lowest_celsius'
         )
     curve = curves.inductance_of_gap
     gaps = np.linspace(curve.low, curve.high, 61)
@@ -145,6 +144,18 @@ def _checked_share(compensation: TemperatureCompensation, celsius: float) -> flo
             f'cool down or warm up, or calibrate over a wider range'
         )
     return temperature_share(compensation, celsius)
+
+
+def _without_shift(
+    value: float,
+    calibrated: Callable[[float], float],
+    share: float,
+    shift: ScaledPolynomial,
+    curve: ScaledPolynomial,
+) -> float:
+    """Return `value` less the share of the shift at the gap at which it is what is measured."""
+    gap = _gap_at(lambda gap: calibrated(gap) + share * _shift(shift, gap), value, curve)
+    return value - share * _shift(shift, gap)
 
 
 def _shift(shift: ScaledPolynomial, gap: float) -> float:

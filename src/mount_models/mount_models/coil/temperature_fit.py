@@ -45,9 +45,8 @@ def measured_compensation(
     if len(inside) < _FEWEST_GAPS:
         raise GapCurvesRefusedError(
             f'a temperature compensation needs recordings at {_FEWEST_GAPS} or more gaps within '
-            f'{curves.inductance_of_gap.low * 1e6:.0f} .. {curves.inductance_of_gap.high * 1e6:.0f} um '
-            'at the '
-            f'other temperature; {len(inside)} given: record more, or leave that temperature out'
+            f'{curves.inductance_of_gap.low * 1e6:.0f} .. {curves.inductance_of_gap.high * 1e6:.0f} um at '
+            f'the other temperature; {len(inside)} given: record more, or leave that temperature out'
         )
     gaps = np.array([point.gap for point in inside])
     at_rest = np.array([1.0 / point.inductance for point in inside])

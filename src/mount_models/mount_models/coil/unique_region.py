@@ -62,9 +62,8 @@ def warnings(region: UniqueRegion, rest_current: float, crossing_inductance: flo
         )
     if not _inside(region.levels, crossing_inductance):
         found.append(
-            f'crossing_inductance ({crossing_inductance * 1e3:.1f} mH) must be one whose current tells '
-            'the gap '
-            f'without ambiguity: {_told(region.levels, 1e3, "mH")}; choose an inductance from there'
+            f'crossing_inductance ({crossing_inductance * 1e3:.1f} mH) must be one whose current tells the '
+            f'gap without ambiguity: {_told(region.levels, 1e3, "mH")}; choose an inductance from there'
         )
     return found
 

@@ -10,6 +10,8 @@ from mount_models.friction.coefficient import dynamic_coefficient, offset_coeffi
 FADE_VELOCITY = 0.001
 """v_w in m/s (chosen): below it the weight 1 - exp(-(v/v_w)^2) fades mu to zero, because the simplified
 model knows no sticking (Sec. 4)."""
+FADED_BELOW = 2.5 * FADE_VELOCITY
+"""Speed in m/s below which mu is faded by more than 0.2 % (derived)."""
 LOWEST_COEFFICIENT = 0.05
 """Floor of mu when a force is divided by it (chosen)."""
 _DAMPED_STEPS = 5

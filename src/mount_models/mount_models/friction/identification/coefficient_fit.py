@@ -109,9 +109,8 @@ def _check_coverage(lines: Sequence[StrokeLine]) -> None:
         speeds = sorted(abs(line.velocity) for line in lines if line.velocity * sign > 0.0)
         if not speeds:
             raise IdentificationError(
-                f'only strokes to the {other} side ({len(lines)} strokes, 0 to the {side}); both are '
-                'needed, for '
-                'each has parameters of its own: record strokes to and fro'
+                f'only strokes to the {other} side ({len(lines)} strokes, 0 to the {side}); both are needed, '
+                'for each has parameters of its own: record strokes to and fro'
             )
         distinct = 1
         reference = speeds[0]
@@ -121,10 +120,8 @@ def _check_coverage(lines: Sequence[StrokeLine]) -> None:
         if distinct < FEWEST_SPEEDS or speeds[-1] < SPEED_SPREAD * speeds[0]:
             raise IdentificationError(
                 f'{distinct} speeds to the {side} side, {1e3 * speeds[0]:.3g} .. {1e3 * speeds[-1]:.3g} '
-                'mm/s; at least '
-                f'{FEWEST_SPEEDS} are needed, the highest {SPEED_SPREAD:g} times the lowest or more: '
-                'record more '
-                'speeds'
+                f'mm/s; at least {FEWEST_SPEEDS} are needed, the highest {SPEED_SPREAD:g} times the lowest '
+                'or more: record more speeds'
             )
 
 

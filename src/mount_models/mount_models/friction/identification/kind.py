@@ -24,9 +24,8 @@ def recognised(recording: FrictionRecording) -> str:
             return RAMP
         side = 'positive' if x[-1] > x[0] else 'negative'
         raise IdentificationError(
-            f'{recording.name} moves to the {side} side only (0 turning points in {1e3 * span:.3g} mm); '
-            'at least 1 '
-            'is needed: record strokes to and fro, or a ramp that is held'
+            f'{recording.name} moves to the {side} side only (0 turning points in {1e3 * span:.3g} mm); at '
+            'least 1 is needed: record strokes to and fro, or a ramp that is held'
         )
     return SAWTOOTH if _is_straight(recording) else OTHER
 

@@ -1,8 +1,7 @@
 """The ladder: every law fitted to the same recordings, judged by recordings that no fit has seen.
 
 The error is rms of the difference over rms of the measured force, both over all samples of all recordings.
-The
-training error tells how well a law can follow, the held-out error what it is worth.
+The training error tells how well a law can follow, the held-out error what it is worth.
 """
 
 import math

@@ -139,6 +139,35 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     )
 
 
+def contact_of_response(
+    joint_stiffness: float, machine_stiffness: float, kappa: float, time_constant: float
+) -> FrictionContact:
+    """Return the contact from c_xi, p (N/m), kappa = T_v / T and T (s): Eq (11) put right (derived)."""
+    c_re = (machine_stiffness + joint_stiffness) / kappa - machine_stiffness
+    c_r = joint_stiffness * c_re / (c_re - joint_stiffness)
+    d_r = time_constant * (c_r + machine_stiffness * c_re / (machine_stiffness + c_re))
+    return FrictionContact(c_r, d_r, c_re)
+
+
+def printed_formulas(
+    joint_stiffness: float,
+    stiffness_with_p: float,
+    machine_stiffness: float,
+    first_over_last: float,
+    time_constant: float,
+) -> PrintedFormulas:
+    """Return Eq (11) word for word, k being the first force over the last.
+
+    `joint_stiffness` is c_xi without the spring p, `stiffness_with_p` (the last force over the desired
+    displacement) contains it; N/m, T in s.
+    """
+    k, p = first_over_last, machine_stiffness
+    c_re = k * stiffness_with_p * p / (p - k * stiffness_with_p)
+    without_p = joint_stiffness * c_re / (c_re - joint_stiffness)
+    with_p = stiffness_with_p * c_re / (c_re - stiffness_with_p)
+    return PrintedFormulas(c_re, with_p, without_p, without_p * time_constant)
+
+
 def mean_contact(fits: list[RampHoldFit]) -> FrictionContact:
     """Return the contact of several ramps: each parameter's mean, weighted by its uncertainty."""
     values = np.array([fit.contact for fit in fits])
@@ -200,9 +229,8 @@ def _start(
     rising = np.flatnonzero(smooth_force[: top + 1] > 0.1 * smooth_force[top])
     if force_end <= 0.0 or x_end <= 0.0 or top < 2 or not rising.size or top > 0.8 * count:
         raise IdentificationError(
-            f'{name}: force ends at {force_end:.3g} N and displacement at {x_end:.3g} m; step 1 needs a '
-            'ramp that '
-            'is held afterwards, force and displacement to the same side: check signs, or record ramp '
+            f'{name}: force ends at {force_end:.3g} N and displacement at {x_end:.3g} m; step 1 needs a ramp '
+            'that is held afterwards, force and displacement to the same side: check signs, or record ramp '
             'and hold'
         )
     begin = int(rising[0])
@@ -216,8 +244,8 @@ def _start(
     if not stiffness > 0.0:
         raise IdentificationError(
             f'{name}: while held, force and displacement change by {stiffness:.3g} N/m together; a rack '
-            'gives way '
-            'against the force (above 0 N/m): record the desired displacement as well, or hold longer'
+            'gives way against the force (above 0 N/m): record the desired displacement as well, or hold '
+            'longer'
         )
     height = np.clip(smooth_x[hold][0] / x_end, 0.1, 0.98)
     passed = (smooth_x[hold] - smooth_x[hold][0]) > 0.63 * (x_end - smooth_x[hold][0])
@@ -230,33 +258,24 @@ def _contact(name: str, values: FloatArray) -> FrictionContact:
     contact = _inverted(values)
     if not all(value > 0.0 and np.isfinite(value) for value in contact):
         raise IdentificationError(
-            f'{name}: c_R {contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} '
-            'N s/m, c_Re '
-            f'{contact.contact_stiffness:.3g} N/m must all be above 0: the displacement does not creep '
-            'as the '
-            'contact does (kappa '
-            f'{values[1]:.3f} must lie below 1); ramp faster, hold longer, and stay in microslip'
+            f'{name}: c_R {contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} N '
+            f's/m, c_Re {contact.contact_stiffness:.3g} N/m must all be above 0: the displacement does not '
+            f'creep as the contact does (kappa {values[1]:.3f} must lie below 1); ramp faster, hold longer, '
+            'and stay in microslip'
         )
     return contact
 
 
 def _inverted(values: FloatArray) -> FrictionContact:
     asymptote, kappa, lag, p, desired = (float(value) for value in values[:5])
-    c_xi = p * (desired - asymptote) / asymptote
-    c_re = (p + c_xi) / kappa - p
-    c_r = c_xi * c_re / (c_re - c_xi)
-    return FrictionContact(c_r, lag * (c_r + p * c_re / (p + c_re)), c_re)
+    return contact_of_response(p * (desired - asymptote) / asymptote, p, kappa, lag)
 
 
 def _as_printed(values: FloatArray) -> PrintedFormulas:
-    """Return Eq (11) word for word, k = F(0+) / F(inf), c_xi with p in the first formula."""
     asymptote, kappa, lag, p, desired = (float(value) for value in values[:5])
-    without = p * (desired - asymptote) / asymptote
-    with_p = without * p / (without + p)
-    k = (desired - kappa * asymptote) / (desired - asymptote)
-    c_re = k * with_p * p / (p - k * with_p)
-    stiff = without * c_re / (c_re - without)
-    return PrintedFormulas(c_re, with_p * c_re / (c_re - with_p), stiff, stiff * lag)
+    joint = p * (desired - asymptote) / asymptote
+    first_over_last = (desired - kappa * asymptote) / (desired - asymptote)
+    return printed_formulas(joint, joint * p / (joint + p), p, first_over_last, lag)
 
 
 def _contact_covariance(values: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -276,9 +295,8 @@ def _check_misfit(name: str, misfits: tuple[float, float]) -> None:
         if misfit > LARGEST_MISFIT:
             raise IdentificationError(
                 f'{name}: the fitted ramp misses the {channel} by {100 * misfit:.1f} % rms (at most '
-                f'{100 * LARGEST_MISFIT:.0f} %): the contact slides, or it is no ramp that is held; use '
-                'a smaller '
-                'displacement'
+                f'{100 * LARGEST_MISFIT:.0f} %): the contact slides, or it is no ramp that is held; use a '
+                'smaller displacement'
             )
 
 

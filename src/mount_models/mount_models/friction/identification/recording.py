@@ -221,24 +221,21 @@ def _check_magnitudes(
         )
     if clamp.min() <= 0.0:
         raise IdentificationError(
-            f'{name}: normal force falls to {clamp.min():.3g} N; it must stay above 0 N: choose a '
-            'stretch with '
-            'the contact closed, or check sign and zero of the load cell'
+            f'{name}: normal force falls to {clamp.min():.3g} N; it must stay above 0 N: choose a stretch '
+            'with the contact closed, or check sign and zero of the load cell'
         )
     coefficient = float(np.percentile(np.abs(force), 95) / np.median(clamp))
     low, high = limits
     if coefficient > high:
         raise IdentificationError(
             f'{name}: friction force over normal force reaches {coefficient:.3g}; at most {high:g} is '
-            'plausible: '
-            'is the normal force in kN, or the friction force in mN? Name the units of the columns'
+            'plausible: is the normal force in kN, or the friction force in mN? Name the units of the columns'
         )
     # A contact that only creeps may stay far below sliding; a thousandth of it is no contact at all.
     if coefficient < low / 20.0 or (coefficient < low and stroke > 1e-4):
         raise IdentificationError(
             f'{name}: friction force over normal force stays at {coefficient:.3g}; at least {low:g} is '
-            'plausible: '
-            'is the friction force in kN, or the normal force in mN? Name the units of the columns'
+            'plausible: is the friction force in kN, or the normal force in mN? Name the units of the columns'
         )
 
 

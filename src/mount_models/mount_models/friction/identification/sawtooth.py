@@ -1,8 +1,7 @@
 """Step 2: mu over the deflection u at constant speeds and normal force (Figs. 8, 9, Eq 12).
 
 The measured force drives the linear part, xi' = (F_F - c_R xi) / d_R; u = sign(F_F) xi. In every stroke
-between
-two turning points mu = |F_F| / F_N is a straight line over u: mu = a + b u.
+between two turning points mu = |F_F| / F_N is a straight line over u: mu = a + b u.
 """
 
 from dataclasses import dataclass
@@ -31,8 +30,11 @@ _LEAST_STROKE = 0.2  # of the largest stroke
 
 @dataclass(frozen=True)
 class StrokeLine:
-    """mu = a + b u of one stroke: speed with sign (m/s), normal force (N), a (1), b (1/m), half widths of
-    CI."""
+    """mu = a + b u of one stroke: a (1) and b (1/m) with the half widths of their confidence intervals.
+
+    `velocity` (m/s, with sign) is that of the slider, to which a and b belong, `displacement_velocity` that
+    of the rack. `window` are the samples of `u` (m) and `mu`, a part of the whole `stroke`.
+    """
 
     recording: str
     velocity: float
@@ -45,6 +47,19 @@ class StrokeLine:
     b_deviation: float
     u: FloatArray
     mu: FloatArray
+    displacement_velocity: float
+    stroke: slice
+    window: slice
+
+    @property
+    def residual(self) -> float:
+        """Rms of what the line leaves of mu."""
+        return float(np.sqrt(np.mean((self.mu - self.a - self.b * self.u) ** 2)))
+
+    @property
+    def fall(self) -> float:
+        """By how much mu falls along the line, from its first to its last sample."""
+        return float(self.b * (self.u[0] - self.u[-1]))
 
 
 def stroke_lines(recording: FrictionRecording, contact: FrictionContact) -> list[StrokeLine]:
@@ -59,16 +74,14 @@ def stroke_lines(recording: FrictionRecording, contact: FrictionContact) -> list
             lines.append(line)
     if not lines:
         raise IdentificationError(
-            f'{recording.name}: no stroke slides for {SHORTEST_WINDOW:g} s or more at constant speed; '
-            'use longer '
-            'strokes or lower speeds'
+            f'{recording.name}: no stroke slides for {SHORTEST_WINDOW:g} s or more at constant speed; use '
+            'longer strokes or lower speeds'
         )
     return lines
 
 
 def strokes(recording: FrictionRecording) -> list[tuple[int, int, float]]:
-    """Return (first sample, last sample, velocity m/s) between turning points; incomplete and short ones
-    too."""
+    """Return (first sample, last sample, velocity m/s) of all strokes, incomplete and short ones too."""
     x = smoothed_displacement(recording)
     turns = [0, *turning_points(x), x.size - 1]
     found = []
@@ -80,6 +93,19 @@ def strokes(recording: FrictionRecording) -> list[tuple[int, int, float]]:
         velocity = float(np.polyfit(time[inner] - time[first], recording.displacement[inner], 1)[0])
         found.append((first, last, velocity))
     return found
+
+
+def sliding_window(
+    recording: FrictionRecording, contact: FrictionContact, first: int, last: int, velocity: float
+) -> slice:
+    """Return the samples of a stroke at which all of the contact slides; empty where it is too short.
+
+    Behind the turning point the contact first unloads and loads the spring c_Re.
+    """
+    swing = 2.0 * float(np.median(np.abs(recording.force[first : last + 1])))
+    travel = _SETTLING_TRAVEL * swing / contact.contact_stiffness
+    settled = first + round(max(_SETTLING, travel / max(abs(velocity), 1e-9)) / recording.dt)
+    return slice(settled, max(last - round(_EDGE / recording.dt), settled))
 
 
 def turning_points(displacement: FloatArray) -> list[int]:
@@ -108,8 +134,7 @@ def turning_points(displacement: FloatArray) -> list[int]:
 
 @compiled
 def deflection_from_force(force, dt, tangential_stiffness, tangential_damping):
-    """Return xi (m) of the linear part for `force` (N), (n,), from rest, the force straight between
-    samples."""
+    """Return xi (m) of the linear part, from rest, for a `force` (N), (n,), straight between samples."""
     xi = np.zeros(force.size)
     z = tangential_stiffness * dt / tangential_damping
     fade = np.exp(-z)
@@ -130,13 +155,10 @@ def _line(
 ) -> StrokeLine | None:
     dt = recording.dt
     side = 0 if velocity >= 0.0 else 1
-    swing = 2.0 * float(np.median(np.abs(recording.force[first : last + 1])))
-    travel = _SETTLING_TRAVEL * swing / contact.contact_stiffness
-    settled = first + round(max(_SETTLING, travel / max(abs(velocity), 1e-9)) / dt)
-    end = last - round(_EDGE / dt)
+    window = sliding_window(recording, contact, first, last, velocity)
+    settled, end = window.start, window.stop
     if (end - settled) * dt < SHORTEST_WINDOW or end - settled < 20:
         return None
-    window = slice(settled, end)
     sign = 1.0 if velocity >= 0.0 else -1.0
     clamp = float(recording.normal_force[window, side].mean())
     u = sign * xi[window]
@@ -148,10 +170,16 @@ def _line(
     relief = float(
         recording.force[end - third : end].mean() - recording.force[settled : settled + third].mean()
     ) / (span * contact.contact_stiffness)
-    return _fitted(recording.name, velocity - creep - relief, clamp, u, mu)
+    a, b, a_deviation, b_deviation = _fitted(u, mu)
+    factor = float(student.ppf(0.5 + 0.5 * CONFIDENCE, max(u.size - 2, 1)))
+    return StrokeLine(
+        recording.name, velocity - creep - relief, clamp, a, b, factor * a_deviation, factor * b_deviation,
+        a_deviation, b_deviation, u, mu, velocity, slice(first, last), window,
+    )  # fmt: skip
 
 
-def _fitted(name: str, velocity: float, clamp: float, u: FloatArray, mu: FloatArray) -> StrokeLine:
+def _fitted(u: FloatArray, mu: FloatArray) -> tuple[float, float, float, float]:
+    """Return a and b of the line through mu over u, and their standard deviations."""
     centre = float(u.mean())
     matrix = np.column_stack([np.ones_like(u), u - centre])
     (level, slope), *_ = np.linalg.lstsq(matrix, mu, rcond=None)
@@ -161,8 +189,4 @@ def _fitted(name: str, velocity: float, clamp: float, u: FloatArray, mu: FloatAr
     slope_variance = variance / max(float(((u - centre) ** 2).sum()), 1e-300)
     a_deviation = float(np.sqrt(variance / u.size + centre**2 * slope_variance))
     b_deviation = float(np.sqrt(slope_variance))
-    factor = float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
-    return StrokeLine(
-        name, velocity, clamp, float(level - slope * centre), float(slope), factor * a_deviation,
-        factor * b_deviation, a_deviation, b_deviation, u, mu,
-    )  # fmt: skip
+    return float(level - slope * centre), float(slope), a_deviation, b_deviation

@@ -14,18 +14,16 @@ from mount_models.friction.identification.recording import (
     FrictionRecording,
     smoothed_displacement,
 )
-from mount_models.friction.identification.sawtooth import strokes
-from mount_models.friction.simplified import FADE_VELOCITY, simplified_response
-
-_SETTLING = 0.03  # s after a turning point, as in step 2
+from mount_models.friction.identification.slip_regions import slip_regions
+from mount_models.friction.simplified import simplified_response
 
 
 @dataclass(frozen=True)
 class ModelValidation:
     """Error of both models on one recording, rms over rms of the measured force.
 
-    `*_macroslip` leaves out the first 30 ms after each turning point, where the simplified model is not
-    defined, and strokes below twice the speed under which it fades mu to zero (by 2 % there).
+    `*_macroslip` leaves out what follows a turning point, where the simplified model is not defined, and
+    strokes so slow that it fades mu (see `slip_regions`).
     `full`, `simplified` are the predicted forces (N, (n,)).
     """
 
@@ -47,7 +45,9 @@ def validate(
     velocity = _velocity(x, recording.dt)
     clamp = np.where(velocity >= 0.0, recording.normal_force[:, 0], recording.normal_force[:, 1])
     simplified, _ = simplified_response(contact, coefs, velocity, clamp, recording.dt)
-    sliding = _sliding(recording)
+    sliding = slip_regions(recording, contact).macro
+    if not sliding.any():
+        sliding[:] = True
 
     def error(force: FloatArray, which: FloatArray | slice) -> float:
         difference, signal = (force - recording.force)[which], recording.force[which]
@@ -73,17 +73,7 @@ def pooled_error(validations: Sequence[ModelValidation], recordings: Sequence[Fr
 
 
 def _velocity(displacement: FloatArray, dt: float) -> FloatArray:
-    window = max(3, round(0.02 / dt) | 1)  # 20 ms, chosen: less than the 30 ms that are left out
+    window = max(3, round(0.02 / dt) | 1)  # 20 ms, chosen: less than the 30 ms or more that are left out
     if displacement.size <= window:
         return np.gradient(displacement, dt)
     return np.asarray(savgol_filter(displacement, window, 1, deriv=1, delta=dt))
-
-
-def _sliding(recording: FrictionRecording) -> FloatArray:
-    inside = np.zeros(recording.force.size, bool)
-    settling, edge = round(_SETTLING / recording.dt), round(0.01 / recording.dt)
-    for first, last, velocity in strokes(recording):
-        if abs(velocity) < 1.95 * FADE_VELOCITY:
-            continue
-        inside[first + settling : max(last - edge, first + settling)] = True
-    return inside if inside.any() else np.ones(recording.force.size, bool)

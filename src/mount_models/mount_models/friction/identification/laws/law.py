@@ -35,8 +35,7 @@ class FrictionLaw(Protocol):
         """Return the friction force (N, (n,)) for `displacement` (m, (n,)) sampled every `dt` s.
 
         `normal_force` (N, (n, 2)) counts for sliding to positive and to negative side. The contact starts
-        free
-        of force at the first displacement.
+        free of force at the first displacement.
         """
         ...
 

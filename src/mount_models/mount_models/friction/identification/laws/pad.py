@@ -22,8 +22,7 @@ class PadModel:
 
     Loads and speeds are related to those of the training: alpha and beta are 1 at `reference` (N), do not
     change beyond `lowest` and `highest`, and stay 1 where only one load was trained. `known` starts the
-    search
-    at what steps 1 to 3 have found.
+    search at what steps 1 to 3 have found.
     """
 
     name = "paper's model"
