@@ -20,13 +20,13 @@ CONTACT = FrictionContact()
 TIME = np.arange(0.0, 5.0, 1e-3)
 
 
-def ramp(contact=CONTACT, p=2e6, noise=0.0, seed=0, start=0.3):
+def ramp(contact=CONTACT, p=2e6, noise=0.0, seed=0, start=0.3, time=TIME):
     random = np.random.default_rng(seed)
-    channels = ramp_response(contact, p, 20e-6, start, 0.2, TIME)
+    channels = ramp_response(contact, p, 20e-6, start, 0.2, time)
     x, force, desired = (
         each + noise * np.sqrt(np.mean(each**2)) * random.standard_normal(each.size) for each in channels
     )
-    return checked_recording('ramp', TIME, x, force, 100.0, desired)
+    return checked_recording('ramp', time, x, force, 100.0, desired)
 
 
 def sawtooth(load, speeds=(0.002, 0.004, 0.006, 0.010), noise=0.01, seed=0, coefs=None):
@@ -65,6 +65,18 @@ def test_step_1_recovers_drawn_contacts_within_3_percent_with_noise(seed):
     contact = FrictionContact(stiff, stiff * random.uniform(0.35, 0.7), 4e6 * random.uniform(0.7, 1.4))
     fit = fit_ramp_hold(ramp(contact, 2e6 * random.uniform(0.7, 1.4), 0.01, seed))
     assert fit.contact == pytest.approx(contact, rel=0.03)
+
+
+def held(time_constants, noise):
+    return ramp(noise=noise, time=np.arange(0.0, 0.5 + time_constants * 0.44118, 1e-3))
+
+
+@pytest.mark.parametrize('noise', [0.0, 0.01])
+def test_step_1_refuses_a_ramp_that_is_held_for_less_than_three_time_constants(noise):
+    assert fit_ramp_hold(held(3.4, noise)).contact == pytest.approx(CONTACT, rel=0.05)
+    for short in (0.5, 2.6):
+        with pytest.raises(IdentificationError, match=r'held for .* time constants of .* \(at least 3\).* hold for'):
+            fit_ramp_hold(held(short, noise))
 
 
 def test_step_1_refuses_a_contact_that_slides():
