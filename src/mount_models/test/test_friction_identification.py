@@ -75,7 +75,9 @@ def held(time_constants, noise):
 def test_step_1_refuses_a_ramp_that_is_held_for_less_than_three_time_constants(noise):
     assert fit_ramp_hold(held(3.4, noise)).contact == pytest.approx(CONTACT, rel=0.05)
     for short in (0.5, 2.6):
-        with pytest.raises(IdentificationError, match=r'held for .* time constants of .* \(at least 3\).* hold for'):
+        with pytest.raises(
+            IdentificationError, match=r'held for .* time constants of .* \(at least 3\).* hold for'
+        ):
             fit_ramp_hold(held(short, noise))
 
 
@@ -123,12 +125,21 @@ def test_too_few_speeds_are_refused():
         fit_coefficients(stroke_lines(sawtooth(100.0, (0.004, 0.008)), CONTACT))
 
 
-def test_one_direction_only_is_refused():
-    lines = [line for line in stroke_lines(sawtooth(100.0), CONTACT) if line.velocity > 0]
-    with pytest.raises(IdentificationError, match='only strokes to the positive side'):
+@pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
+def test_one_direction_only_is_refused(sign, side):
+    lines = [line for line in stroke_lines(sawtooth(100.0), CONTACT) if sign * line.velocity > 0]
+    with pytest.raises(IdentificationError, match=f'only strokes to the {side} side'):
         fit_coefficients(lines)
-    with pytest.raises(IdentificationError, match='positive side only'):
-        recognised(checked_recording('one way', TIME, 1e-3 * TIME, 50.0 + np.sin(TIME), 100.0))
+    with pytest.raises(IdentificationError, match=f'{side} side only'):
+        recognised(checked_recording('one way', TIME, sign * 1e-3 * TIME, 50.0 + np.sin(TIME), 100.0))
+
+
+@pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
+def test_too_few_speeds_to_one_side_are_refused(sign, side):
+    lines = stroke_lines(sawtooth(100.0), CONTACT)
+    fewer = [line for line in lines if sign * line.velocity < 0 or abs(line.velocity) < 0.005]
+    with pytest.raises(IdentificationError, match=f'2 speeds to the {side} side'):
+        fit_coefficients(fewer)
 
 
 def test_recordings_are_recognised():

@@ -32,7 +32,7 @@ LARGEST_MISFIT = 0.08
 """Largest rms misfit over the rms of force or displacement: above, it is no ramp in microslip (chosen)."""
 LARGEST_UNCERTAINTY = 0.25
 SHORTEST_HOLD = 3.0
-"""Time constants (chosen): of the creep 5 % are left then, so its end is measured rather than extrapolated."""
+"""Time constants (chosen): 5 % of the creep is left then, so its end is measured, not extrapolated."""
 
 
 @dataclass(frozen=True)
