@@ -3,7 +3,6 @@
 Units end here: everything behind is in SI units.
 """
 
-import hashlib
 import json
 import re
 from dataclasses import dataclass
@@ -82,14 +81,6 @@ def parsed_channels(texts: list[str]) -> dict[str, Channel]:
             )
         found[name] = Channel(source, UNITS[unit.lower()] if unit else None)
     return found
-
-
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file, or of all files of a folder in the order of their names."""
-    digest = hashlib.sha256()
-    for part in [path] if path.is_file() else sorted(each for each in path.rglob('*') if each.is_file()):
-        digest.update(part.read_bytes())
-    return digest.hexdigest()
 
 
 def _csv(path: Path, channels: dict[str, Channel]) -> FrictionRecording:

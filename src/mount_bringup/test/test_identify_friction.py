@@ -13,6 +13,8 @@ from mount_bringup.experiments.friction_rack import move, sawtooth_corners
 from mount_bringup.experiments.rack_recording import record_friction_rack
 from mount_bringup.friction_files import parsed_channels, read_recording
 from mount_bringup.identify_arguments import with_repeated_options
+from mount_bringup.rack_recordings import described
+from mount_bringup.recording_path import recording_hash
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.identification import ladder
@@ -76,8 +78,13 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
     assert specimen.friction == pytest.approx({**result['coefficients'], **result['contact']})
     assert specimen.force_law == default_specimen().force_law
     told = specimen.provenance['parts']['friction']
-    digest = hashlib.sha256((rack / '80.csv').read_bytes()).hexdigest()
-    assert {'file': '80.csv', 'part': 'held out', 'kind': 'sawtooth', 'sha256': digest} in told['recordings']
+    digests = {
+        name: hashlib.sha256((rack / name).read_bytes()).hexdigest()
+        for name in ('ramp.csv', '40.csv', '80.csv', '120.csv')
+    }
+    assert {entry['file']: entry['sha256'] for entry in told['recordings']} == digests
+    held_out = {'file': '80.csv', 'part': 'held out', 'kind': 'sawtooth', 'sha256': digests['80.csv']}
+    assert held_out in told['recordings']
     assert told['valid']['normal_force'] == pytest.approx([40.0, 120.0], rel=0.01)
     assert told['residuals']['held_out']['80.csv'] < 0.05
     for names, matrix in told['covariance'].items():
@@ -199,6 +206,29 @@ def test_a_held_out_recording_must_be_unseen(rack, capsys):
     with pytest.raises(SystemExit):
         main(['identify', 'friction', '--train', str(rack / '40.csv'), '--held-out', str(rack / '40.csv')])
     assert 'must be unseen' in capsys.readouterr().err.replace('\n', ' ')
+
+
+def test_a_held_out_recording_must_be_unseen_under_another_name_too(rack, tmp_path, capsys):
+    seen, copy, out = rack / '40.csv', tmp_path / 'other.csv', tmp_path / 'f.json'
+    copy.write_bytes(seen.read_bytes())
+    with pytest.raises(SystemExit):
+        main(['identify', 'friction', '--train', str(seen), '--held-out', str(copy), '--json', str(out)])
+    refusal = capsys.readouterr().err.replace('\n', ' ')
+    assert 'other.csv and 40.csv (train) are the same to the bit' in refusal
+    assert not out.exists()
+
+
+def test_the_hash_of_a_recording_is_that_of_its_data_in_order(tmp_path):
+    run = tmp_path / 'run' / 'recording'
+    run.mkdir(parents=True)
+    for name, content in (('b_1.mcap', b'second'), ('a_0.mcap', b'first'), ('metadata.yaml', b'x')):
+        (run / name).write_bytes(content)
+    expected = hashlib.sha256(b'firstsecond').hexdigest()
+    assert recording_hash(run) == recording_hash(tmp_path / 'run') == expected
+    assert described([run / 'b_1.mcap', run]) == [
+        {'file': 'b_1.mcap', 'sha256': hashlib.sha256(b'second').hexdigest()},
+        {'file': 'recording', 'sha256': expected},
+    ]
 
 
 def test_parameters_need_ramp_and_sawtooth(rack, tmp_path, capsys):
