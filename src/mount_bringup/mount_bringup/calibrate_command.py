@@ -87,7 +87,6 @@ def actuator(
     Refused are outliers, too few gaps or currents, and a law that is not positive, rising with the current
     and falling with the gap within the measured range. Then no file is written.
     """
-    from mount_bringup.calibrate_figure import draw_force_law
     from mount_bringup.calibrated_specimen import check_targets, with_force_law
     from mount_bringup.rack_recordings import GivenValues, read_force
     from mount_models.actuator.fit import fit_force_law
@@ -144,6 +143,8 @@ def actuator(
         'rms_by_gap': [{'gap_m': g, 'rms_n': r} for g, r in zip(fit.gaps, fit.gap_rms, strict=True)],
     }
     if figure is not None:
+        from mount_bringup.calibrate_figure import draw_force_law
+
         draw_force_law(points, law, figure)
         console.print(f'figure     {figure}', highlight=False)
     _write(console, specimen, figures, json_file, out)
@@ -183,7 +184,6 @@ def inductance(
     The temperature with most recordings is that of the curves. With recordings at a second one the
     compensation is measured, else it is stated from the conductivity's coefficient and the base's force law.
     """
-    from mount_bringup.calibrate_figure import draw_gap_curves
     from mount_bringup.calibrate_inductance import GapOrder, calibrate_inductance
     from mount_bringup.calibrated_specimen import check_targets, with_gap_curves
     from mount_bringup.rack_recordings import read_ripple
@@ -224,6 +224,8 @@ def inductance(
         console.print('[yellow]warning[/yellow]', end=' ')
         _say(console, warning)
     if figure is not None:
+        from mount_bringup.calibrate_figure import draw_gap_curves
+
         draw_gap_curves(result, order, figure)
         console.print(f'figure     {figure}', highlight=False)
     _write(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)

@@ -3,8 +3,6 @@
 Units end here: everything behind is in SI units.
 """
 
-import csv
-import hashlib
 import json
 import re
 from dataclasses import dataclass
@@ -85,20 +83,12 @@ def parsed_channels(texts: list[str]) -> dict[str, Channel]:
     return found
 
 
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file, or of all files of a folder in the order of their names."""
-    digest = hashlib.sha256()
-    for part in [path] if path.is_file() else sorted(each for each in path.rglob('*') if each.is_file()):
-        digest.update(part.read_bytes())
-    return digest.hexdigest()
-
-
 def _csv(path: Path, channels: dict[str, Channel]) -> FrictionRecording:
-    from mount_sim.recorded import load_signal
+    from mount_sim.csv_table import read_table
+    from mount_sim.recorded import signal_of
 
-    with path.open(newline='', encoding='utf-8-sig', errors='replace') as stream:
-        header = next((row for row in csv.reader(stream) if row and not row[0].startswith('#')), [])
-    header = [name.strip() for name in header]
+    table = read_table(path)
+    header = list(table.header)
     time_column = channels['time'].source if 'time' in channels else ''
     times: FloatArray | None = None
     values: dict[str, FloatArray] = {}
@@ -111,7 +101,7 @@ def _csv(path: Path, channels: dict[str, Channel]) -> FrictionRecording:
                 f'{path.name} has no column for {name} (its columns: {", ".join(header)}); name it as in '
                 f'--channel {name}=COLUMN:UNIT'
             )
-        signal = load_signal(path, column=place.source, time_column=time_column)
+        signal = signal_of(table, place.source, time_column)
         factor = place.factor if place.factor is not None else _factor_of(place.source, name, path.name)
         times, values[name] = signal.times, signal.values * factor
     assert times is not None

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mount_bringup.friction_files import Channel, file_hash, read_recording
+from mount_bringup.friction_files import Channel, read_recording
+from mount_bringup.recording_path import recording_hash
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.identification.coefficient_fit import VARIANTS, CoefficientFit, fit_coefficients
@@ -210,10 +211,21 @@ def _read(
         if order.step in (RAMP, SAWTOOTH) and part == 'train':
             _check_kind(recording.name, kind, order.step)
         key = path.name if path.name not in found.recordings else str(path)
-        found.recordings[key] = {'part': part, 'kind': kind, 'sha256': file_hash(path)}
+        digest = recording_hash(path)
+        _check_unseen(found, key, digest)
+        found.recordings[key] = {'part': part, 'kind': kind, 'sha256': digest}
         found.notes += [f'{recording.name}: {note}' for note in recording.notes]
         result.append((recording, kind))
     return result
+
+
+def _check_unseen(found: Identification, key: str, digest: str) -> None:
+    for other, entry in found.recordings.items():
+        if entry['sha256'] == digest:
+            raise IdentificationError(
+                f'{key} and {other} ({entry["part"]}) are the same to the bit; a held-out recording must be '
+                'unseen, and none counts twice: give each recording once'
+            )
 
 
 def _check_kind(name: str, kind: str, step: str) -> None:

@@ -1,6 +1,5 @@
 """Rack recordings as the calibrations take them: force points and ripple, from CSV and MCAP."""
 
-import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from mount_bringup.rack_columns import (
     check_alive,
     read_columns,
 )
-from mount_bringup.recording_path import open_run
+from mount_bringup.recording_path import open_run, recording_hash
 from mount_models.actuator.points import gap_groups
 from mount_models.coil.gap import measured_inductance
 from mount_models.coil.gap_calibration import RippleRecording
@@ -103,7 +102,7 @@ def read_ripple(
 
 def described(files: Sequence[Path]) -> list[dict[str, str]]:
     """Return name and SHA-256 of each recording; of a folder, that of its files one after the other."""
-    return [{'file': file.name, 'sha256': _hash(file)} for file in files]
+    return [{'file': file.name, 'sha256': recording_hash(file)} for file in files]
 
 
 _FEWEST = 8  # chosen: fewer points are no measurement
@@ -123,7 +122,7 @@ def _checked_files(files: Sequence[Path]) -> Sequence[Path]:
             raise RackRecordingError(
                 f'{file}: files of type {file.suffix or "(none)"} are not read; use .csv or .mcap'
             )
-        digest = _hash(file)
+        digest = recording_hash(file)
         if digest in seen:
             raise RackRecordingError(
                 f'{file} and {seen[digest]} are the same to the bit; give each recording once'
@@ -286,13 +285,3 @@ def _topic(recording: Recording, name: str) -> Any:
             'a recording of the rack?'
         )
     return recording[name]
-
-
-def _hash(file: Path) -> str:
-    digest = hashlib.sha256()
-    parts = sorted(part for part in file.rglob('*.mcap*') if part.is_file()) if file.is_dir() else [file]
-    for part in parts:
-        with part.open('rb') as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
-    return digest.hexdigest()

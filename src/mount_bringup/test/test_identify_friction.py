@@ -12,8 +12,11 @@ from mount_bringup.core_chain import friction_model
 from mount_bringup.experiments.rack_recording import record_friction_rack
 from mount_bringup.friction_files import parsed_channels, read_recording
 from mount_bringup.identify_arguments import with_repeated_options
+from mount_bringup.rack_recordings import described
+from mount_bringup.recording_path import recording_hash
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
+from mount_models.friction.identification import ladder
 from mount_models.friction.identification.recording import IdentificationError
 from mount_models.specimen import default_specimen, load_specimen
 from mount_sim.rack_friction import (
@@ -63,7 +66,10 @@ def test_several_paths_after_one_option_become_repeated_options():
     assert with_repeated_options(['--train=a', 'b']) == ['--train=a', 'b']
 
 
-def test_files_give_parameters_and_a_ladder(rack, tmp_path):
+def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
+    # a search from fewer starts on fewer samples: which law is best here is no close race
+    for name, value in (('SEARCH_SAMPLES', 400), ('FINAL_SAMPLES', 1500), ('STARTS', 2), ('DRAWS', 4)):
+        monkeypatch.setattr(ladder, name, value)
     _run(
         'identify', 'friction', '--train', *(str(rack / name) for name in ('ramp.csv', '40.csv', '120.csv')),
         '--held-out', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'), '--out', str(tmp_path /
@@ -79,8 +85,13 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path):
     assert specimen.friction == pytest.approx({**result['coefficients'], **result['contact']})
     assert specimen.force_law == default_specimen().force_law
     told = specimen.provenance['parts']['friction']
-    digest = hashlib.sha256((rack / '80.csv').read_bytes()).hexdigest()
-    assert {'file': '80.csv', 'part': 'held out', 'kind': 'sawtooth', 'sha256': digest} in told['recordings']
+    digests = {
+        name: hashlib.sha256((rack / name).read_bytes()).hexdigest()
+        for name in ('ramp.csv', '40.csv', '80.csv', '120.csv')
+    }
+    assert {entry['file']: entry['sha256'] for entry in told['recordings']} == digests
+    held_out = {'file': '80.csv', 'part': 'held out', 'kind': 'sawtooth', 'sha256': digests['80.csv']}
+    assert held_out in told['recordings']
     assert told['valid']['normal_force'] == pytest.approx([40.0, 120.0], rel=0.01)
     assert told['residuals']['held_out']['80.csv'] < 0.05
     for names, matrix in told['covariance'].items():
@@ -121,9 +132,16 @@ def test_one_file_trains_on_its_first_half_and_is_tried_on_its_second(rack, tmp_
     from mount_models.friction.identification.ladder import fit_ladder
     from mount_models.friction.identification.laws.coulomb import Coulomb
 
+    whole = read_recording(rack / '80.csv')
+    middle = whole.force.size // 2
+
     def quick(training, held_out, **others):
         assert [each.name for each in training] == ['80.csv, first half']
         assert [each.name for each in held_out] == ['80.csv, second half']
+        for (half,), part in ((training, slice(None, middle)), (held_out, slice(middle, None))):
+            np.testing.assert_array_equal(half.displacement, whole.displacement[part])
+            np.testing.assert_array_equal(half.force, whole.force[part])
+            np.testing.assert_array_equal(half.normal_force, whole.normal_force[part])
         return fit_ladder(training, held_out, laws=[Coulomb()])
 
     monkeypatch.setattr(identify_friction, 'fit_ladder', quick)
@@ -158,10 +176,66 @@ def test_the_recordings_of_the_sawtooth_experiment_are_read_as_the_rack_measured
     )
 
 
+@pytest.fixture(scope='module')
+def in_mcap(rack):
+    """Return what the rack measured, and the folder with its MCAP recording."""
+    recorded = sawtooth(noise=RackNoise(seed=4), normal_force=70.0, speeds=(0.004, 0.008), stroke=1e-3)
+    folder = record_friction_rack(
+        rack / 'as_mcap', recorded.displacement, recorded.friction_force, recorded.normal_force, {}
+    )
+    return recorded, folder
+
+
+def test_mcap_is_read_as_the_csv_of_the_same_measurement_is(in_mcap, tmp_path):
+    recorded, folder = in_mcap
+    write_csv(recorded, tmp_path / 'same.csv')
+    (file,) = folder.glob('*.mcap')
+    same = read_recording(tmp_path / 'same.csv')
+    for other in (read_recording(folder), read_recording(file)):
+        assert other.dt == pytest.approx(same.dt, rel=1e-6)
+        assert other.displacement == pytest.approx(same.displacement, abs=1e-9)
+        assert other.force == pytest.approx(same.force, abs=1e-4)
+        assert other.normal_force == pytest.approx(same.normal_force, abs=1e-4)
+
+
+def test_channels_of_mcap_are_chosen_with_their_unit(in_mcap):
+    recorded, folder = in_mcap
+    read = read_recording(folder, parsed_channels(['friction_force=sim/clamp_force.wrench.force.z:lb']))
+    assert read.force == pytest.approx(4.4482216152605 * recorded.normal_force, rel=1e-9)
+    assert read.normal_force[:, 0] == pytest.approx(recorded.normal_force, rel=1e-9)
+    with pytest.raises(
+        IdentificationError, match=r'no topic force \(for friction_force\); it has .*clamp_force'
+    ):
+        read_recording(folder, parsed_channels(['friction_force=force.z']))
+
+
 def test_a_held_out_recording_must_be_unseen(rack, capsys):
     with pytest.raises(SystemExit):
         main(['identify', 'friction', '--train', str(rack / '40.csv'), '--held-out', str(rack / '40.csv')])
     assert 'must be unseen' in capsys.readouterr().err.replace('\n', ' ')
+
+
+def test_a_held_out_recording_must_be_unseen_under_another_name_too(rack, tmp_path, capsys):
+    seen, copy, out = rack / '40.csv', tmp_path / 'other.csv', tmp_path / 'f.json'
+    copy.write_bytes(seen.read_bytes())
+    with pytest.raises(SystemExit):
+        main(['identify', 'friction', '--train', str(seen), '--held-out', str(copy), '--json', str(out)])
+    refusal = capsys.readouterr().err.replace('\n', ' ')
+    assert 'other.csv and 40.csv (train) are the same to the bit' in refusal
+    assert not out.exists()
+
+
+def test_the_hash_of_a_recording_is_that_of_its_data_in_order(tmp_path):
+    run = tmp_path / 'run' / 'recording'
+    run.mkdir(parents=True)
+    for name, content in (('b_1.mcap', b'second'), ('a_0.mcap', b'first'), ('metadata.yaml', b'x')):
+        (run / name).write_bytes(content)
+    expected = hashlib.sha256(b'firstsecond').hexdigest()
+    assert recording_hash(run) == recording_hash(tmp_path / 'run') == expected
+    assert described([run / 'b_1.mcap', run]) == [
+        {'file': 'b_1.mcap', 'sha256': hashlib.sha256(b'second').hexdigest()},
+        {'file': 'recording', 'sha256': expected},
+    ]
 
 
 def test_parameters_need_ramp_and_sawtooth(rack, tmp_path, capsys):

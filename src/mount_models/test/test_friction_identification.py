@@ -20,13 +20,13 @@ CONTACT = FrictionContact()
 TIME = np.arange(0.0, 5.0, 1e-3)
 
 
-def ramp(contact=CONTACT, p=2e6, noise=0.0, seed=0, start=0.3):
+def ramp(contact=CONTACT, p=2e6, noise=0.0, seed=0, start=0.3, time=TIME):
     random = np.random.default_rng(seed)
-    channels = ramp_response(contact, p, 20e-6, start, 0.2, TIME)
+    channels = ramp_response(contact, p, 20e-6, start, 0.2, time)
     x, force, desired = (
         each + noise * np.sqrt(np.mean(each**2)) * random.standard_normal(each.size) for each in channels
     )
-    return checked_recording('ramp', TIME, x, force, 100.0, desired)
+    return checked_recording('ramp', time, x, force, 100.0, desired)
 
 
 def sawtooth(load, speeds=(0.002, 0.004, 0.006, 0.010), noise=0.01, seed=0, coefs=None):
@@ -65,6 +65,20 @@ def test_step_1_recovers_drawn_contacts_within_3_percent_with_noise(seed):
     contact = FrictionContact(stiff, stiff * random.uniform(0.35, 0.7), 4e6 * random.uniform(0.7, 1.4))
     fit = fit_ramp_hold(ramp(contact, 2e6 * random.uniform(0.7, 1.4), 0.01, seed))
     assert fit.contact == pytest.approx(contact, rel=0.03)
+
+
+def held(time_constants, noise):
+    return ramp(noise=noise, time=np.arange(0.0, 0.5 + time_constants * 0.44118, 1e-3))
+
+
+@pytest.mark.parametrize('noise', [0.0, 0.01])
+def test_step_1_refuses_a_ramp_that_is_held_for_less_than_three_time_constants(noise):
+    assert fit_ramp_hold(held(3.4, noise)).contact == pytest.approx(CONTACT, rel=0.05)
+    for short in (0.5, 2.6):
+        with pytest.raises(
+            IdentificationError, match=r'held for .* time constants of .* \(at least 3\).* hold for'
+        ):
+            fit_ramp_hold(held(short, noise))
 
 
 def test_step_1_refuses_a_contact_that_slides():
@@ -111,12 +125,21 @@ def test_too_few_speeds_are_refused():
         fit_coefficients(stroke_lines(sawtooth(100.0, (0.004, 0.008)), CONTACT))
 
 
-def test_one_direction_only_is_refused():
-    lines = [line for line in stroke_lines(sawtooth(100.0), CONTACT) if line.velocity > 0]
-    with pytest.raises(IdentificationError, match='only strokes to the positive side'):
+@pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
+def test_one_direction_only_is_refused(sign, side):
+    lines = [line for line in stroke_lines(sawtooth(100.0), CONTACT) if sign * line.velocity > 0]
+    with pytest.raises(IdentificationError, match=f'only strokes to the {side} side'):
         fit_coefficients(lines)
-    with pytest.raises(IdentificationError, match='positive side only'):
-        recognised(checked_recording('one way', TIME, 1e-3 * TIME, 50.0 + np.sin(TIME), 100.0))
+    with pytest.raises(IdentificationError, match=f'{side} side only'):
+        recognised(checked_recording('one way', TIME, sign * 1e-3 * TIME, 50.0 + np.sin(TIME), 100.0))
+
+
+@pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
+def test_too_few_speeds_to_one_side_are_refused(sign, side):
+    lines = stroke_lines(sawtooth(100.0), CONTACT)
+    fewer = [line for line in lines if sign * line.velocity < 0 or abs(line.velocity) < 0.005]
+    with pytest.raises(IdentificationError, match=f'2 speeds to the {side} side'):
+        fit_coefficients(fewer)
 
 
 def test_recordings_are_recognised():

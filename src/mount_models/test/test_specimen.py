@@ -3,6 +3,7 @@
 import ast
 import copy
 import math
+from copy import deepcopy
 from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
@@ -131,6 +132,48 @@ def test_a_doubtful_file_is_refused_in_a_sentence(tmp_path, path, value, sentenc
     with pytest.raises(SpecimenError, match=sentence) as refusal:
         load_specimen(file)
     assert str(file) in str(refusal.value)
+
+
+def leaves(content, path=()):
+    """Yield the path to every value that is no mapping or list itself."""
+    inner = content.items() if isinstance(content, dict) else enumerate(content)
+    for name, value in inner:
+        if isinstance(value, (dict, list)):
+            yield from leaves(value, (*path, name))
+        else:
+            yield (*path, name)
+
+
+PLAIN = {**specimen_to_mapping(DEFAULT), 'provenance': {}}
+
+
+def with_leaf(path, change):
+    """Return `PLAIN` with the value at `path` as `change` makes it of the old one; dropped if it is None."""
+    content = deepcopy(PLAIN)
+    inside = content
+    for name in path[:-1]:
+        inside = inside[name]
+    new = change(inside[path[-1]])
+    if new is None:
+        del inside[path[-1]]
+    else:
+        inside[path[-1]] = new
+    return content
+
+
+@pytest.mark.parametrize('path', list(leaves(PLAIN)), ids=lambda path: '.'.join(map(str, path)))
+def test_no_value_of_the_file_can_be_edited_without_being_refused_or_seen(path):
+    changes = [lambda old: f'{old}x' if isinstance(old, str) else 1.01 * old + 1e-9]
+    if isinstance(path[-1], str):  # a list may be shorter: laws and curves of other orders exist
+        changes.append(lambda old: None)
+    for change in changes:
+        try:
+            assert specimen_from_mapping(with_leaf(path, change)) != replace(DEFAULT, provenance={})
+        except SpecimenError:
+            continue
+    for nonsense in (math.nan, '1.0 mm', [[]], {}):
+        with pytest.raises(SpecimenError):
+            specimen_from_mapping(with_leaf(path, lambda old, new=nonsense: new if path != ('name',) else 7))
 
 
 def test_a_missing_file_is_refused():

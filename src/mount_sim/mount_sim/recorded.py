@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_sim.csv_table import RecordedInputError, read_table
+from mount_sim.csv_table import CsvTable, RecordedInputError, read_table
 
 __all__ = ['RecordedInputError', 'RecordedSignal', 'load_signal', 'resample']
 
@@ -63,12 +63,22 @@ def load_signal(
     elif path.is_dir() or path.suffix == '.npy':
         name, times, values = _load_npy(path, column)
     elif path.suffix.lower() in ('.csv', '.txt'):
-        name, times, values = _load_csv(path, column, time_column)
+        return signal_of(read_table(path), column, time_column)
     else:
         raise RecordedInputError(
             f'{path.name}: files of type {path.suffix or "(none)"!s} are not read; use .csv, .npy or .mcap'
         )
     return _checked(RecordedSignal(name, times, values))
+
+
+def signal_of(table: CsvTable, column: str, time_column: str = '') -> RecordedSignal:
+    """Return the signal in `column` (header name or number) of a CSV file, checked."""
+    header = list(table.header)
+    value_place = _column_place(table.path, header, column, 'column')
+    default_time = next((name for name in header if name.lower() in _TIME_NAMES), '0')
+    time_place = _column_place(table.path, header, time_column or default_time, 'time column')
+    times, values = table.columns(time_place, value_place)
+    return _checked(RecordedSignal(header[value_place], times, values))
 
 
 def resample(recorded: RecordedSignal, step_time: float) -> NDArray[np.float64]:
@@ -185,18 +195,6 @@ def _numbers(file: Path) -> NDArray[np.float64]:
             f'{file} holds {what}; needed are real numbers, (samples,) or (samples, columns)'
         )
     return loaded.astype(float)
-
-
-def _load_csv(
-    path: Path, column: str, time_column: str
-) -> tuple[str, NDArray[np.float64], NDArray[np.float64]]:
-    table = read_table(path)
-    header = list(table.header)
-    value_place = _column_place(path, header, column, 'column')
-    default_time = next((name for name in header if name.lower() in _TIME_NAMES), '0')
-    time_place = _column_place(path, header, time_column or default_time, 'time column')
-    times, values = table.columns(time_place, value_place)
-    return header[value_place], times, values
 
 
 def _column_place(path: Path, header: list[str], column: str, what: str) -> int:

@@ -31,6 +31,8 @@ from mount_models.single_threaded import single_threaded
 LARGEST_MISFIT = 0.08
 """Largest rms misfit over the rms of force or displacement: above, it is no ramp in microslip (chosen)."""
 LARGEST_UNCERTAINTY = 0.25
+SHORTEST_HOLD = 3.0
+"""Time constants (chosen): 5 % of the creep is left then, so its end is measured, not extrapolated."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,7 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     misfits = _relative(model[0] - x, x), _relative(model[1] - force, force)
     _check_misfit(recording.name, misfits)
     contact = _contact(recording.name, values)
+    _check_hold(recording.name, float(time[-1] - values[5] - values[6]), float(values[2]))
     covariance = _contact_covariance(values, covariance)
     deviation = FrictionContact(*(float(value) for value in np.sqrt(covariance.diagonal().clip(0.0))))
     _check_deviation(recording.name, contact, deviation)
@@ -300,12 +303,21 @@ def _check_misfit(name: str, misfits: tuple[float, float]) -> None:
             )
 
 
+def _check_hold(name: str, held: float, lag: float) -> None:
+    if held < SHORTEST_HOLD * lag:
+        raise IdentificationError(
+            f'{name}: the ramp is held for {held:.2f} s, {held / lag:.1f} time constants of {lag:.2f} s (at '
+            f'least {SHORTEST_HOLD:g}): where the creep ends is not measured; hold for '
+            f'{SHORTEST_HOLD * lag:.1f} s or longer'
+        )
+
+
 def _check_deviation(name: str, contact: FrictionContact, deviation: FrictionContact) -> None:
     for quantity, value, spread in zip(('c_R', 'd_R', 'c_Re'), contact, deviation, strict=True):
         if spread > LARGEST_UNCERTAINTY * value:
             raise IdentificationError(
                 f'{name}: {quantity} {value:.3g} is known only to {spread:.2g} (at most '
-                f'{100 * LARGEST_UNCERTAINTY:.0f} %): hold longer than three time constants, or reduce noise'
+                f'{100 * LARGEST_UNCERTAINTY:.0f} %): hold longer, or reduce noise'
             )
 
 
