@@ -7,8 +7,6 @@ import pytest
 import yaml
 
 from mount_bringup.command import main
-from mount_bringup.experiments import inductance_map
-from mount_bringup.experiments.contract import Order
 from mount_bringup.experiments.rack_recording import record_actuator_rack
 from mount_bringup.rack_columns import RackRecordingError
 from mount_bringup.rack_recordings import GivenValues, read_force, read_ripple
@@ -101,18 +99,6 @@ def test_force_points_are_means_over_small_steps_of_the_current(tmp_path):
     assert points.gap[0] == pytest.approx(349e-6)
     truth = np.array([magnetic_force(RACK.actuator, i, 349e-6) for i in points.current.tolist()])
     np.testing.assert_allclose(points.force, truth, rtol=0.02)
-
-
-def test_a_recorded_ramp_of_the_assembled_actuator_is_read(tmp_path):
-    """As the experiment on the ripple's inductance records it: a whole initialisation."""
-    outcome = inductance_map.run(Order(tmp_path, {}), lambda share, what: None)
-    (bag,) = outcome.recordings
-    (ripple,) = read_ripple([bag], {}, GivenValues({bag: 492e-6}, {}), AREA)
-    assert ripple.celsius == 20.0
-    resting = np.abs(ripple.current - 0.2) < 0.005
-    assert np.nanmean(ripple.inductance[resting]) == pytest.approx(
-        outcome.figures['ramp_inductance_at_rest_h'], rel=1e-3
-    )
 
 
 def test_a_recording_without_what_is_needed_is_refused(tmp_path):

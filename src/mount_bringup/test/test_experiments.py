@@ -1,8 +1,8 @@
 """The contract of the experiments, and each of them on a short version."""
 
 import json
-from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -20,7 +20,9 @@ from mount_bringup.experiments import (
 )
 from mount_bringup.experiments.contract import Experiment, Holds, Order, Outcome, Statement
 from mount_bringup.experiments.registry import EXPERIMENTS
+from mount_bringup.rack_recordings import GivenValues, read_ripple
 from mount_models.friction.contact import FrictionContact
+from mount_models.specimen import default_specimen
 
 PNG = b'\x89PNG'
 SHORT_SAWTOOTH = {
@@ -187,8 +189,17 @@ def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
     assert figures['initialisation']['contact_gap'] == pytest.approx(349e-6, abs=2e-6)
     assert any(low <= 0.9 <= high for low, high in figures['ambiguous_currents_a'])
     assert any(low <= 0.2 <= high for low, high in figures['unique_currents_a'])
-    recording = mount_bags.open(Path(outcome.recordings[0]))
-    assert {'/coil_ripple', '/air_gap', '/session'} <= set(recording.topics)
+    (folder,) = outcome.recordings
+    assert {'/coil_ripple', '/air_gap', '/session'} <= set(mount_bags.open(folder).topics)
+    _check_that_calibration_reads_the_ramp(folder, figures['ramp_inductance_at_rest_h'])
+
+
+def _check_that_calibration_reads_the_ramp(folder, inductance_at_rest):
+    turns_area = default_specimen().turns_area
+    (ripple,) = read_ripple([folder], {}, GivenValues({folder: 492e-6}, {}), turns_area)
+    assert ripple.celsius == 20.0
+    resting = np.abs(ripple.current - 0.2) < 0.005
+    assert np.nanmean(ripple.inductance[resting]) == pytest.approx(inductance_at_rest, rel=1e-3)
 
 
 def test_both_computations_of_the_penetration_agree_at_rest(tmp_path):

@@ -180,9 +180,7 @@ def test_the_recordings_of_the_sawtooth_experiment_are_read_as_the_rack_measured
 def in_mcap(rack):
     """Return what the rack measured, and the folder with its MCAP recording."""
     recorded = sawtooth(noise=RackNoise(seed=4), normal_force=70.0, speeds=(0.004, 0.008), stroke=1e-3)
-    folder = record_friction_rack(
-        rack / 'as_mcap', recorded.displacement, recorded.friction_force, recorded.normal_force, {}
-    )
+    folder = record_friction_rack(rack / 'as_mcap', recorded, {})
     return recorded, folder
 
 

@@ -211,8 +211,7 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
             'one-dimensional diffusion that the simulated coil uses. Equivalent depth against one dimension, '
             f'in the middle of the plate: {_told(currents, middle)}; averaged along the plate: '
             f'{_told(currents, along)}. Geometry of core and winding are chosen, so the pictures cannot be '
-            'laid '
-            "over the authors'.",
+            "laid over the authors'.",
             Holds.NOT_COMPARABLE,
         ),
     ]
@@ -234,7 +233,8 @@ EXPERIMENT = Experiment(
         'periodic state of the switched bridge. Dots: the same from a finite-element computation in two '
         'dimensions (scikit-fem, mesh of this project): nonlinear steady field of one plate with its air '
         'gap, then the alternating field about it with eddy currents. Both are driven with the same mean '
-        'flux in the middle of the plate.'
+        'flux in the middle of the plate: what is checked is the diffusion into the plate, not the flux '
+        'that passes by it, which at saturation is a large part of what the winding sees.'
     ),
     defaults=PenetrationParameters(),
     run=run,
