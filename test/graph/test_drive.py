@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import mount_bags
+from mount_bags.audit import audit
+from mount_bags.audit_report import is_lossless
 
 DATA_TOPICS = (
     'displacement',
@@ -35,10 +37,10 @@ def _payloads(folder, topic):
     return [payloads[place] for place in np.argsort(series.stamps, kind='stable')]
 
 
-def test_lockstep_repeats_itself_in_any_namespace_and_equals_the_core_run(command):
+def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equals_the_core_run(command):
     options = ('--scenario', 'bench', '--duration', '1', '--set', 'mount_sim.timeline.start=2.9')
     first = command.drive('--lockstep', *options)
-    second = command.drive('--lockstep', '--namespace', 'mount_right', *options)
+    second = command.drive('--lockstep', '--namespace', 'mount_right', '--split', '1s', *options)
     core = command.drive('--core', *options)
     assert first.code == second.code == core.code == 0, first.output + second.output + core.output
     for topic in DATA_TOPICS:
@@ -46,8 +48,12 @@ def test_lockstep_repeats_itself_in_any_namespace_and_equals_the_core_run(comman
         assert reference, topic
         assert _payloads(second.folder, topic) == reference, topic
         assert _payloads(core.folder, topic) == reference, topic
-    topics = set(mount_bags.open(second.folder / 'recording').topics)
+    recording = mount_bags.open(second.folder / 'recording')
+    topics = set(recording.topics)
     assert topics - {'/diagnostics'} == {name for name in topics if name.startswith('/mount_right/')}
+    assert len(recording.files) > 1
+    assert second.figures['lost_samples'] == 0
+    assert is_lossless(audit(recording), recording)
 
 
 def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switching_too(command):

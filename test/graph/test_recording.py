@@ -1,4 +1,4 @@
-"""Recordings that users order: by `record` beside whoever publishes, and by `drive` in several files."""
+"""Recordings that users order by `record`, beside whoever publishes."""
 
 import os
 import pty
@@ -14,8 +14,6 @@ from std_msgs.msg import String
 from typer.testing import CliRunner
 
 import mount_bags
-from mount_bags.audit import audit
-from mount_bags.audit_report import is_lossless
 from mount_bags.event_marks import read_marks
 from mount_bringup.command import app
 from mount_ros.qos import publisher_qos
@@ -124,15 +122,6 @@ def test_a_key_press_marks_and_sets_a_snapshot_off(source, command):
     recording = mount_bags.open(command.folder / 'bag')
     assert len(recording['displacement']) == 10
     assert [mark.kind for mark in read_marks(recording['event'])] == ['mark']
-
-
-def test_a_drive_in_several_files_lost_nothing(command):
-    result = command.drive('--lockstep', '--scenario', 'bench', '--duration', '1', '--split', '1s')
-    assert result.code == 0, result.output
-    assert result.figures['lost_samples'] == 0
-    recording = mount_bags.open(result.folder / 'recording')
-    assert len(recording.files) > 1
-    assert is_lossless(audit(recording), recording)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from mount_bringup.core_chain import Parameters, control_parameters
 from mount_bringup.core_recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.ending_signals import ending_signals
-from mount_bringup.evaluation import load_drive
+from mount_bringup.evaluation import Drive, load_drive
 from mount_bringup.graph import RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.preflight import preflight
@@ -56,6 +56,7 @@ class DriveOrder:
     out: Path | None = None
     priority: int = 0
     apart: bool = False  # in lock-step too every node has a process of its own
+    report: bool = True  # with a figure and a page about the run
 
 
 @dataclass
@@ -76,7 +77,8 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
     recording = open_recording(folder.recording)
     complaints += recording.warnings
     figures = _evaluate(order, folder, recording, run, console)
-    complaints += _write_report(folder, recording, console)
+    if order.report:
+        complaints += _write_report(folder, recording, console)
     return DriveOutcome(figures, folder, [folder.recording], complaints)
 
 
@@ -117,18 +119,23 @@ def _recorder_parameters(order: DriveOrder) -> RecorderParameters:
 def _evaluate(
     order: DriveOrder, folder: RunFolder, recording: Recording, run: dict[str, Any], console: Console
 ) -> dict[str, Any]:
-    from mount_bringup.figure import draw_drive  # after the drive: what draws takes a second to load
-
     drive_data = load_drive(recording, run['excitation_start'])
     audits = audit(recording)
     figures = summarise(recording, audits, drive_data, order.parameters, run)
-    control = control_parameters(order.parameters)
-    title = f'{order.scenario}, {order.mode}: mount displacement and actuator current'
-    draw_drive(drive_data, control.switch_on_level, control.switch_off_level, title, folder.figure)
+    if order.report:
+        _draw(order, folder, drive_data)
     write_json(figures, folder.summary)
     print_summary(figures, console)
     console.print(as_table(audits))
     return figures
+
+
+def _draw(order: DriveOrder, folder: RunFolder, drive_data: Drive) -> None:
+    from mount_bringup.figure import draw_drive  # after the drive: what draws takes a second to load
+
+    control = control_parameters(order.parameters)
+    title = f'{order.scenario}, {order.mode}: mount displacement and actuator current'
+    draw_drive(drive_data, control.switch_on_level, control.switch_off_level, title, folder.figure)
 
 
 def _write_report(folder: RunFolder, recording: Recording, console: Console) -> list[str]:

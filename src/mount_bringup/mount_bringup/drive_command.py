@@ -58,6 +58,9 @@ def drive(
     ] = None,
     out: NewFolder = None,
     json_file: JsonFile = None,
+    report: Annotated[
+        bool, typer.Option('--report/--no-report', help='draw the figure and write the page about the run')
+    ] = True,
     on_full: Annotated[
         str, typer.Option(help='full disk: stop the run, or continue without recording')
     ] = 'stop',
@@ -109,7 +112,7 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart)
+    order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart, report)
     console = Console()
     outcome = driving.drive(order, console)
     if json_file is not None:

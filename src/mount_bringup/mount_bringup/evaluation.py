@@ -101,11 +101,8 @@ def wanted_force(
     Wanted is what the selected damper would do at the true velocity of the mount in the band at that very
     moment, without any delay; so an error against it holds phase and delay as well as force.
     """
-    from scipy.signal import lfilter  # here, for it takes longer to load than all the rest
-
     band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, SAMPLE_TIME)
-    velocity = lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], drive.true_velocity)
-    wanted = damper.force(velocity)
+    wanted = damper.force(band_pass.filtered(band, drive.true_velocity))
     places = np.clip(np.searchsorted(drive.true_time, drive.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1)
     return wanted, places
 

@@ -88,3 +88,10 @@ def test_without_lead_the_prediction_would_be_far_off(sine):
     w0, times = 2.0 * math.pi * 8.0, 1e-3 * np.arange(3500, 4000)
     late = np.abs(velocity - 1e-3 * w0 * np.cos(w0 * (times + 0.0019))).max() / (1e-3 * w0)
     assert late == pytest.approx(2.0 * math.sin(0.5 * w0 * 0.0019), abs=0.001)
+
+
+def test_a_whole_signal_is_filtered_as_by_scipy():
+    band = band_pass.design(8.0, 1.0, 0.0, SAMPLE_TIME)
+    values = np.random.default_rng(1).normal(size=500)
+    expected = signal.lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], values)
+    np.testing.assert_allclose(band_pass.filtered(band, values), expected, rtol=0.0, atol=1e-14)
