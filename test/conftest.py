@@ -16,7 +16,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 LIMIT = 240.0  # s: only a hang takes so long
 LATE = 0.020  # s: a setpoint that comes later than this is answered with 0 A
-ATTEMPTS = 3
+ATTEMPTS = 2
 
 # About the work of the 1 kHz loop on two cores, each sample begun at its time or when the last one is done.
 # Nothing of this project takes part.
@@ -97,7 +97,7 @@ def command(tmp_path: Path, domain: int) -> Iterator[Command]:
 
 @pytest.fixture
 def drive_in_time(command: Command) -> Callable[..., Result]:
-    """Drive in real time, again if something was late; a machine too late by itself skips the test."""
+    """Drive in real time, once more if something was late; a machine too late by itself skips the test."""
 
     def drive(*options: str) -> Result:
         for _ in range(ATTEMPTS):
