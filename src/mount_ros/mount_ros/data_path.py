@@ -3,7 +3,7 @@
 While a lifecycle transition runs, the executor of its node serves nothing else. So the data path has
 its own node `<name>_io` and goes on receiving during a blocking activation. Nodes that share a process may
 share the thread too: a message from one to the other then wakes nobody, and a thread that has other work
-between the messages takes them itself, which costs a fifth of what the executor takes for it.
+between the messages takes them itself, which costs less than to have an executor tell of each.
 """
 
 import threading
