@@ -67,7 +67,7 @@ def open_bus(
 
 def may_have_frames(bus: can.BusABC) -> bool:
     """Return False only where nothing can be received now; costs less than trying."""
-    return not (isinstance(bus, VirtualBus) and bus.queue.empty())
+    return not (isinstance(bus, VirtualBus) and not bus.queue.queue)
 
 
 def _python_can_bus(interface: str, channel: str, filters: Any, **options: Any) -> can.BusABC:

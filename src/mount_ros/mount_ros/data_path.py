@@ -8,7 +8,8 @@ between the messages takes them itself, which costs less than to have an executo
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from rclpy.context import Context
@@ -20,11 +21,11 @@ from rclpy.subscription import Subscription
 
 from mount_ros.message_types import message_class
 from mount_ros.qos import control_qos, publisher_qos
-from mount_ros.topics import Topic
+from mount_ros.topics import Delivery, Topic
 
 _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
 _IDLE_PERIOD = 1e-4  # s, chosen: how long it sleeps when there is neither message nor work
-_REST_PERIOD = 0.05  # s, chosen
+_RARE_PERIOD = 0.02  # s, chosen: how often it looks at what nobody waits for
 
 Work = Callable[[], bool]
 """Does what there is to do without waiting; returns whether there was anything."""
@@ -51,8 +52,7 @@ class DataPath:
         self.node = io_node(owner)
         self._serving = False
         self._publishers: list[Publisher] = []
-        self._subscriptions: list[Subscription] = []
-        self._resting: _RareLook | None = None
+        self._inlets = _Inlets()
         self._works: list[Work] = []
         self._stopped = False
 
@@ -78,20 +78,23 @@ class DataPath:
             control_qos(topic, lockstep=self.lockstep),
             raw=True,
         )
-        self._subscriptions.append(subscription)
+        inlets = self._inlets.latched if topic.delivery is Delivery.LATCHED else self._inlets.prompt
+        inlets.append(subscription)
+        if self._serving:
+            self._thread.add(self.node, self._inlets)
 
     def unmatched(self) -> list[str]:
         """Return the names of the topics that nobody on the other side has been found for yet.
 
         Data sent before both sides have found each other is lost without a word.
         """
-        alone = [s.topic_name for s in self._subscriptions if s.get_publisher_count() == 0]
+        alone = [s.topic_name for s in self._inlets.all() if s.get_publisher_count() == 0]
         alone += [p.topic_name for p in self._publishers if p.get_subscription_count() == 0]
         return sorted(set(alone))
 
     def start(self) -> None:
         """Begin to serve the subscriptions."""
-        self._thread.add(self.node, self._subscriptions)
+        self._thread.add(self.node, self._inlets)
         self._serving = True
 
     def attend(self, work: Work) -> None:
@@ -108,17 +111,12 @@ class DataPath:
             self._thread.leave(self._works.pop())
 
     def rest(self) -> None:
-        """From now on only look at what came last, a few times a second: nobody waits for an answer."""
-        if self._resting is None and self._serving:
-            self._thread.remove(self.node)
-            self._resting = _RareLook(self._subscriptions)
+        """From now on only look at what has come a few times in 0.1 s: nobody waits for an answer."""
+        self._set_resting(True)
 
     def wake(self) -> None:
         """Serve each message at once again."""
-        if self._resting is not None:
-            self._resting.end()
-            self._resting = None
-            self._thread.add(self.node, self._subscriptions)
+        self._set_resting(False)
 
     def stop(self) -> None:
         """End serving and destroy the node; safe to call twice."""
@@ -126,11 +124,14 @@ class DataPath:
             return
         self._stopped = True
         self.leave_work()
-        if self._resting is not None:
-            self._resting.end()
-        elif self._serving:
+        if self._serving:
             self._thread.remove(self.node)
         self.node.destroy_node()
+
+    def _set_resting(self, resting: bool) -> None:
+        if self._serving and not self._stopped and self._inlets.resting != resting:
+            self._inlets.resting = resting
+            self._thread.add(self.node, self._inlets)
 
     def _surviving(self, trouble: str, callback: Callable[..., Any]) -> Callable[..., Any]:
         # The border of the data thread: an exception would end it, and with it every node that it serves.
@@ -146,6 +147,18 @@ class DataPath:
         return guarded
 
 
+@dataclass
+class _Inlets:
+    """The subscriptions of a node: those that somebody waits for, and those to look at now and then."""
+
+    prompt: list[Subscription] = field(default_factory=list)
+    latched: list[Subscription] = field(default_factory=list)
+    resting: bool = False
+
+    def all(self) -> list[Subscription]:
+        return self.prompt + self.latched
+
+
 class DataThread:
     """A thread that serves nodes and does attended work; it lives as long as there is one or the other.
 
@@ -158,14 +171,14 @@ class DataThread:
         self._context = context
         self._executor: Executor | None = None
         self._thread: threading.Thread | None = None
-        self._nodes: dict[Node, list[Subscription]] = {}
+        self._nodes: dict[Node, _Inlets] = {}
         self._works: list[Work] = []
         self._changes: list[tuple[Callable[[], Any], threading.Event]] = []
         self._guard = threading.Lock()
 
-    def add(self, node: Node, subscriptions: list[Subscription]) -> None:
-        """Serve `node` from now on, with all that is or comes into the list of its `subscriptions`."""
-        self._change(lambda: self._nodes.update({node: subscriptions}))
+    def add(self, node: Node, inlets: _Inlets) -> None:
+        """Serve `node` from now on, with what its `inlets` are now."""
+        self._change(lambda: self._nodes.update({node: inlets}))
 
     def remove(self, node: Node) -> None:
         """Return when `node` is served no more and none of its callbacks runs."""
@@ -196,12 +209,12 @@ class DataThread:
 
     def _serve(self, executor: Executor) -> None:
         while self._apply_changes(executor):
+            # The last first: who listens was there before who speaks.
+            inlets = list(self._nodes.values())[::-1]
             if self._works:
-                self._work_and_take()
+                self._work_and_take(inlets)
             else:
-                # spin() of this executor dispatches nothing in the pinned wheels; spin_once does, one event.
-                while not self._changes:
-                    executor.spin_once(_SPIN_PERIOD)
+                self._wait_for_events(executor, inlets)
 
     def _apply_changes(self, executor: Executor) -> bool:
         """Return whether there is anything left to serve or to do."""
@@ -209,7 +222,8 @@ class DataThread:
             changes, self._changes = self._changes, []
             for change, _ in changes:
                 change()
-            wanted = set() if self._works else set(self._nodes)
+            waking = {node for node, inlets in self._nodes.items() if not inlets.resting}
+            wanted = set() if self._works else waking
             served = set(executor.get_nodes())
             for node in served - wanted:
                 executor.remove_node(node)
@@ -222,46 +236,47 @@ class DataThread:
                 done.set()
             return serving
 
-    def _work_and_take(self) -> None:
+    def _wait_for_events(self, executor: Executor, nodes: Sequence[_Inlets]) -> None:
+        look = _RareLook([s for inlets in nodes if inlets.resting for s in inlets.all()])
+        period = _RARE_PERIOD if look.needed else _SPIN_PERIOD
+        # spin() of this executor dispatches nothing in the pinned wheels; spin_once does, one event.
+        while not self._changes:
+            executor.spin_once(period)
+            look()
+
+    def _work_and_take(self, nodes: Sequence[_Inlets]) -> None:
         works = self._works[::-1]
-        nodes = list(self._nodes.values())[::-1]
+        prompt = [s for inlets in nodes if not inlets.resting for s in inlets.prompt]
+        # What is asked for each message is looked up once: there are several per sample, and most rounds are one.
+        takes = [(s.handle.take_message, s.msg_type, s.callback) for s in prompt]
+        look = _RareLook([s for inlets in nodes for s in (inlets.all() if inlets.resting else inlets.latched)])
         while not self._changes:
             busy = False
             for work in works:
                 busy |= work()
-            for subscriptions in nodes:
-                for subscription in subscriptions:
-                    busy |= _take_all(subscription)
+            for take, kind, callback in takes:
+                taken = take(kind, True)
+                if taken is not None:
+                    callback(taken[0])
+                    busy = True
+            look()
             if not busy:
                 time.sleep(_IDLE_PERIOD)
 
 
-def _take_all(subscription: Subscription) -> bool:
-    """Hand all messages that have come to the callback; return whether there was any."""
-    handle, kind = subscription.handle, subscription.msg_type
-    taken_any = False
-    with handle:
-        while (taken := handle.take_message(kind, True)) is not None:
-            subscription.callback(taken[0])
-            taken_any = True
-    return taken_any
-
-
 class _RareLook:
-    """Takes what has come on some subscriptions a few times a second, in a thread of its own."""
+    """Hands over what has come on some subscriptions, when it is called after `_RARE_PERIOD` again."""
 
-    def __init__(self, subscriptions: list[Subscription]):
+    def __init__(self, subscriptions: Sequence[Subscription]):
+        self.needed = bool(subscriptions)
         self._subscriptions = subscriptions
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._look, name='rare_look', daemon=True)
-        self._thread.start()
+        self._next = 0.0
 
-    def end(self) -> None:
-        """Return when nothing is taken any more."""
-        self._ending.set()
-        self._thread.join()
-
-    def _look(self) -> None:
-        while not self._ending.wait(_REST_PERIOD):
-            for subscription in self._subscriptions:
-                _take_all(subscription)
+    def __call__(self) -> None:
+        if time.monotonic() < self._next:
+            return
+        for subscription in self._subscriptions:
+            take, kind = subscription.handle.take_message, subscription.msg_type
+            while (taken := take(kind, True)) is not None:
+                subscription.callback(taken[0])
+        self._next = time.monotonic() + _RARE_PERIOD

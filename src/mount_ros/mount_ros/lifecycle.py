@@ -20,13 +20,14 @@ class SafeLifecycleNode(LifecycleNode):
 
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
-        self.declare_parameter('lockstep', False)
+        self._lockstep = bool(self.declare_parameter('lockstep', False).value)
         self.data_path: DataPath | Collector | None = None
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
         self._diagnostics = Diagnostics(self, self._present_verdict)
+        self._diagnostics.start()
 
     # What a node fills in.
 
@@ -55,8 +56,8 @@ class SafeLifecycleNode(LifecycleNode):
 
     @property
     def lockstep(self) -> bool:
-        """Whether time stands in the stamps alone."""
-        return bool(self.get_parameter('lockstep').value)
+        """Whether time stands in the stamps alone; as it was when the node was configured."""
+        return self._lockstep
 
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
@@ -72,18 +73,21 @@ class SafeLifecycleNode(LifecycleNode):
 
     def close(self) -> None:
         """Leave the active state and release everything; called once at the end of the process."""
-        if self._active:
-            self._leave_active()
-        self._release()
+        with self._diagnostics.pause:
+            if self._active:
+                self._leave_active()
+            self._release()
 
     def destroy_node(self) -> None:
         """Destroy the node at once; rclpy leaves it in the graph until nothing refers to its services."""
+        self._diagnostics.stop()
         super().destroy_node()
         self._state_machine.destroy_when_not_in_use()
 
     # Transitions.
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._lockstep = bool(self.get_parameter('lockstep').value)
         return self._attempt('configure', self.configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -112,7 +116,8 @@ class SafeLifecycleNode(LifecycleNode):
         # rclpy lets a transition that is not valid in the present state end the process with an
         # exception; a node that drives a coil answers "no" and goes on.
         try:
-            return super()._LifecycleNodeMixin__change_state(transition_id)  # type: ignore[misc]
+            with self._diagnostics.pause:
+                return super()._LifecycleNodeMixin__change_state(transition_id)  # type: ignore[misc]
         except Exception as error:
             self.get_logger().warning(f'transition {transition_id} refused: {error}')
             return TransitionCallbackReturn.FAILURE
