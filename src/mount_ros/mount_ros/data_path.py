@@ -25,7 +25,7 @@ from mount_ros.topics import Delivery, Topic
 
 _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
 _IDLE_PERIOD = 1e-4  # s, chosen: how long it sleeps when there is neither message nor work
-_RARE_PERIOD = 0.02  # s, chosen: how often it looks at what nobody waits for
+_RARE_PERIOD = 0.05  # s, chosen: how often it looks at what nobody waits for
 
 Work = Callable[[], bool]
 """Does what there is to do without waiting; returns whether there was anything."""
@@ -111,7 +111,7 @@ class DataPath:
             self._thread.leave(self._works.pop())
 
     def rest(self) -> None:
-        """From now on only look at what has come a few times in 0.1 s: nobody waits for an answer."""
+        """From now on only look at what has come a few times a second: nobody waits for an answer."""
         self._set_resting(True)
 
     def wake(self) -> None:
