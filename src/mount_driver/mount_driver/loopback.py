@@ -7,10 +7,10 @@ it works without any, and no frame that moves an actuator can leave the machine.
 
 import ctypes
 import ipaddress
+import math
 import select
 import socket
 import struct
-import time
 from typing import Any
 
 import can
@@ -19,6 +19,9 @@ from can.interfaces.udp_multicast.utils import pack_message, unpack_message
 _LOOPBACK = '127.0.0.1'
 _LARGEST_DATAGRAM = 4096  # bytes; a frame takes about 200
 _SO_ATTACH_FILTER = 26  # Linux, asm-generic/socket.h
+_SO_TIMESTAMPNS = 35  # Linux, asm-generic/socket.h: the kernel tells when a datagram arrived
+_TIME = struct.Struct('@ll')  # s, ns
+_ROOM_FOR_TIME = socket.CMSG_SPACE(_TIME.size)
 
 
 class LoopbackMulticastBus(can.BusABC):
@@ -57,13 +60,13 @@ class LoopbackMulticastBus(can.BusABC):
         try:
             if not self._poll.poll(None if timeout is None else max(timeout, 0.0) * 1e3):
                 return None, False
-            datagram = self._socket.recv(_LARGEST_DATAGRAM)
+            datagram, told, _, _ = self._socket.recvmsg(_LARGEST_DATAGRAM, _ROOM_FOR_TIME)
         except BlockingIOError:
             return None, False
         except OSError as error:
             raise can.CanOperationError(f'receiving failed: {error.strerror}', error.errno) from error
         try:
-            message = unpack_message(datagram, replace={'timestamp': time.time()})
+            message = unpack_message(datagram, replace={'timestamp': _arrival(told)})
         except (TypeError, ValueError):
             self.foreign_datagrams += 1  # somebody else uses this group and port; no reason to stop
             return None, False
@@ -79,6 +82,7 @@ def _receiving_socket(channel: str, port: int) -> socket.socket:
     try:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        sock.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         sock.bind(('', port))
         membership = address.packed + socket.inet_aton(_LOOPBACK)
         sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
@@ -87,6 +91,15 @@ def _receiving_socket(channel: str, port: int) -> socket.socket:
         sock.close()
         raise
     return sock
+
+
+def _arrival(told: list[tuple[int, int, bytes]]) -> float:
+    """Return the system time (s) at which the kernel received the datagram; NaN where it did not say."""
+    for level, kind, data in told:
+        if (level, kind) == (socket.SOL_SOCKET, _SO_TIMESTAMPNS):
+            seconds, nanoseconds = _TIME.unpack_from(data)
+            return seconds + 1e-9 * nanoseconds
+    return math.nan
 
 
 def _sending_socket() -> socket.socket:

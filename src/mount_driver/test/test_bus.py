@@ -2,6 +2,7 @@
 
 import os
 import socket
+import time
 
 import can
 import pytest
@@ -29,6 +30,15 @@ def test_a_frame_arrives_as_can_fd_with_its_data(pair):
     far.send(frame(0x210, bytes(range(24)), bitrate_switch=True))
     message = near.recv(10.0)
     assert (message.arbitration_id, message.data, message.is_fd) == (0x210, bytes(range(24)), True)
+
+
+def test_a_frame_tells_when_it_arrived_not_when_it_was_read(pair):
+    far, near = pair
+    before = time.time()
+    far.send(frame(0x210))
+    after = time.time()
+    time.sleep(0.02)
+    assert before <= near.recv(10.0).timestamp <= after
 
 
 def test_frames_with_other_identifiers_are_filtered_out(pair):

@@ -83,6 +83,14 @@ class DataPath:
         if self._serving:
             self._thread.add(self.node, self._inlets)
 
+    def unsubscribe(self, topic: Topic) -> None:
+        """Hear no more of `topic`, also if it was not subscribed: no message is taken after the return."""
+        name = self.node.resolve_topic_name(topic.name)
+        for subscription in self._inlets.drop(name):
+            if self._serving:
+                self._thread.add(self.node, self._inlets)
+            self.node.destroy_subscription(subscription)
+
     def unmatched(self) -> list[str]:
         """Return the names of the topics that nobody on the other side has been found for yet.
 
@@ -158,6 +166,12 @@ class _Inlets:
     def all(self) -> list[Subscription]:
         return self.prompt + self.latched
 
+    def drop(self, name: str) -> list[Subscription]:
+        dropped = [s for s in self.all() if s.topic_name == name]
+        self.prompt = [s for s in self.prompt if s not in dropped]
+        self.latched = [s for s in self.latched if s not in dropped]
+        return dropped
+
 
 class DataThread:
     """A thread that serves nodes and does attended work; it lives as long as there is one or the other.
@@ -229,6 +243,8 @@ class DataThread:
                 executor.remove_node(node)
             for node in wanted - served:
                 executor.add_node(node)
+            if served - wanted:
+                _take_effect(executor)
             serving = bool(self._nodes) or bool(self._works)
             if not serving:
                 self._executor = None
@@ -246,10 +262,13 @@ class DataThread:
 
     def _work_and_take(self, nodes: Sequence[_Inlets]) -> None:
         works = self._works[::-1]
-        prompt = [s for inlets in nodes if not inlets.resting for s in inlets.prompt]
-        # What is asked for each message is looked up once: there are several per sample, and most rounds are one.
+        prompt, rare = [], []
+        for inlets in nodes:
+            prompt += [] if inlets.resting else inlets.prompt
+            rare += inlets.all() if inlets.resting else inlets.latched
+        # Looked up once: to ask each subscription for its parts costs as much as to take a message.
         takes = [(s.handle.take_message, s.msg_type, s.callback) for s in prompt]
-        look = _RareLook([s for inlets in nodes for s in (inlets.all() if inlets.resting else inlets.latched)])
+        look = _RareLook(rare)
         while not self._changes:
             busy = False
             for work in works:
@@ -262,6 +281,17 @@ class DataThread:
             look()
             if not busy:
                 time.sleep(_IDLE_PERIOD)
+
+
+def _take_effect(executor: Executor) -> None:
+    """Return when the executor has let go of removed nodes, which it does by an event of its own.
+
+    Until then it holds their subscriptions, and notes each message that comes for ever.
+    """
+    reached: list[bool] = []
+    executor.create_task(reached.append, True)
+    while not reached:
+        executor.spin_once(_SPIN_PERIOD)
 
 
 class _RareLook:

@@ -55,6 +55,7 @@ def pair(make_end):
     sender.path.start()
     receiver.path.start()
     wait_until(lambda: not sender.path.unmatched() and not receiver.path.unmatched(), 'connection')
+    receiver.sender_has_one = lambda: not sender.path.unmatched()
     return receiver, lambda stamp: publish(sender.layout.pack(stamp, (0.0,)))
 
 
@@ -107,6 +108,25 @@ def test_a_resting_path_can_be_stopped(pair):
     assert len(_data_threads()) == 2
     receiver.path.stop()
     assert len(_data_threads()) == 1  # that of the sender
+
+
+@pytest.mark.parametrize('working', [False, True])
+def test_what_is_no_more_subscribed_is_heard_no_more_until_it_is_again(pair, working):
+    receiver, send = pair
+    if working:
+        receiver.path.attend(lambda: False)
+    for turn in range(5):
+        send(2 * turn)
+        wait_until(lambda turn=turn: receiver.stamps[-1:] == [2 * turn], 'arrival')
+        receiver.path.unsubscribe(DISPLACEMENT)
+        receiver.path.unsubscribe(DISPLACEMENT)  # a second time changes nothing
+        wait_until(lambda: receiver.path.node.count_subscribers('displacement') == 0, 'the end')
+        send(2 * turn + 1)
+        receiver.path.subscribe(DISPLACEMENT, receiver.take)
+        wait_until(lambda: not receiver.path.unmatched(), 'publisher found')
+        wait_until(lambda: receiver.path.node.count_subscribers('displacement') == 1, 'subscriber')
+        wait_until(lambda: receiver.sender_has_one(), 'subscriber found')
+    assert receiver.stamps == [0, 2, 4, 6, 8]
 
 
 def test_a_path_that_was_never_started_neither_rests_nor_hangs(make_end):

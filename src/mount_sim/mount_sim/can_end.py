@@ -1,6 +1,6 @@
 """The far end of the CAN bus: sends what the electronics measure, receives and judges setpoints."""
 
-import threading
+import math
 import time
 from dataclasses import dataclass
 
@@ -14,12 +14,12 @@ from mount_sim.electronics import Reading
 
 _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFFFFFF
-_RECEIVE_PATIENCE = 0.1  # s: how often the receiving thread looks whether it shall end
+_CREDIBLE_AGE = 10.0  # s, chosen: a frame's time stamp that is farther from now is of another clock
 
 
 @dataclass(frozen=True)
 class ReceivedSetpoint:
-    """A setpoint with the steady time (s) of its arrival."""
+    """A setpoint with the time of its arrival by the system clock (s), NaN where the bus does not tell it."""
 
     setpoint: Setpoint
     arrival: float
@@ -38,19 +38,11 @@ class CanEnd:
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
         self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint)
-        self._latest: ReceivedSetpoint | None = None
-        self._thread: threading.Thread | None = None
-        self._ending = threading.Event()
 
     @property
     def corrupt_setpoints(self) -> int:
         """Setpoint frames that were not used."""
         return self._receiver.corrupt
-
-    @property
-    def latest(self) -> ReceivedSetpoint | None:
-        """The newest good setpoint."""
-        return self._latest
 
     def measurement_frame(
         self, number: int, microseconds: int, reading: Reading, enabled: bool
@@ -82,35 +74,29 @@ class CanEnd:
         end = time.monotonic() + limit
         while True:
             remaining = end - time.monotonic()
-            received = self._receive(max(0.0, min(remaining, _RECEIVE_PATIENCE)))
+            frame = self._bus.recv(max(0.0, remaining))
+            received = None if frame is None else self._setpoint_in(frame)
             if received is not None and received.answers(number & _COUNTER_MASK):
                 return received
-            if remaining <= 0.0 or self._ending.is_set():
+            if remaining <= 0.0:
                 return None
 
-    def listen(self) -> None:
-        """Receive setpoints in a thread from now on; `latest` is the newest."""
-        self._thread = threading.Thread(target=self._listen, name='can_end', daemon=True)
-        self._thread.start()
+    def newest(self) -> ReceivedSetpoint | None:
+        """Take all frames that have come since the last call and return the last good setpoint in them."""
+        newest = None
+        while may_have_frames(self._bus) and (frame := self._bus.recv(0.0)) is not None:
+            newest = self._setpoint_in(frame) or newest
+        return newest
 
     def close(self) -> None:
-        """End the thread and the bus; safe to call twice."""
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
+        """End the bus; safe to call twice."""
         self._bus.shutdown()
 
-    def _listen(self) -> None:
-        while not self._ending.is_set():
-            self._receive(_RECEIVE_PATIENCE)
-
-    def _receive(self, limit: float) -> ReceivedSetpoint | None:
-        frame = self._bus.recv(limit)
-        if frame is None or frame.arbitration_id != self._codec.setpoint.frame_id:
+    def _setpoint_in(self, frame: can.Message) -> ReceivedSetpoint | None:
+        if frame.arbitration_id != self._codec.setpoint.frame_id:
             return None
         setpoint = self._receiver.receive(frame.data)
         if setpoint is None:
             return None
-        self._latest = ReceivedSetpoint(setpoint, time.monotonic())
-        return self._latest
+        credible = abs(time.time() - frame.timestamp) < _CREDIBLE_AGE
+        return ReceivedSetpoint(setpoint, frame.timestamp if credible else math.nan)

@@ -60,15 +60,10 @@ class ElectronicsLoop:
 
     def run_in_real_time(self, ending: threading.Event) -> None:
         """Sample at 1 kHz of the electronics' clock until the run is over or `ending` is set."""
-        self._can_end.listen()
         period = SAMPLE_TIME / (1.0 + self._electronics.clock_drift)
-        taken: ReceivedSetpoint | None = None
         begin = time.monotonic()
         while not self._mount.finished and not ending.is_set():
-            latest = self._can_end.latest
-            new = latest if latest is not taken else None
-            taken = latest
-            self._tick(new)
+            self._tick(self._can_end.newest())
             self.figures.wall_time = time.monotonic() - begin
             remaining = begin + self._mount.sample * period - time.monotonic()
             if remaining > 0.0:
@@ -113,7 +108,7 @@ class ElectronicsLoop:
             number, number * round(SAMPLE_TIME * _MICROSECONDS), reading, mount.enabled
         )
         arriving = self._fault.frame(now, number, frame)
-        self._sent_at[number % _REMEMBERED] = time.monotonic()
+        self._sent_at[number % _REMEMBERED] = time.time()
         if arriving is not None:
             self._can_end.send_frame(arriving)
         if number % STATUS_EVERY == 0:
@@ -134,7 +129,8 @@ class ElectronicsLoop:
         self.figures.answered += 1
         sent = self._sent_at[received.setpoint.answered_counter % _REMEMBERED]
         self.last_latency = received.arrival - sent
-        self.figures.latency.add(self.last_latency)
+        if self.last_latency == self.last_latency:  # the bus tells when its frames arrive
+            self.figures.latency.add(self.last_latency)
 
     def _take_answer(self, answer: ReceivedSetpoint) -> None:
         now = time.monotonic()

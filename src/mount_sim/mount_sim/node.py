@@ -2,6 +2,7 @@
 
 import threading
 
+import can
 from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import Imu
 
@@ -109,7 +110,7 @@ class MountSim(SafeLifecycleNode):
                 self._loop.run_in_lockstep(self._ending, self._patience)
             else:
                 self._loop.run_in_real_time(self._ending)
-        except (NoAnswerError, OSError) as error:
+        except (NoAnswerError, OSError, can.CanError) as error:
             self._fail(error)
 
     def _step(self) -> bool:
@@ -118,7 +119,7 @@ class MountSim(SafeLifecycleNode):
             return False
         try:
             return loop.step_in_lockstep(self._patience)
-        except (NoAnswerError, OSError) as error:
+        except (NoAnswerError, OSError, can.CanError) as error:
             self._fail(error)
             return False
 

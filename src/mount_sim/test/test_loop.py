@@ -3,6 +3,7 @@
 import itertools
 import math
 import threading
+import time
 
 import can
 import pytest
@@ -98,7 +99,6 @@ def test_only_the_answer_to_the_asked_sample_ends_the_wait(ends):
         host.send(Setpoint(0.1 * counter, counter))
     received = end.wait_for_answer(7, LIMIT)
     assert received.setpoint == Setpoint(pytest.approx(0.7), 7, True)
-    assert end.latest is received
     assert end.wait_for_answer(7, 0.01) is None
 
 
@@ -112,7 +112,8 @@ def test_a_frame_that_switches_off_answers_no_sample(ends):
     end, host = ends
     host.send(Setpoint(0.0, 7, enable=False))
     assert end.wait_for_answer(7, 0.05) is None
-    assert not end.latest.setpoint.enable  # but it is taken over where nobody waits
+    host.send(Setpoint(0.0, 7, enable=False))
+    assert not end.newest().setpoint.enable  # but it is taken over where nobody waits
 
 
 def test_damaged_and_foreign_frames_are_no_setpoints(ends):
@@ -121,12 +122,31 @@ def test_damaged_and_foreign_frames_are_no_setpoints(ends):
     host.bus.send(_frame(b'\0' * 8, identifier=0x123))
     assert end.wait_for_answer(7, 0.05) is None
     assert end.corrupt_setpoints == 1
-    assert end.latest is None
+    host.send(Setpoint(0.5, 7), damage=0x10)
+    assert end.newest() is None
+
+
+def test_of_several_setpoints_the_newest_good_one_counts_and_none_counts_twice(ends):
+    end, host = ends
+    host.send(Setpoint(0.5, 7))
+    host.send(Setpoint(0.75, 8))
+    host.send(Setpoint(1.0, 9), damage=0x10)
+    assert end.newest().setpoint == Setpoint(0.75, 8, True)
+    assert end.newest() is None
+
+
+def test_the_time_of_arrival_is_that_of_the_bus_and_unknown_where_its_clock_is_another(ends):
+    end, host = ends
+    before = time.time()
+    host.send(Setpoint(0.5, 7))
+    assert before <= end.newest().arrival <= time.time()
+    host.bus.preserve_timestamps = True  # those of the sender: 0 s
+    host.send(Setpoint(0.5, 7))
+    assert math.isnan(end.newest().arrival)
 
 
 def test_closing_twice_does_no_harm(ends):
     end, _ = ends
-    end.listen()
     end.close()
     end.close()
 
