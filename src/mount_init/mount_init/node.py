@@ -48,15 +48,13 @@ class MountInit(SafeLifecycleNode):
         self._send_air_gap = path.sender(topics.AIR_GAP)
         self._send_table = path.sender(topics.CURRENT_FORCE_TABLE)
         self._dialogue = CoilDialogue(self._publish_setpoint)
-        path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
         path.subscribe(topics.COIL_TEMPERATURE, self._on_temperature)
-        path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
+        self._subscribe_streams(path)
         path.start()
 
     def activate(self) -> None:
         assert self._dialogue is not None
-        assert isinstance(self.data_path, DataPath)
-        self.data_path.wake()
+        self._listen()
         parameters = self._init_parameters
         self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
         ramp = Initialisation(self._specimen, parameters, self._temperatures)
@@ -66,7 +64,7 @@ class MountInit(SafeLifecycleNode):
         result = ramp.result()
         assert ramp.last_stamp is not None
         self._publish_result(ramp.last_stamp, result)
-        self.data_path.rest()  # with the result latched nobody waits for an answer from here
+        self._stop_listening()
         self._result = (ramp.last_stamp, result)
 
     def deactivate(self) -> None:
@@ -82,6 +80,30 @@ class MountInit(SafeLifecycleNode):
         stamp, result = self._result
         figures = InitFigures(result, stamp, self._malformed, self._malformed_reason)
         return verdict(figures, self._specimen, self._init_parameters)
+
+    # With the result latched nobody waits for an answer from here: at rest this node costs next to nothing.
+
+    def _subscribe_streams(self, path: DataPath) -> None:
+        path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
+        path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
+        self._deaf = False
+
+    def _listen(self) -> None:
+        assert self._dialogue is not None
+        assert isinstance(self.data_path, DataPath)
+        self.data_path.wake()
+        if self._deaf:
+            self._dialogue.forget_what_was_heard()
+            self._subscribe_streams(self.data_path)
+
+    def _stop_listening(self) -> None:
+        assert isinstance(self.data_path, DataPath)
+        if self.lockstep:
+            self.data_path.rest()  # the sample that waits for the next ramp must not be missed
+            return
+        self.data_path.unsubscribe(topics.COIL_RIPPLE)
+        self.data_path.unsubscribe(topics.CURRENT_SETPOINT)
+        self._deaf = True
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
         self._send_setpoint(self._setpoint.pack(stamp, (current,)))

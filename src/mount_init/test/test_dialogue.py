@@ -247,6 +247,21 @@ def test_another_node_that_has_just_fallen_silent_is_waited_for(bench):
     bench.dialogue.await_quiet(0.05, bench.ending)
 
 
+def test_after_a_time_without_listening_it_is_waited_for_quiet_and_no_old_sample_is_answered(bench):
+    bench.sample(1)
+    bench.dialogue.forget_what_was_heard()
+    bench.ending.set()  # a wait ends at once
+    with pytest.raises(CoilBusyError):
+        bench.dialogue.await_quiet(100.0, bench.ending)
+    bench.ending.clear()
+    bench.dialogue.await_quiet(0.02, bench.ending)
+    bench.start()
+    bench.sample(2)
+    assert [stamp // STEP for stamp, _ in bench.setpoints] == [2]
+    bench.ending.set()
+    bench.join()
+
+
 def test_own_setpoints_do_not_count_as_those_of_others(bench):
     bench.start()
     for number in range(1, bench.ramp.length + 1):

@@ -1,6 +1,7 @@
 """The node between electronics that wait for each answer and a lifecycle service."""
 
 import threading
+import time
 
 import pytest
 from lifecycle_msgs.msg import State, Transition
@@ -57,6 +58,17 @@ class Electronics:
 
     def send_temperature(self, celsius):
         self._send_temperature(temperature_layout().pack(self.stamp, celsius))
+
+    def kick(self, answered):
+        """Send the next sample unless more than `answered` setpoints have come; return whether they have."""
+        if len(self.setpoints) > answered:
+            return True
+        self.plant.follow(0.0)
+        self.send_sample()
+        end = time.monotonic() + 0.3
+        while len(self.setpoints) <= answered and time.monotonic() < end:
+            time.sleep(0.002)
+        return len(self.setpoints) > answered
 
     def drive_as_another_node(self, current):
         self.foreign.publish(self._setpoint.pack(self.stamp, (current,)))
@@ -250,6 +262,25 @@ def test_a_second_activation_measures_anew(graph, simulated_actuator):
     assert g.electronics.tables[1].stamp == 2 * RAMP_LENGTH * STEP
     stamps = [stamp // STEP for stamp, _ in g.electronics.setpoints]
     assert stamps == list(range(1, 2 * RAMP_LENGTH + 1))
+
+
+def test_in_real_time_the_node_hears_the_streams_only_while_it_measures(graph, simulated_actuator):
+    g = graph(lockstep=False)
+    g.configure()
+    subscribers = g.electronics.path.node.count_subscribers
+    for turn in range(2):
+        # Nobody waits for these electronics: they send until they are answered.
+        activating = threading.Thread(target=g.change, args=(Transition.TRANSITION_ACTIVATE,))
+        activating.start()
+        answered = len(g.electronics.setpoints)
+        wait_until(lambda answered=answered: g.electronics.kick(answered), 'the first answer')
+        activating.join()
+        assert g.state() == State.PRIMARY_STATE_ACTIVE
+        wait_until(lambda turn=turn: len(g.electronics.tables) == turn + 1, 'the table')
+        wait_until(lambda: subscribers('coil_ripple') == 0, 'the end of listening')
+        assert subscribers('current_setpoint') == 1  # the electronics
+        assert subscribers('coil_temperature') == 1
+        assert g.change(Transition.TRANSITION_DEACTIVATE)
 
 
 def test_without_samples_activation_is_refused(graph):
