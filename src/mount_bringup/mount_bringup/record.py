@@ -24,6 +24,7 @@ from mount_bags.writer import RecordingError
 from mount_bringup.ending_signals import ending_signals
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.replay_lockstep import ros_context, transition
+from mount_ros.process import wake
 from mount_ros.topics import EVENT, TOPICS, topic
 
 # Several may run beside a graph; by the order of names the graph's own recorder sets the automatic marks.
@@ -122,7 +123,7 @@ class _LoneRecorder:
         begun = self._thread.is_alive()
         self._ending.set()
         if begun:
-            self._executor.wake()
+            wake(self._executor)
             self._thread.join()
         self._executor.shutdown()
         if begun:

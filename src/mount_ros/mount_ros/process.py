@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from mount_ros.data_path import DataThread
@@ -18,7 +18,7 @@ from mount_ros.environment import prepare_environment
 from mount_ros.leaving import end_process, leave_middleware
 from mount_ros.lifecycle import SafeLifecycleNode
 
-_SPIN_PERIOD = 5.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
+_SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
 
 Create = Callable[[], SafeLifecycleNode]
 
@@ -56,6 +56,15 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     code = 1 if any(service.failed for service in services) else 0
     if not leave_middleware(partial(_take_down, nodes)) or code:
         end_process(code)
+
+
+def wake(executor: Executor) -> None:
+    """End the `spin_once` of another thread; `Executor.wake` alone lets it look and sleep on."""
+    executor.create_task(_nothing)
+
+
+def _nothing() -> None:
+    """Something to do."""
 
 
 def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
@@ -107,7 +116,7 @@ class _Service:
 
     def end(self) -> None:
         self._node.ending.set()
-        self._executor.wake()
+        wake(self._executor)
         self._thread.join()
         self._executor.remove_node(self._node)
         self._executor.shutdown()

@@ -5,9 +5,13 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 
+from mount_ros.process import wake
 from mount_ros.testing import LIMIT, free_domain
 
 PROGRAM = """
@@ -163,3 +167,17 @@ print('awake')
 def test_a_signal_that_another_thread_takes_wakes_the_sleeping_main_thread():
     ended = subprocess.run([sys.executable, '-c', SLEEPER], capture_output=True, text=True, timeout=LIMIT)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'awake\n', '')
+
+
+def test_an_executor_that_sleeps_can_be_woken(context):
+    node = Node('sleeper', context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    sleeping = threading.Thread(target=executor.spin_once, args=(10 * LIMIT,), daemon=True)
+    sleeping.start()
+    time.sleep(0.3)  # it shall have fallen asleep; where it has not, it must not fall asleep any more
+    wake(executor)
+    sleeping.join(LIMIT)
+    assert not sleeping.is_alive()
+    executor.shutdown()
+    node.destroy_node()
