@@ -9,6 +9,8 @@ PACKAGES := mount_models mount_ros mount_driver mount_init mount_control mount_s
 PYTHON ?= $(shell for p in /usr/bin/python3 python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 DRIVE_OPTIONS ?=
+# Processes that pass tests at the same time: one more than cores, for many tests wait for processes of their own.
+WORKERS ?= $(shell echo $$(($$(nproc) < 3 ? $$(nproc) + 1 : 4)))
 RACK := build/rack
 SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
 # A real drive, not part of this repository: docs/recorded_drive.md is written anew only where it is there.
@@ -24,7 +26,7 @@ drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and 
 	@$(BIN)/engine-mount drive $(DRIVE_OPTIONS)
 
 test: $(VENV)/.ready-dev ## pass all tests
-	@$(BIN)/python -m pytest -m 'not real_time' -n auto --maxprocesses 4 --dist worksteal
+	@$(BIN)/python -m pytest -m 'not real_time' -n $(WORKERS) --dist worksteal
 	@$(BIN)/python -m pytest -m real_time
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/experiments.md and docs/figures

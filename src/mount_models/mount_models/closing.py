@@ -115,23 +115,30 @@ def _gap_from_open(mechanics, actuator, current, gap):
 
     Over the gap the net force is convex as long as the core is not saturated: it has at most two zeros,
     of which the upper is the equilibrium. From above Newton's steps fall onto it without ever passing it.
+    With a saturated core a step may pass it; then it lies above where the step ended.
     """
     pull, slope = _pull(mechanics, actuator, current, gap)
     if pull < 0.0:
         return _gap_above(mechanics, actuator, current, gap)
     for _ in range(60):
-        if slope <= 0.0:
-            return mechanics.contact_gap
+        if slope <= 0.0 or gap - pull / slope <= mechanics.contact_gap:
+            return _gap_at_contact(mechanics, actuator, current)
         step = pull / slope
         gap -= step
-        if gap <= mechanics.contact_gap:
-            return mechanics.contact_gap
         if abs(step) < _GAP_RESOLUTION:
             return gap
         pull, slope = _pull(mechanics, actuator, current, gap)
         if pull < 0.0:
             return _gap_above(mechanics, actuator, current, gap)
     return gap
+
+
+@compiled
+def _gap_at_contact(mechanics, actuator, current):
+    """Return the contact gap, or the equilibrium above it where the spring wins there."""
+    if _pull(mechanics, actuator, current, mechanics.contact_gap)[0] < 0.0:
+        return _gap_above(mechanics, actuator, current, mechanics.contact_gap)
+    return mechanics.contact_gap
 
 
 @compiled

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -138,6 +138,7 @@ def test_every_state_is_an_equilibrium_of_its_branch(
 
 @settings(deadline=None, max_examples=60)
 @given(current=st.floats(0.0, 3.0), start=st.floats(-0.05, 1.0), spring_stiffness=st.floats(5e4, 2e6))
+@example(current=2.25, start=0.5, spring_stiffness=1321410.0)  # saturated, and just above the contact
 def test_the_state_is_the_first_equilibrium_on_the_way(current, start, spring_stiffness):
     """The halves may not jump over an equilibrium: the net force keeps its sign up to the one they reach."""
     mechanics = with_values(WIDE, spring_stiffness=spring_stiffness)
