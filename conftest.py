@@ -1,3 +1,13 @@
-"""What the tests of all packages share: the fixtures of `mount_ros.testing`."""
+"""What the tests of all packages share: the fixtures of `mount_ros.testing`, and examples that repeat.
+
+Hypothesis draws the same examples in every run, so that a test passes or fails by the code alone;
+`pytest --hypothesis-profile=exploring` draws new ones.
+"""
+
+from hypothesis import settings
 
 pytest_plugins = ['mount_ros.testing']
+
+settings.register_profile('repeatable', derandomize=True)
+settings.register_profile('exploring', derandomize=False)
+settings.load_profile('repeatable')
