@@ -24,7 +24,8 @@ from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Delivery, Topic
 
 _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
-_IDLE_PERIOD = 1e-4  # s, chosen: how long it sleeps when there is neither message nor work
+_IDLE_PERIOD = 1e-4  # s, chosen: how long it sleeps when there is neither message nor work,
+_LONGEST_IDLE_PERIOD = 2e-3  # s, chosen: and how long when it has been so for a while
 _RARE_PERIOD = 0.05  # s, chosen: how often it looks at what nobody waits for
 
 Work = Callable[[], bool]
@@ -269,6 +270,7 @@ class DataThread:
         # Looked up once: to ask each subscription for its parts costs as much as to take a message.
         takes = [(s.handle.take_message, s.msg_type, s.callback) for s in prompt]
         look = _RareLook(rare)
+        pause = _IDLE_PERIOD
         while not self._changes:
             busy = False
             for work in works:
@@ -279,8 +281,11 @@ class DataThread:
                     callback(taken[0])
                     busy = True
             look()
-            if not busy:
-                time.sleep(_IDLE_PERIOD)
+            if busy:
+                pause = _IDLE_PERIOD
+            else:
+                time.sleep(pause)
+                pause = min(2.0 * pause, _LONGEST_IDLE_PERIOD)
 
 
 def _take_effect(executor: Executor) -> None:

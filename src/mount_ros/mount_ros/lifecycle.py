@@ -1,6 +1,7 @@
 """A lifecycle node that fails closed: every error ends in the safe state, with a sentence that says why."""
 
 import threading
+from collections.abc import Callable
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
@@ -23,6 +24,7 @@ class SafeLifecycleNode(LifecycleNode):
         self._lockstep = bool(self.declare_parameter('lockstep', False).value)
         self.data_path: DataPath | Collector | None = None
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
+        self.after_configure: Callable[[], None] = _nothing  # what a process wants done then
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
@@ -88,7 +90,9 @@ class SafeLifecycleNode(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._lockstep = bool(self.get_parameter('lockstep').value)
-        return self._attempt('configure', self.configure, undo=self._release)
+        outcome = self._attempt('configure', self.configure, undo=self._release)
+        self.after_configure()
+        return outcome
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         calm_resending()
@@ -165,3 +169,7 @@ class SafeLifecycleNode(LifecycleNode):
         if not self._active:
             return Verdict(Level.OK, 'inactive')
         return self.judge()
+
+
+def _nothing() -> None:
+    """No process of its own."""
