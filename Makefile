@@ -9,6 +9,7 @@ PACKAGES := mount_models mount_ros mount_driver mount_init mount_control mount_s
 PYTHON ?= $(shell for p in /usr/bin/python3 python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 DRIVE_OPTIONS ?=
+REAL_TIME_TESTS = $(shell grep -rl --include='test_*.py' 'mark.real_time' src test)
 # Processes that pass tests at the same time: one more than cores, for many tests wait for processes of their own.
 WORKERS ?= $(shell echo $$(($$(nproc) < 3 ? $$(nproc) + 1 : 4)))
 RACK := build/rack
@@ -27,7 +28,7 @@ drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and 
 
 test: $(VENV)/.ready-dev ## pass all tests
 	@$(BIN)/python -m pytest -m 'not real_time' -n $(WORKERS) --dist worksteal
-	@$(BIN)/python -m pytest -m real_time
+	@$(BIN)/python -m pytest -m real_time $(REAL_TIME_TESTS)
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/experiments.md and docs/figures
 	@$(BIN)/engine-mount experiment all --page docs/experiments.md

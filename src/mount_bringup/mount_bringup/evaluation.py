@@ -43,11 +43,9 @@ class Drive:
 
 def load_drive(recording: Recording, excitation_start: float) -> Drive:
     """Read the signals of a drive whose excitation began `excitation_start` s after its first sample."""
-    displacement, trace, truth = (
-        recording['displacement'],
-        recording['control_trace'],
-        recording['sim/truth'],
-    )
+    names = ('displacement', 'control_trace', 'sim/truth')
+    recording.load(names)
+    displacement, trace, truth = (recording[name] for name in names)
     zero = int(truth.stamps.min()) + round(excitation_start * _SECOND)
     shown, traced, seen = (np.argsort(series.stamps) for series in (displacement, trace, truth))
     stamps = displacement.stamps[shown]
