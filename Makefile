@@ -17,6 +17,10 @@ SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
 # A real drive, not part of this repository: docs/recorded_drive.md is written anew only where it is there.
 RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 
+# Where it is set, as in many containers, every process would compile all its modules anew: half a second for each node,
+# a quarter of a minute for each process that passes tests.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help drive test experiments identify bench lint format setup setup-dev clean
 
