@@ -61,24 +61,31 @@ def _node_pids(parent: int) -> dict[str, int]:
     return found
 
 
-@pytest.mark.parametrize('moment', ['initialising', 'damping'])
-def test_ctrl_c_ends_at_zero_current_with_a_closed_recording(command, bus_listener, moment):
+def test_ctrl_c_during_the_start_ends_every_node(command, bus_listener):
     process, out = command.start_drive(*ENDLESS)
-    reached = {
-        'initialising': lambda: any(setpoint.current > 1.0 for setpoint in bus_listener),
-        'damping': lambda: _damping(bus_listener),
-    }[moment]
-    wait_until(reached, moment, LIMIT)
-    process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=LIMIT)
-    assert process.returncode == 130, output
-    assert 'interrupted' in output
-    assert bus_listener[-1].current == 0.0
-    assert not bus_listener[-1].enable
-    recording = mount_bags.open(out / 'recording')
-    assert recording.warnings == []
-    assert len(recording['displacement']) > 100
-    wait_until(lambda: not _node_pids(process.pid), 'the end of all nodes', LIMIT)
+    wait_until(lambda: (out / 'log' / 'mount_control.log').exists(), 'the start of all nodes', LIMIT)
+    _interrupt(process)
+    assert bus_listener == []
+
+
+def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_recording(command, bus_listener):
+    process, out = command.start_drive(*ENDLESS)
+    wait_until(lambda: any(setpoint.current > 1.0 for setpoint in bus_listener), 'the ramp', LIMIT)
+    _interrupt(process)
+    _expect_a_sound_end(bus_listener, out)
+
+
+def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while_it_damps(
+    command, bus_listener, domain
+):
+    first, out = command.start_drive(*ENDLESS)
+    wait_until(lambda: bus_listener, 'the first graph', LIMIT)
+    second = command.drive('--scenario', 'bench', '--duration', '1')
+    assert second.code == 1
+    assert f'a graph already runs in ROS domain {domain}' in second.output
+    wait_until(lambda: _damping(bus_listener), 'damping', LIMIT)
+    _interrupt(first)
+    _expect_a_sound_end(bus_listener, out)
 
 
 def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_listener):
@@ -116,19 +123,20 @@ def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
     assert len(mount_bags.open(result.folder / 'recording')['displacement']) == 4000
 
 
-def test_a_second_graph_on_the_same_domain_is_refused_and_ctrl_c_ends_the_first_while_it_starts(
-    command, domain
-):
-    first, out = command.start_drive(*ENDLESS)
-    wait_until(lambda: (out / 'log' / 'mount_control.log').exists(), 'the first graph', LIMIT)
-    second = command.drive('--scenario', 'bench', '--duration', '1')
-    assert second.code == 1
-    assert f'a graph already runs in ROS domain {domain}' in second.output
-    first.send_signal(signal.SIGINT)
-    output, _ = first.communicate(timeout=LIMIT)
-    assert first.returncode == 130, output
+def _interrupt(process) -> None:
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=LIMIT)
+    assert process.returncode == 130, output
     assert 'interrupted' in output
-    wait_until(lambda: not _node_pids(first.pid), 'the end of all nodes', LIMIT)
+    wait_until(lambda: not _node_pids(process.pid), 'the end of all nodes', LIMIT)
+
+
+def _expect_a_sound_end(setpoints, out) -> None:
+    assert setpoints[-1].current == 0.0
+    assert not setpoints[-1].enable
+    recording = mount_bags.open(out / 'recording')
+    assert recording.warnings == []
+    assert len(recording['displacement']) > 100
 
 
 def _damping(setpoints) -> bool:

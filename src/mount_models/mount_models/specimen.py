@@ -4,6 +4,7 @@ A specimen is what a calibration has measured and what is known by design. It ho
 simulated plant; two mounts of one car have two specimens.
 """
 
+import functools
 import math
 import os
 import tempfile
@@ -73,10 +74,11 @@ def default_specimen() -> Specimen:
 def load_specimen(path: str | Path, name: str = '') -> Specimen:
     """Return the specimen in the YAML file `path`; every doubt raises `SpecimenError` and names the entry.
 
-    With a `name`, a file for another specimen is refused.
+    With a `name`, a file for another specimen is refused. Who loads the same content twice gets the same
+    object.
     """
     try:
-        content = yaml.load(Path(path).read_text(encoding='utf-8'), Loader=_LOADER)
+        specimen = _specimen_in(Path(path).read_text(encoding='utf-8'))
     except OSError as error:
         raise SpecimenError(
             f'specimen file {path} cannot be read ({error.strerror}); give its full path'
@@ -87,8 +89,6 @@ def load_specimen(path: str | Path, name: str = '') -> Specimen:
         ) from error
     except yaml.YAMLError as error:
         raise SpecimenError(f'specimen file {path} is not valid YAML; {error}') from error
-    try:
-        specimen = specimen_from_mapping(content)
     except SpecimenError as error:
         raise SpecimenError(f'specimen file {path}: {error}') from error
     if name and specimen.name != name:
@@ -196,6 +196,12 @@ def checked_specimen(specimen: Specimen) -> Specimen:
 _READABLE = 0o644
 # The rules of safe_load, in C where PyYAML has it: all those covariances then take a tenth of the time.
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+
+# Several parts of a run load the same file, and to check it takes some 20 ms.
+@functools.lru_cache(maxsize=8)
+def _specimen_in(text: str) -> Specimen:
+    return specimen_from_mapping(yaml.load(text, Loader=_LOADER))
 
 
 def _check_version(content: Any) -> None:

@@ -71,6 +71,14 @@ def test_a_specimen_and_its_mapping_lead_back_to_each_other():
     assert specimen_from_mapping(specimen_to_mapping(DEFAULT)) == DEFAULT
 
 
+def test_a_file_that_was_written_anew_is_loaded_anew(tmp_path):
+    file = tmp_path / 'specimen.yaml'
+    save_specimen(DEFAULT, file)
+    assert load_specimen(file) is load_specimen(file)
+    save_specimen(replace(DEFAULT, name='other'), file)
+    assert load_specimen(file).name == 'other'
+
+
 def test_a_specimen_cannot_be_changed_by_accident():
     with pytest.raises(FrozenInstanceError):
         DEFAULT.turns_area = 1.0

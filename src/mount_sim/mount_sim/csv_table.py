@@ -1,7 +1,9 @@
 """A CSV file as a header and columns of numbers; whatever is no number is refused with its line."""
 
 import csv
+from collections.abc import Iterable
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +26,21 @@ class CsvTable:
     def columns(self, *places: int) -> NDArray[np.float64]:
         """Return the chosen columns as numbers, shape (columns, rows)."""
         values = np.empty((len(places), len(self.rows)))
-        for number, row in enumerate(self.rows):
-            try:
-                for column, place in enumerate(places):
-                    values[column, number] = float(row[place])
-            except (ValueError, IndexError):
-                raise RecordedInputError(
-                    f'{self.path}, line {self.lines[number]}: {",".join(row)!r} is not a line of numbers'
-                ) from None
+        try:
+            for column, place in enumerate(places):
+                values[column] = np.fromiter(map(float, map(itemgetter(place), self.rows)), float)
+        except (ValueError, IndexError):
+            raise RecordedInputError(self._first_fault(places)) from None
         return values
+
+    def _first_fault(self, places: Iterable[int]) -> str:
+        for line, row in zip(self.lines, self.rows, strict=True):
+            try:
+                for place in places:
+                    float(row[place])
+            except (ValueError, IndexError):
+                return f'{self.path}, line {line}: {",".join(row)!r} is not a line of numbers'
+        raise AssertionError('there is no fault')
 
 
 def read_table(path: Path) -> CsvTable:

@@ -1,6 +1,5 @@
 """The look that the experiments' pictures share: 1000 pixels wide, units at every axis."""
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,9 @@ import matplotlib
 
 matplotlib.use('Agg')
 
+import numpy as np
 from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -37,10 +38,10 @@ def finish(figure: Figure, file: Path, *, grid: bool = True) -> Path:
         for axes in figure.axes:
             axes.grid(alpha=0.25)
     file.parent.mkdir(parents=True, exist_ok=True)
-    drawn = io.BytesIO()
-    figure.savefig(drawn, dpi=_DPI, format='raw')
-    width, height = (round(_DPI * inches) for inches in figure.get_size_inches())
-    picture = Image.frombytes('RGBA', (width, height), drawn.getvalue()).convert('RGB')
+    figure.set_dpi(_DPI)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # once; savefig draws twice
+    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB')
     # a palette halves the file; nothing of date or program in it: the same figures give the same bytes
     picture.quantize(_COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
     return file

@@ -112,13 +112,22 @@ def _robust_parabola(powers: FloatArray, values: FloatArray) -> tuple[FloatArray
         solution = np.linalg.lstsq(powers * root[:, np.newaxis], values * root, rcond=None)[0]
         coefficients = np.asarray(solution, np.float64)
         error = np.abs(values - powers @ coefficients)
-        noise = _MAD_TO_STD * float(np.median(error)) * math.sqrt(count / (count - unknowns))
+        noise = _MAD_TO_STD * _median(error) * math.sqrt(count / (count - unknowns))
         noise = max(noise, 1e-12 * float(np.abs(values).max()))
         if turn < _TURNS_OF_WEIGHTING // 2:
             weights = noise / np.maximum(error, 0.1 * noise)
         else:
             weights = np.clip(1.0 - (error / (_BISQUARE * noise)) ** 2, 0.0, 1.0) ** 2
     return coefficients, weights, noise
+
+
+def _median(values: FloatArray) -> float:
+    """Return the median as `np.median` does, which for so few values takes three times as long."""
+    middle = values.size // 2
+    if values.size % 2:
+        return float(np.partition(values, middle)[middle])
+    low, high = np.partition(values, (middle - 1, middle))[middle - 1 : middle + 1]
+    return float(0.5 * (low + high))
 
 
 def _root_near_zero(coefficients: FloatArray, level: float) -> float:
