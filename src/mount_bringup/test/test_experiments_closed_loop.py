@@ -13,6 +13,7 @@ from mount_bringup.experiments import bench, motorway_gap, page, sensitivity, sw
 from mount_bringup.experiments.contract import Experiment, ExperimentError, Holds, Order, Outcome
 from mount_bringup.experiments.registry import EXPERIMENTS
 from mount_bringup.experiments.sensitivity_grid import Job, run_all, run_job
+from mount_bringup.experiments.sweep_evaluation import defined_peak
 from mount_models.damper import DamperError, damper_curve
 from mount_models.quantity import ParameterError
 
@@ -222,9 +223,9 @@ def test_bands_that_the_sweep_does_not_reach_are_unknown(swept):
 
 def test_a_resonance_peak_is_a_local_maximum_well_above_the_switch_on_level():
     edges = [5.0, 6.0, 7.0, 8.0]
-    assert sweep.defined_peak(edges, [0.4, 1.1, 0.6, 0.5], 0.8) == (6.5, 1.1)
-    assert sweep.defined_peak(edges, [0.4, 0.9, 0.6, 0.5], 0.8) is None
-    assert sweep.defined_peak(edges, [0.4, 1.1, 1.2, 1.3], 0.8) is None
+    assert defined_peak(edges, [0.4, 1.1, 0.6, 0.5], 0.8) == (6.5, 1.1)
+    assert defined_peak(edges, [0.4, 0.9, 0.6, 0.5], 0.8) is None
+    assert defined_peak(edges, [0.4, 1.1, 1.2, 1.3], 0.8) is None
 
 
 # Gap.

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from mount_bringup.command import app
 from mount_bringup.experiments import page, recorded_drive
 from mount_bringup.experiments.contract import ExperimentError, Holds, Order
-from mount_bringup.experiments.recorded_drive import (
+from mount_bringup.experiments.recorded_drive_evaluation import (
     ELASTOMER,
     FRICTION,
     HYDRO,

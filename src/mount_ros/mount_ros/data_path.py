@@ -81,15 +81,13 @@ class DataPath:
         )
         inlets = self._inlets.latched if topic.delivery is Delivery.LATCHED else self._inlets.prompt
         inlets.append(subscription)
-        if self._serving:
-            self._thread.add(self.node, self._inlets)
+        self._tell_thread()
 
     def unsubscribe(self, topic: Topic) -> None:
         """Hear no more of `topic`, also if it was not subscribed: no message is taken after the return."""
         name = self.node.resolve_topic_name(topic.name)
         for subscription in self._inlets.drop(name):
-            if self._serving:
-                self._thread.add(self.node, self._inlets)
+            self._tell_thread()
             self.node.destroy_subscription(subscription)
 
     def unmatched(self) -> list[str]:
@@ -103,8 +101,8 @@ class DataPath:
 
     def start(self) -> None:
         """Begin to serve the subscriptions."""
-        self._thread.add(self.node, self._inlets)
         self._serving = True
+        self._tell_thread()
 
     def attend(self, work: Work) -> None:
         """Let the thread that serves the messages do `work` too, whenever it has handled one.
@@ -140,6 +138,10 @@ class DataPath:
     def _set_resting(self, resting: bool) -> None:
         if self._serving and not self._stopped and self._inlets.resting != resting:
             self._inlets.resting = resting
+            self._tell_thread()
+
+    def _tell_thread(self) -> None:
+        if self._serving:
             self._thread.add(self.node, self._inlets)
 
     def _surviving(self, trouble: str, callback: Callable[..., Any]) -> Callable[..., Any]:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mount_bringup.experiments.bench_evaluation import COULOMB, HYDRO, OFF, ORDERS, Loop
 from mount_bringup.experiments.drawing import BLUE, GREY, RED, family, finish, new_figure
-
-if TYPE_CHECKING:
-    from mount_bringup.experiments.bench import Loop
 
 
 def draw_hysteresis(loops: dict[str, Loop], dampers: list[str], title: str, file: Path) -> Path:
     """Draw mount force over displacement for the family of characteristics, Fig. 13 left."""
-    from mount_bringup.experiments.bench import HYDRO, OFF
-
     figure = new_figure(f'Loss hysteresis of the mount at {title} (Fig. 13 left)', 6.0)
     axes = figure.subplots()
     lines = [(OFF, 'black', '-', 1.4)]
@@ -41,8 +36,6 @@ def draw_hysteresis(loops: dict[str, Loop], dampers: list[str], title: str, file
 
 def draw_harmonics(loops: dict[str, Loop], damper: str, title: str, file: Path) -> Path:
     """Draw harmonics 1 to 8 of the mount force as bars, Fig. 13 right."""
-    from mount_bringup.experiments.bench import COULOMB, HYDRO, ORDERS
-
     figure = new_figure(f'Harmonics of the mount force at {title} (Fig. 13 right)')
     axes = figure.subplots()
     places = np.arange(1, ORDERS + 1)

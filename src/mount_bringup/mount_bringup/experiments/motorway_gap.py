@@ -1,12 +1,10 @@
 """Fig. 15: over a gap in the motorway; displacement with both switching levels, and the current."""
 
-from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mount_bringup.evaluation import switching
-from mount_bringup.experiments.closed_loop import FloatArray, Ride, mode_of, ride
+from mount_bringup.experiments.closed_loop import Ride, mode_of, ride
 from mount_bringup.experiments.contract import (
     Experiment,
     Holds,
@@ -16,6 +14,14 @@ from mount_bringup.experiments.contract import (
     Statement,
     parameters_of,
 )
+from mount_bringup.experiments.motorway_gap_evaluation import (
+    FRICTION,
+    HYDRO,
+    OFF,
+    WINDOW,
+    Crossing,
+    figures_of,
+)
 from mount_bringup.experiments.numbers import numbers_of
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.parameters import ControlParameters
@@ -23,9 +29,7 @@ from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity, with_flattened
 
 NAME = 'motorway_gap'
-FRICTION, HYDRO, OFF = 'friction', 'hydromount', 'friction, 0 A'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', OFF: 'friction_off'}
-_WINDOW = (0.2, 1.2)  # s after the switch-on level was exceeded: damping has come on, the gap still rings
 _DELAY = (0.125, 0.200)  # s, chosen: one period, and up to 0.6 more for the band-pass and the rise
 _OFF_TOLERANCE = 0.020  # s, chosen
 _CLEAR = 0.75  # chosen: a clear effect leaves less than so much
@@ -39,14 +43,6 @@ class GapParameters(NamedTuple):
     duration: Annotated[float, Quantity('s', 'length of the drive', 2.5, 120.0)] = 6.0
     compared_depths: str = '0.010, 0.020, 0.030'
     damper: str = DEFAULT_DAMPER
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """The three mounts over one gap; `exceeded` (s) is when the friction mount first left the on level."""
-
-    rides: dict[str, Ride]
-    exceeded: float | None
 
 
 def run(order: Order, progress: Progress) -> Outcome:
@@ -95,59 +91,10 @@ def _exceeded(ridden: Ride, level: float, parameters: GapParameters) -> float | 
     return float(seen.time[above[0]]) if above.size else None
 
 
-def _figures_of(crossing: Crossing, control: ControlParameters) -> dict[str, Any]:
-    found: dict[str, Any] = {'exceeded_s': crossing.exceeded}
-    if crossing.exceeded is None:
-        return found | dict.fromkeys(
-            (
-                'on_delay_s',
-                'on_duration_s',
-                'off_delay_s',
-                'off_delay_in_band_s',
-                'rms_m',
-                'peak_m',
-                'highest_current_a',
-            )
-        )
-    friction = crossing.rides[FRICTION]
-    changes = switching(friction.seen)
-    on = next((time for time in changes.on if time >= crossing.exceeded), None)
-    off = None if on is None else next((time for time in changes.off if time > on), None)
-    begin, end = (crossing.exceeded + edge for edge in _WINDOW)
-    rms, peak = {}, {}
-    for name, ridden in crossing.rides.items():
-        window = (ridden.time >= begin) & (ridden.time < end)
-        rms[name] = float(np.sqrt(np.mean(ridden.displacement[window] ** 2)))
-        peak[name] = float(np.max(np.abs(ridden.displacement[ridden.time >= crossing.exceeded])))
-    return found | {
-        'on_delay_s': None if on is None else on - crossing.exceeded,
-        'on_duration_s': None if on is None or off is None else off - on,
-        'off_delay_s': None if off is None else off - _last_above(friction, control, off),
-        'off_delay_in_band_s': None if off is None else off - _last_above_in_band(friction, control, off),
-        'rms_m': rms,
-        'peak_m': peak,
-        'highest_current_a': float(friction.coil_current.max()),
-    }
-
-
-def _last_above(ridden: Ride, control: ControlParameters, off: float) -> float:
-    """Return when the displacement was last at or above the switch-off level before damping went off."""
-    return _last(ridden.seen.time, ridden.seen.displacement, control.switch_off_level, off)
-
-
-def _last_above_in_band(ridden: Ride, control: ControlParameters, off: float) -> float:
-    """Return the same of the band-passed displacement, which the control compares with the level."""
-    return _last(ridden.band_time, ridden.band_displacement, control.switch_off_level, off)
-
-
-def _last(time: FloatArray, values: FloatArray, level: float, before: float) -> float:
-    return float(time[np.flatnonzero((time < before) & (np.abs(values) >= level))[-1]])
-
-
 def _figures(
     crossings: dict[float, Crossing], parameters: GapParameters, control: ControlParameters, mode: str
 ) -> dict[str, Any]:
-    told = {f'{1e3 * depth:g} mm': _figures_of(each, control) for depth, each in crossings.items()}
+    told = {f'{1e3 * depth:g} mm': figures_of(each, control) for depth, each in crossings.items()}
     return {
         **told[f'{1e3 * parameters.gap_depth:g} mm'],
         'gap_depth_m': parameters.gap_depth,
@@ -184,7 +131,7 @@ def _on_effect(figures: dict[str, Any]) -> Statement:
     return Statement(
         'Fig. 15',
         'A significant effect of damping can be seen.',
-        f'Rms of the displacement from {_WINDOW[0]:g} to {_WINDOW[1]:g} s behind that moment over that '
+        f'Rms of the displacement from {WINDOW[0]:g} to {WINDOW[1]:g} s behind that moment over that '
         f'of the same mount without current, by depth of the gap, {told}; counted as significant below '
         f'{_CLEAR:g} (chosen). The first peak comes before damping and is the same.',
         _verdict([share < _CLEAR for share in known]),

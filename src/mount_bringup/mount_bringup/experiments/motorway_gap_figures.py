@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mount_bringup.experiments.drawing import BLUE, GREEN, GREY, RED, finish, new_figure
+from mount_bringup.experiments.motorway_gap_evaluation import FRICTION, HYDRO, OFF, Crossing
 
 if TYPE_CHECKING:
-    from mount_bringup.experiments.motorway_gap import Crossing
     from mount_control.parameters import ControlParameters
 
 _BEFORE, _AFTER = 0.3, 1.5  # s round the moment at which the switch-on level is exceeded
@@ -18,8 +18,6 @@ _BEFORE, _AFTER = 0.3, 1.5  # s round the moment at which the switch-on level is
 
 def draw_gap(crossing: Crossing, depth: float, control: ControlParameters, file: Path) -> Path:
     """Draw displacement with both switching levels above, the coil's current below, Fig. 15."""
-    from mount_bringup.experiments.motorway_gap import FRICTION, HYDRO, OFF
-
     figure = new_figure(f'Over a gap of {1e3 * depth:g} mm in the motorway (Fig. 15)', 6.5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     friction = crossing.rides[FRICTION]

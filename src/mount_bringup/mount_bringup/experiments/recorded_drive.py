@@ -1,11 +1,9 @@
 """A recorded drive of a real car: friction mount, hydromount and elastomer alone on the same acceleration."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mount_bringup.evaluation import switching
 from mount_bringup.experiments.closed_loop import FloatArray, Ride, mode_of, ride
@@ -19,6 +17,19 @@ from mount_bringup.experiments.contract import (
     Statement,
     parameters_of,
 )
+from mount_bringup.experiments.recorded_drive_evaluation import (
+    BANDS,
+    ELASTOMER,
+    FRICTION,
+    HYDRO,
+    SHORTEST,
+    BoolArray,
+    near,
+    ratios,
+    rms_in_bands,
+    rms_in_bands_within,
+    spectra_of,
+)
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
@@ -27,13 +38,7 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_sim.scenario import AccelerationScale, RecordedScenario, recorded_signal
 
 NAME = 'recorded_drive'
-FRICTION, HYDRO, ELASTOMER = 'friction mount', 'hydromount', 'elastomer alone'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', ELASTOMER: 'elastomer'}
-BANDS = ((1.0, 5.0), (5.0, 12.0), (12.0, 30.0))
-"""Hz, chosen: the car's body, the engine on its mounts, above."""
-_SEGMENT = 4.096  # s, chosen: a spectrum with lines 0.24 Hz apart, and many segments in a minute
-_SHORTEST = 3.0 * _SEGMENT
-_FILTER_ORDER = 4  # chosen, of the band-pass that goes forth and back
 _EVEN = 0.02  # chosen: two rms count as even within so much of each other
 
 
@@ -49,18 +54,6 @@ class RecordedDriveParameters(NamedTuple):
     damper: str = DEFAULT_DAMPER
 
 
-BoolArray = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Spectra:
-    """Amplitude densities over frequency (Hz): displacement (m/sqrt(Hz)), mount force (N/sqrt(Hz))."""
-
-    frequency: FloatArray
-    displacement: FloatArray
-    force: FloatArray
-
-
 def run(order: Order, progress: Progress) -> Outcome:
     """Drive every mount on the recording, and evaluate spectra and bands."""
     from mount_bringup.experiments import recorded_drive_figures as drawing
@@ -73,9 +66,9 @@ def run(order: Order, progress: Progress) -> Outcome:
             f'--set {NAME}.file=FILE, its --set {NAME}.column=NAME, and --set {NAME}.scale=-1 where its axis '
             'points down'
         )
-    if 0.0 < parameters.duration < _SHORTEST:
+    if 0.0 < parameters.duration < SHORTEST:
         raise ExperimentError(
-            f'{NAME}.duration ({parameters.duration:g} s) must be at least {_SHORTEST:.1f} s for a spectrum, '
+            f'{NAME}.duration ({parameters.duration:g} s) must be at least {SHORTEST:.1f} s for a spectrum, '
             'or 0 for all of the recording'
         )
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
@@ -95,61 +88,6 @@ def run(order: Order, progress: Progress) -> Outcome:
     page = write_recorded_drive(figures, pictures, rate, order.out / f'{NAME}.md')
     recordings = [each.recording for each in rides.values()]
     return Outcome(figures, pictures, recordings, statements(figures), [page])
-
-
-def spectra_of(ridden: Ride) -> Spectra:
-    """Return the amplitude densities of displacement and mount force (Welch, Hann window)."""
-    frequency, displacement = _density(ridden.displacement)
-    _, force = _density(ridden.mount_force)
-    return Spectra(frequency, np.sqrt(displacement), np.sqrt(force))
-
-
-def rms_in_bands(values: FloatArray) -> list[float]:
-    """Return the rms of what `values` (n,) at 1 kHz hold in each of `BANDS`, in their unit.
-
-    From one spectrum of all of it: every moment counts the same, as it does not with windows.
-    """
-    amplitude = np.abs(np.fft.rfft(values)) / len(values)
-    frequency = np.fft.rfftfreq(len(values), SAMPLE_TIME)
-    inside = [(frequency >= low) & (frequency < high) for low, high in BANDS]
-    return [float(np.sqrt(2.0 * np.sum(amplitude[band] ** 2))) for band in inside]
-
-
-def rms_in_bands_within(values: FloatArray, within: BoolArray) -> list[float] | None:
-    """Return the rms of `values` (n,) at 1 kHz in each of `BANDS` at the samples `within` (n,), None of none.
-
-    By a band-pass without phase: what happens at one time stays there but for about a period of the lower
-    edge. At both edges of the band a quarter of the power is left.
-    """
-    from scipy.signal import butter, sosfiltfilt  # here, for they take longer to load than all the rest
-
-    if not within.any():
-        return None
-    found = []
-    for band in BANDS:
-        sections = butter(_FILTER_ORDER, band, 'bandpass', fs=1.0 / SAMPLE_TIME, output='sos')
-        passed = sosfiltfilt(sections, values - np.mean(values))[within]
-        found.append(float(np.sqrt(np.mean(passed**2))))
-    return found
-
-
-def near(active: BoolArray, margin: float) -> BoolArray:
-    """Return where damping is `active` (n,) at 1 kHz, and `margin` (s) before and behind."""
-    count = round(margin / SAMPLE_TIME)
-    return np.convolve(active, np.ones(2 * count + 1), 'same') > 0.5
-
-
-def _density(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    from scipy.signal import welch  # here, as above
-
-    count = round(_SEGMENT / SAMPLE_TIME)
-    if len(values) < round(_SHORTEST / SAMPLE_TIME):
-        raise ExperimentError(
-            f'the recorded drive lasts {len(values) * SAMPLE_TIME:.1f} s; a spectrum needs at least '
-            f'{_SHORTEST:.1f} s: give a longer one'
-        )
-    frequency, density = welch(values, 1.0 / SAMPLE_TIME, 'hann', count, 3 * count // 4)  # evenly weighted
-    return frequency, density
 
 
 def _scenario(parameters: RecordedDriveParameters) -> RecordedScenario:
@@ -229,12 +167,6 @@ def statements(figures: dict[str, Any]) -> list[Statement]:
     return [_on_isolation(figures), _on_displacement(figures)]
 
 
-def ratios(figures: dict[str, Any], key: str, other: str = HYDRO) -> list[float]:
-    """Return by band the friction mount's rms over that of `other`; nothing where there is no such rms."""
-    mine, its = figures['runs'][FRICTION][key], figures['runs'][other][key]
-    return [] if mine is None else [each / beside for each, beside in zip(mine, its, strict=True)]
-
-
 def _on_isolation(figures: dict[str, Any]) -> Statement:
     force = ratios(figures, 'force_band_rms_else_n')
     displacement = ratios(figures, 'displacement_band_rms_else_m')
@@ -259,16 +191,6 @@ def _on_displacement(figures: dict[str, Any]) -> Statement:
         f'the elastomer alone: {_by_band(figures, soft)}. Holds if lower than the hydromount, 5 to 12 Hz.',
         _lower(hydro[1:2]),
     )
-
-
-def while_on(figures: dict[str, Any]) -> str:
-    """Return a sentence on the rms displacement of all mounts while the friction damper was on."""
-    key = 'displacement_rms_while_friction_is_on_m'
-    values = {name: each[key] for name, each in figures['runs'].items()}
-    if values[FRICTION] is None:
-        return 'Damping was never on: the displacement did not stay above the switch-on level long enough.'
-    told = ', '.join(f'{name} {1e3 * value:.2f} mm' for name, value in values.items())
-    return f'In the seconds in which damping was on, the rms displacements are: {told}.'
 
 
 def _by_band(figures: dict[str, Any], values: list[float]) -> str:

@@ -8,10 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mount_bringup.experiments.drawing import BLUE, GREEN, GREY, RED, finish, new_figure
+from mount_bringup.experiments.recorded_drive_evaluation import (
+    BANDS,
+    ELASTOMER,
+    FRICTION,
+    HYDRO,
+    Spectra,
+)
 
 if TYPE_CHECKING:
     from mount_bringup.experiments.closed_loop import Ride
-    from mount_bringup.experiments.recorded_drive import Spectra
     from mount_control.parameters import ControlParameters
 
 _LOWEST, _HIGHEST = 0.7, 45.0  # Hz, chosen: what the bands lie in, and no more than a car's sensor has
@@ -20,8 +26,6 @@ _BEFORE, _AFTER = 1.0, 4.0  # s round the largest displacement
 
 def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
     """Draw displacement and chassis-side force of all mounts over frequency, the bands behind them."""
-    from mount_bringup.experiments.recorded_drive import BANDS
-
     figure = new_figure('A recorded drive: displacement of the mount and its force on the chassis', 7.5)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, name, scale, label in (
@@ -49,8 +53,6 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
 
 def draw_traces(rides: dict[str, Ride], control: ControlParameters, file: Path) -> Path:
     """Draw the whole drive above, the seconds round its largest displacement below."""
-    from mount_bringup.experiments.recorded_drive import FRICTION
-
     friction = rides[FRICTION]
     seen = friction.seen
     middle = float(friction.time[np.argmax(np.abs(friction.displacement))])
@@ -88,6 +90,4 @@ def draw_traces(rides: dict[str, Ride], control: ControlParameters, file: Path) 
 
 def _styles() -> list[tuple[str, str, str]]:
     """Return mount, colour and dash, the one that lies on top last."""
-    from mount_bringup.experiments.recorded_drive import ELASTOMER, FRICTION, HYDRO
-
     return [(ELASTOMER, GREY, ':'), (HYDRO, RED, '--'), (FRICTION, BLUE, '-')]

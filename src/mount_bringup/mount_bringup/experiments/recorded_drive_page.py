@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mount_bringup.experiments.recorded_drive import ELASTOMER, FRICTION, HYDRO, ratios, while_on
+from mount_bringup.experiments.recorded_drive_evaluation import ELASTOMER, FRICTION, HYDRO, ratios, while_on
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

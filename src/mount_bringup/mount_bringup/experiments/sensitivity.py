@@ -1,11 +1,9 @@
 """What the comparison with the hydromount depends on: road level, decoupler, chamber, idling engine."""
 
-from dataclasses import dataclass
 from itertools import product
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from mount_bringup.experiments.closed_loop import settings_of_run
 from mount_bringup.experiments.contract import (
@@ -19,61 +17,22 @@ from mount_bringup.experiments.contract import (
 )
 from mount_bringup.experiments.numbers import numbers_of
 from mount_bringup.experiments.sensitivity_grid import Job, run_all
+from mount_bringup.experiments.sensitivity_maps import (
+    Axes,
+    FloatArray,
+    Maps,
+    SensitivityParameters,
+    share_won,
+)
 from mount_bringup.experiments.sensitivity_reference import DAMPER as THERE
-from mount_bringup.experiments.sweep import BELOW_ISOLATION, FIRST_FREQUENCY, ISOLATION_BANDS, RATE
-from mount_bringup.settings import DEFAULT_DAMPER
+from mount_bringup.experiments.sweep_evaluation import BELOW_ISOLATION, FIRST_FREQUENCY, ISOLATION_BANDS, RATE
 from mount_models.damper import damper_curve
 from mount_models.hydromount import Hydromount
-from mount_models.quantity import Quantity, checked
-
-FloatArray = npt.NDArray[np.float64]
+from mount_models.quantity import checked
 
 NAME = 'sensitivity'
-EVEN_WITHIN = 0.02
-"""Two mounts count as even where their ratio differs from 1 by at most so much (chosen)."""
 _BENCH_FREQUENCY, _BENCH_AMPLITUDE, _BENCH_SECONDS = 8.0, 1e-3, 4.75
 _HIGHEST_LEVEL = 1.0  # m/s
-
-
-class SensitivityParameters(NamedTuple):
-    """The values between which all combinations are run, separated by commas, and the common rest."""
-
-    road_levels: str = '0.04, 0.06, 0.08, 0.10, 0.12, 0.16, 0.20'
-    decoupler_resistances: str = '2e7, 5e7, 1e8, 2e8'
-    chamber_asymmetries: str = '0.25, 0'
-    idle_forces: str = '0, 80, 200, 400'
-    last_frequency: Annotated[float, Quantity('Hz', 'end of the sweep', 14.0, 50.0, 'Sec. 6')] = 50.0
-    damper: str = DEFAULT_DAMPER
-    workers: Annotated[int, Quantity('1', 'processes; 0: one for each core', 0, 256)] = 0
-
-
-class Axes(NamedTuple):
-    """The values of the four things: m/s, Pa s/m^3, 1, N."""
-
-    levels: list[float]
-    resistances: list[float]
-    asymmetries: list[float]
-    idle_forces: list[float]
-
-
-@dataclass(frozen=True)
-class Maps:
-    """Friction mount over hydromount, below 1 where the friction mount has less.
-
-    `peak` (level, resistance, asymmetry, idle): largest displacement from 3 to 14 Hz. `rms` (band, level,
-    resistance, asymmetry, idle): chassis acceleration; NaN where the sweep ends before. `friction_peak`
-    (level, idle) in m. Of each (resistance, asymmetry) on the rack, `hydro_harmonics` are those of the
-    hydromount in N, `below` the orders in which the friction mount is lower. `peak_as_there` {level: m} is
-    the friction mount's without idle force, with the damper of the independent computation.
-    """
-
-    axes: Axes
-    peak: FloatArray
-    rms: FloatArray
-    friction_peak: FloatArray
-    below: dict[tuple[float, float], list[int]]
-    hydro_harmonics: dict[tuple[float, float], list[float]]
-    peak_as_there: dict[float, float]
 
 
 def run(order: Order, progress: Progress) -> Outcome:
@@ -210,22 +169,6 @@ def _figures(maps: Maps, parameters: SensitivityParameters, runs: int) -> dict[s
             for key, orders in maps.below.items()
         ],
     }
-
-
-def lower(ratios: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return where the friction mount has less than the hydromount, and not about the same."""
-    return np.asarray(ratios < 1.0 - EVEN_WITHIN)
-
-
-def higher(ratios: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return where the friction mount has more than the hydromount, and not about the same."""
-    return np.asarray(ratios > 1.0 + EVEN_WITHIN)
-
-
-def share_won(ratios: FloatArray) -> float:
-    """Return the share of the known ratios in which the friction mount has less, NaN if none is known."""
-    known = ratios[~np.isnan(ratios)]
-    return float(np.mean(lower(known))) if known.size else float('nan')
 
 
 def verdict(share: float) -> Holds:

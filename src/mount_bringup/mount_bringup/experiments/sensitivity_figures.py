@@ -10,12 +10,12 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.patheffects import withStroke
 
 from mount_bringup.experiments.drawing import finish, new_figure
-from mount_bringup.experiments.sensitivity import lower
-from mount_bringup.experiments.sweep import ISOLATION_BANDS
+from mount_bringup.experiments.sensitivity_maps import lower
+from mount_bringup.experiments.sweep_evaluation import ISOLATION_BANDS
 
 if TYPE_CHECKING:
     from mount_bringup.experiments.closed_loop import FloatArray
-    from mount_bringup.experiments.sensitivity import Maps
+    from mount_bringup.experiments.sensitivity_maps import Maps
 
 _COLOURS = 'RdBu_r'  # red: the friction mount has more
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mount_bringup.experiments.sensitivity import EVEN_WITHIN, higher, lower
+from mount_bringup.experiments.sensitivity_maps import EVEN_WITHIN, higher, lower
 from mount_bringup.experiments.sensitivity_reference import agreement
-from mount_bringup.experiments.sweep import ISOLATION_BANDS
+from mount_bringup.experiments.sweep_evaluation import ISOLATION_BANDS
 
 if TYPE_CHECKING:
     from mount_bringup.experiments.closed_loop import FloatArray
-    from mount_bringup.experiments.sensitivity import Maps, SensitivityParameters
+    from mount_bringup.experiments.sensitivity_maps import Maps, SensitivityParameters
 
 _EVEN = (2, 4, 6, 8)
 _HEAD = """# Friction mount or hydromount: what the answer depends on

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mount_bringup.experiments.sweep import ISOLATION_BANDS
+from mount_bringup.experiments.sweep_evaluation import ISOLATION_BANDS
 
 if TYPE_CHECKING:
-    from mount_bringup.experiments.sensitivity import Maps
+    from mount_bringup.experiments.sensitivity_maps import Maps
 
 DAMPER = {'law': 'viscous', 'damping_coefficient': 2500.0}
 """The characteristic of its sweeps, N s/m."""

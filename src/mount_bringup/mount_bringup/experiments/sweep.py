@@ -1,13 +1,10 @@
 """Fig. 14: the front wheels on a sine of rising frequency; displacement, chassis acceleration."""
 
-from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mount_bags.report.sweep import peak_per_band, rms_per_band
-from mount_bringup.evaluation import switching
-from mount_bringup.experiments.closed_loop import FloatArray, Ride, mode_of, ride
+from mount_bringup.experiments.closed_loop import mode_of, ride
 from mount_bringup.experiments.contract import (
     Experiment,
     Holds,
@@ -17,26 +14,30 @@ from mount_bringup.experiments.contract import (
     Statement,
     parameters_of,
 )
+from mount_bringup.experiments.sweep_evaluation import (
+    ALWAYS,
+    DEFINED_PEAK,
+    FIRST_FREQUENCY,
+    FRICTION,
+    FRICTION_IDLE,
+    HYDRO,
+    HYDRO_IDLE,
+    ISOLATION_BANDS,
+    OFF,
+    RATE,
+    RESONANCE,
+    SweepRun,
+    figures_of,
+)
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity
 
 NAME = 'sweep'
-FRICTION, HYDRO, OFF, ALWAYS = 'friction', 'hydromount', 'friction, 0 A', 'friction, always on'
-FRICTION_IDLE, HYDRO_IDLE = 'friction, engine idling', 'hydromount, engine idling'
-FIRST_FREQUENCY, RATE = 1.0, 1.0  # Hz, Hz/s: Sec. 6
-RESONANCE = (7.0, 10.0)  # Hz
-BELOW_ISOLATION = (3.0, 14.0)  # Hz
-ISOLATION_BANDS = ((14.0, 20.0), (20.0, 30.0), (30.0, 50.0))  # Hz: damping is off there
-DEFINED_PEAK = 1.25
-"""A local maximum of the displacement over frequency is a resonance peak if it exceeds the switch-on level by
-this factor (chosen); below it the switched mount cannot damp."""
 
 FAR_HIGHER = 0.75
 """Damping counts as far higher if it leaves less than this share of the other's displacement (chosen)."""
-
-Band = tuple[float, float]
 
 
 class SweepParameters(NamedTuple):
@@ -50,14 +51,6 @@ class SweepParameters(NamedTuple):
         float, Quantity('N', 'F_i: force of the idling engine; 0: none of these runs', 0.0, 2000.0)
     ] = 200.0
     damper: str = DEFAULT_DAMPER
-
-
-@dataclass(frozen=True)
-class SweepRun:
-    """One run of the sweep: its signals, and the frequency (Hz) at each sample."""
-
-    ride: Ride
-    frequency: FloatArray
 
 
 def run(order: Order, progress: Progress) -> Outcome:
@@ -113,53 +106,10 @@ def _switch_on_level(order: Order) -> float:
     return float(control.get('switch_on_level', ControlParameters().switch_on_level))
 
 
-def peak_in(frequency: FloatArray, displacement: FloatArray, band: Band) -> float | None:
-    """Return the largest displacement (m) while the sweep passes a band (Hz), None where it does not."""
-    within = (frequency >= band[0]) & (frequency < band[1])
-    whole = frequency[-1] >= band[1] - 0.01
-    return float(np.max(np.abs(displacement[within]))) if whole and within.any() else None
-
-
-def rms_in(frequency: FloatArray, acceleration: FloatArray, band: Band) -> float | None:
-    """Return the rms of the acceleration (m/s^2) while the sweep passes a band, None where it does not."""
-    within = (frequency >= band[0]) & (frequency < band[1])
-    whole = frequency[-1] >= band[1] - 0.01
-    return float(np.sqrt(np.mean(acceleration[within] ** 2))) if whole and within.any() else None
-
-
-def defined_peak(edges: list[float], peaks: list[float], level: float) -> Band | None:
-    """Return (frequency in the middle of its band, height m) of the highest resonance peak, None for none."""
-    inner = [
-        (edges[k] + 0.5, peaks[k])
-        for k in range(1, len(peaks) - 1)
-        if peaks[k] > peaks[k - 1] and peaks[k] > peaks[k + 1] and peaks[k] > DEFINED_PEAK * level
-    ]
-    return max(inner, key=lambda found: found[1], default=None)
-
-
-def _figures_of(passed: SweepRun, level: float) -> dict[str, Any]:
-    ridden, frequency = passed.ride, passed.frequency
-    edges, peaks = peak_per_band(frequency, ridden.displacement)
-    _, rms = rms_per_band(frequency, ridden.chassis_acceleration)
-    changes = switching(ridden.seen)
-    return {
-        'band_edges_hz': [*edges.tolist(), float(edges[-1]) + 1.0],
-        'peak_displacement_m': peaks.tolist(),
-        'chassis_acceleration_rms': rms.tolist(),
-        'resonance_peak_m': peak_in(frequency, ridden.displacement, RESONANCE),
-        'highest_peak_m': peak_in(frequency, ridden.displacement, BELOW_ISOLATION),
-        'defined_peak': defined_peak(edges.tolist(), peaks.tolist(), level),
-        'isolation_rms': [rms_in(frequency, ridden.chassis_acceleration, band) for band in ISOLATION_BANDS],
-        'resonance_rms': rms_in(frequency, ridden.chassis_acceleration, RESONANCE),
-        'switched_on_hz': [FIRST_FREQUENCY + RATE * time for time in changes.on],
-        'switched_off_hz': [FIRST_FREQUENCY + RATE * time for time in changes.off],
-    }
-
-
 def _figures(
     runs: dict[str, SweepRun], parameters: SweepParameters, mode: str, level: float
 ) -> dict[str, Any]:
-    told = {name: _figures_of(each, level) for name, each in runs.items()}
+    told = {name: figures_of(each, level) for name, each in runs.items()}
     chosen = told[FRICTION]
     return {
         **{key: chosen[key] for key in ('band_edges_hz', 'peak_displacement_m', 'chassis_acceleration_rms')},

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mount_bringup.experiments.drawing import BLUE, GREEN, GREY, RED, finish, new_figure
+from mount_bringup.experiments.sweep_evaluation import ALWAYS, FRICTION, HYDRO, OFF, SweepRun
 
 if TYPE_CHECKING:
     from mount_bringup.experiments.closed_loop import FloatArray
-    from mount_bringup.experiments.sweep import SweepRun
 
 _OUTLINE_STEP = 0.25  # Hz
 
@@ -39,8 +39,6 @@ def draw_sweep(friction: SweepRun, hydro: SweepRun, title: str, file: Path) -> P
 
 def draw_peaks(runs: dict[str, SweepRun], file: Path) -> Path:
     """Draw the largest displacement in each band of 1 Hz, for all mounts on the road alone."""
-    from mount_bringup.experiments.sweep import ALWAYS, FRICTION, HYDRO, OFF
-
     figure = new_figure('Front wheels on a sweep: largest displacement of the mount over frequency')
     axes = figure.subplots()
     for name, colour, dash in (
