@@ -65,7 +65,7 @@ def test_ctrl_c_during_the_start_ends_every_node(command, bus_listener):
     process, out = command.start_drive(*ENDLESS)
     wait_until(lambda: (out / 'log' / 'mount_control.log').exists(), 'the start of all nodes', LIMIT)
     _interrupt(process)
-    assert bus_listener == []
+    assert not bus_listener or bus_listener[-1].current == 0.0
 
 
 def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_recording(command, bus_listener):
