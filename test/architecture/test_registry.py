@@ -12,7 +12,7 @@ import typer
 from cantools.database.can import Database
 
 from mount_bringup.command import app
-from mount_bringup.graph import SIMULATED
+from mount_bringup.graph.nodes import SIMULATED
 from mount_control.controller import TRACE
 from mount_driver.codec import DATABASE_FILE
 from mount_models.actuator.law import ForceLaw

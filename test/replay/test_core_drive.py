@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mount_bringup import core_chain
-from mount_bringup.core_chain import chosen_damper, control_parameters
-from mount_bringup.core_run import CoreOutcome, run_core
+from mount_bringup.core import chain as core_chain
+from mount_bringup.core.chain import chosen_damper, control_parameters
+from mount_bringup.core.run import CoreOutcome, run_core
 from mount_bringup.evaluation import Drive, switching, tracking_error
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_models.specimen import default_specimen

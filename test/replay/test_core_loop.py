@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mount_bringup.core_chain import CoreChain
-from mount_bringup.core_run import run_core
+from mount_bringup.core.chain import CoreChain
+from mount_bringup.core.run import run_core
 from mount_ros import topics
 from mount_ros.scalars import ScalarsLayout, stamp_of
 

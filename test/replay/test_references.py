@@ -6,7 +6,7 @@ import pytest
 
 from mount_bags.accept import ACCEPTED_NAME, LARGEST_TOTAL
 from mount_bags.reference import differences_from_reference
-from mount_bringup.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 REFERENCES = sorted(
     folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()

@@ -4,10 +4,10 @@ import pytest
 
 import mount_bags
 from mount_bags.accept import accept
-from mount_bringup.core_recording import record_core
-from mount_bringup.replay import CORE, LOCKSTEP, ReplayOrder, replay
-from mount_bringup.replay_ramps import measured_gaps
-from mount_bringup.supervisor import session_text
+from mount_bringup.core.recording import record_core
+from mount_bringup.graph.supervisor import session_text
+from mount_bringup.replay.ramps import measured_gaps
+from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 SIM = {
     'scenario': 'bench',

@@ -7,8 +7,8 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 
-from mount_bringup.graph import VEHICLE
-from mount_bringup.launch_graph import launch_graph
+from mount_bringup.graph.launch import launch_graph
+from mount_bringup.graph.nodes import VEHICLE
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -5,22 +5,22 @@ import sys
 import typer
 from rich.console import Console
 
-from mount_bringup import (
-    accept_command,
-    audit_command,
-    calibrate_command,
-    compare_command,
-    cut_command,
-    drive_command,
-    experiment_command,
-    identify_command,
-    merge_command,
-    record_command,
-    recover_command,
-    replay_command,
-    report_command,
+from mount_bringup.commands import (
+    accept,
+    audit,
+    calibrate,
+    compare,
+    cut,
+    drive,
+    experiment,
+    identify,
+    merge,
+    record,
+    recover,
+    replay,
+    report,
 )
-from mount_bringup.identify_arguments import with_repeated_options
+from mount_bringup.commands.identify_arguments import with_repeated_options
 from mount_ros.environment import prepare_environment
 
 app = typer.Typer(
@@ -39,13 +39,13 @@ def _top() -> None:
     """Keep sub-commands even while there is only one."""
 
 
-app.command(name='drive', epilog=drive_command.EPILOG)(drive_command.drive)
+app.command(name='drive', epilog=drive.EPILOG)(drive.drive)
 
 
 @app.command()
 def bench() -> None:
     """Measure what matters for speed, each figure beside its alternative in the same run."""
-    from mount_bringup.bench import print_bench
+    from mount_bringup.bench.bench import print_bench
 
     print_bench(Console())
 
@@ -53,7 +53,7 @@ def bench() -> None:
 @app.command()
 def prepare() -> None:
     """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""
-    from mount_bringup.core_run import run_core
+    from mount_bringup.core.run import run_core
 
     console = Console()
     with console.status('compiling the laws for this machine (once, about half a minute)'):
@@ -62,24 +62,24 @@ def prepare() -> None:
             run_core({'mount_sim': sim}, lambda *_: None)
 
 
-app.command(name='audit', epilog=audit_command.EPILOG)(audit_command.audit)
-app.command(name='record', epilog=record_command.EPILOG)(record_command.record)
-app.command(name='recover', epilog=recover_command.EPILOG)(recover_command.recover)
-app.command(name='replay', epilog=replay_command.EPILOG)(replay_command.replay)
-app.command(name='compare', epilog=compare_command.EPILOG)(compare_command.compare)
-app.command(name='report', epilog=report_command.EPILOG)(report_command.report)
-app.command(name='cut', epilog=cut_command.EPILOG)(cut_command.cut)
-app.command(name='merge', epilog=merge_command.EPILOG)(merge_command.merge)
-app.command(name='experiment', epilog=experiment_command.EPILOG)(experiment_command.experiment)
-app.add_typer(identify_command.app, name='identify')
-app.command(name='accept', epilog=accept_command.EPILOG)(accept_command.accept)
-app.add_typer(calibrate_command.app)
+app.command(name='audit', epilog=audit.EPILOG)(audit.audit)
+app.command(name='record', epilog=record.EPILOG)(record.record)
+app.command(name='recover', epilog=recover.EPILOG)(recover.recover)
+app.command(name='replay', epilog=replay.EPILOG)(replay.replay)
+app.command(name='compare', epilog=compare.EPILOG)(compare.compare)
+app.command(name='report', epilog=report.EPILOG)(report.report)
+app.command(name='cut', epilog=cut.EPILOG)(cut.cut)
+app.command(name='merge', epilog=merge.EPILOG)(merge.merge)
+app.command(name='experiment', epilog=experiment.EPILOG)(experiment.experiment)
+app.add_typer(identify.app, name='identify')
+app.command(name='accept', epilog=accept.EPILOG)(accept.accept)
+app.add_typer(calibrate.app)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; every refusal is one sentence and a non-zero exit code."""
     prepare_environment()
-    from mount_bringup.supervisor import GraphError, Interrupted
+    from mount_bringup.graph.supervisor import GraphError, Interrupted
     from mount_ros.leaving import end_process
 
     try:

@@ -1,7 +1,7 @@
 """Refuses an order that a node would refuse, before any node is started."""
 
 from mount_bags.recorder_parameters import RecorderParameters
-from mount_bringup.core_chain import CoreChain, Parameters
+from mount_bringup.core.chain import CoreChain, Parameters
 from mount_bringup.mount_choice import check_control_of_mount
 from mount_bringup.recorder_options import checked_recorder
 from mount_driver.parameters import DriverParameters

@@ -23,7 +23,7 @@ from mount_bags.snapshot import snapshot_folder
 from mount_bags.writer import RecordingError
 from mount_bringup.ending_signals import ending_signals
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
-from mount_bringup.replay_lockstep import ros_context, transition
+from mount_bringup.replay.lockstep import ros_context, transition
 from mount_ros.process import wake
 from mount_ros.topics import EVENT, TOPICS, topic
 

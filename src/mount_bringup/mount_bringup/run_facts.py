@@ -8,7 +8,7 @@ import yaml
 from mount_bags.report.figures import Levels
 from mount_bags.report.signals import Signals
 from mount_bags.report.subject import RunFacts, Tracking
-from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
+from mount_bringup.core.chain import Parameters, chosen_damper, control_parameters
 from mount_bringup.evaluation import load_drive, tracking_error, wanted_force
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_models.coil.ripple import RippleCoil

@@ -13,7 +13,7 @@ from rich.table import Table
 from mount_bags.audit import TopicAudit
 from mount_bags.reading import Recording
 from mount_bags.recorder_parameters import RecorderParameters
-from mount_bringup.core_chain import Parameters, chosen_damper, control_parameters
+from mount_bringup.core.chain import Parameters, chosen_damper, control_parameters
 from mount_bringup.evaluation import Drive, lost_samples, switching, tracking_error, unanswered_samples
 
 _UM, _MM, _US = 1e6, 1e3, 1e6

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import yaml
 
+from mount_bringup.calibration.rack_columns import RackRecordingError
+from mount_bringup.calibration.rack_recordings import GivenValues, read_force, read_ripple
 from mount_bringup.command import main
 from mount_bringup.experiments.rack_recording import record_actuator_rack
-from mount_bringup.rack_columns import RackRecordingError
-from mount_bringup.rack_recordings import GivenValues, read_force, read_ripple
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import evaluate

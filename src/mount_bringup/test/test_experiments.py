@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 import mount_bags
 from mount_bags.audit import audit
+from mount_bringup.calibration.rack_recordings import GivenValues, read_ripple
 from mount_bringup.command import app
 from mount_bringup.experiments import (
     field_penetration,
@@ -20,7 +21,6 @@ from mount_bringup.experiments import (
 )
 from mount_bringup.experiments.contract import Experiment, Holds, Order, Outcome, Statement
 from mount_bringup.experiments.registry import EXPERIMENTS
-from mount_bringup.rack_recordings import GivenValues, read_ripple
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
 

@@ -8,7 +8,7 @@ from geometry_msgs.msg import WrenchStamped
 
 from mount_bags.writer import BagWriter
 from mount_bringup.command import main
-from mount_bringup.core_run import run_core
+from mount_bringup.core.run import run_core
 from mount_models.drift import DriftError, fitted_drift
 from mount_ros.cdr import serialised
 from mount_ros.force_table_message import to_message

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mount_bringup.calibration.rack_recordings import described
 from mount_bringup.command import main
-from mount_bringup.core_chain import friction_model
+from mount_bringup.commands.identify_arguments import with_repeated_options
+from mount_bringup.core.chain import friction_model
 from mount_bringup.experiments.rack_recording import record_friction_rack
-from mount_bringup.friction_files import parsed_channels, read_recording
-from mount_bringup.identify_arguments import with_repeated_options
-from mount_bringup.rack_recordings import described
+from mount_bringup.identification.friction_files import parsed_channels, read_recording
 from mount_bringup.recording_path import recording_hash
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
@@ -128,7 +128,7 @@ def test_bad_files_are_refused_and_nothing_is_written(make, words, tmp_path, cap
 
 
 def test_one_file_trains_on_its_first_half_and_is_tried_on_its_second(rack, tmp_path, monkeypatch):
-    from mount_bringup import identify_friction
+    from mount_bringup.identification import friction as identify_friction
     from mount_models.friction.identification.ladder import fit_ladder
     from mount_models.friction.identification.laws.coulomb import Coulomb
 

@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from mount_bringup import processes
-from mount_bringup.graph import CONTROL, RECORDER, GraphSettings
+from mount_bringup.graph import processes
+from mount_bringup.graph.nodes import CONTROL, RECORDER, GraphSettings
 
 TELL = 'import os; print(os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)'
 

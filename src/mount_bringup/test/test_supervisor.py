@@ -2,9 +2,9 @@
 
 import pytest
 
-from mount_bringup import supervisor
-from mount_bringup.graph import DRIVER, INIT, SIM, GraphSettings
-from mount_bringup.supervisor import GraphError, Supervisor
+from mount_bringup.graph import supervisor
+from mount_bringup.graph.nodes import DRIVER, INIT, SIM, GraphSettings
+from mount_bringup.graph.supervisor import GraphError, Supervisor
 
 
 class Refused(Supervisor):

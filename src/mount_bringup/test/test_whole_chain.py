@@ -16,8 +16,8 @@ import pytest
 from scipy.optimize import brentq
 
 from mount_bringup.command import main
-from mount_bringup.core_chain import chosen_damper, control_parameters, friction_model
-from mount_bringup.core_run import run_core
+from mount_bringup.core.chain import chosen_damper, control_parameters, friction_model
+from mount_bringup.core.run import run_core
 from mount_bringup.evaluation import Drive, tracking_error
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_bags.reading import Recording, open_recording
-from mount_bringup.core_recording import record_core
+from mount_bringup.core.recording import record_core
 from mount_bringup.drive import versions
 from mount_bringup.experiments.contract import (
     Experiment,
@@ -21,7 +21,7 @@ from mount_bringup.experiments.contract import (
     parameters_of,
 )
 from mount_bringup.experiments.drawing import BLUE, RED, family, finish, new_figure
-from mount_bringup.supervisor import session_text
+from mount_bringup.graph.supervisor import session_text
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.calibration import RIG_CURRENTS, RigMeasurements, RigNoise, measure_actuator
 from mount_models.closing import ClosingMechanics, closed_state

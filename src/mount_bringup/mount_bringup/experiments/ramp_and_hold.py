@@ -16,7 +16,7 @@ from mount_bringup.experiments.contract import (
 )
 from mount_bringup.experiments.drawing import BLUE, GREY, RED, finish, new_figure
 from mount_bringup.experiments.rack_recording import SUBSTEPS, record_friction_rack
-from mount_bringup.friction_files import read_recording
+from mount_bringup.identification.friction_files import read_recording
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.identification.ramp_hold import contact_of_response, printed_formulas

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mount_bringup.experiments.rack_recording import SUBSTEPS
-from mount_bringup.friction_files import read_recording
+from mount_bringup.identification.friction_files import read_recording
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_response

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_bags.report.periodic import harmonics, whole_periods
-from mount_bringup.core_chain import Parameters
-from mount_bringup.core_messages import Samples
-from mount_bringup.core_run import run_core_into
+from mount_bringup.core.chain import Parameters
+from mount_bringup.core.messages import Samples
+from mount_bringup.core.run import run_core_into
 from mount_bringup.experiments.sweep_evaluation import (
     BELOW_ISOLATION,
     FIRST_FREQUENCY,

@@ -1,0 +1,1 @@
+"""What matters for speed, measured beside its alternatives."""

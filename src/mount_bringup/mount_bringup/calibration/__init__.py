@@ -1,0 +1,1 @@
+"""From recordings of a rack to the actuator and the coil of a specimen."""

@@ -1,0 +1,1 @@
+"""The sub-commands of `engine-mount`, one file each: what they take, say and return."""

@@ -1,0 +1,92 @@
+"""`engine-mount record`: the recorder alone, beside a graph or without one."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from mount_bringup.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
+
+EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
+loss, when the disk was full, or when nothing could be recorded; 2 for a wrong use of the command.
+
+Examples:
+
+`engine-mount record` - all topics, until Ctrl-C; `m` or space sets a mark
+
+`engine-mount record displacement control_trace --split 500MB --split 60s --out bags/long`
+
+`engine-mount record --snapshot 30s` - only what happens around marks, with the 30 s before each
+
+In a terminal a line tells messages per second, size, lost messages and marks. The topic `event`, which
+holds the marks, is always recorded. Times are those of the wall clock.
+"""
+
+
+def record(
+    topics: Annotated[
+        list[str] | None, typer.Argument(metavar='[TOPIC]...', help='names of the registry; default: all')
+    ] = None,
+    out: NewFolder = None,
+    split: Split = None,
+    snapshot: Snapshot = '',
+    snapshot_after: Annotated[
+        str, typer.Option(metavar='DURATION', help='snapshot: and with so much after an event')
+    ] = '10s',
+    duration: Annotated[float | None, typer.Option(help='length in s; default: until Ctrl-C')] = None,
+    on_full: Annotated[
+        str, typer.Option(help='full disk: stop, or continue without recording until the end is asked for')
+    ] = 'stop',
+    domain: Domain = None,
+    namespace: Namespace = '',
+) -> None:
+    """Record topics until Ctrl-C; exit code 1 if anything was lost."""
+    from mount_bags.recorder_parameters import RecorderParameters
+    from mount_bringup.domain import chosen_domain
+    from mount_bringup.record import RecordOrder
+    from mount_bringup.record import record as run_record
+    from mount_bringup.recorder_options import checked_recorder, recorder_options
+    from mount_bringup.run_folder import new_place
+
+    if duration is not None and not duration > 0.0:
+        raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
+    options = {'on_full': on_full, **recorder_options(split or [], snapshot, snapshot_after)}
+    order = RecordOrder(
+        out=out if out is not None else new_place('record'),
+        topics=tuple(topics or ()),
+        parameters=checked_recorder(RecorderParameters(), options),
+        domain=chosen_domain(domain),
+        namespace=namespace,
+        duration=duration,
+    )
+    console = Console()
+    outcome = run_record(order, console)
+    if outcome.failure:
+        _print('note', outcome.failure, console)
+    sound = [_told(folder, console) for folder in outcome.folders]
+    if not sound and not outcome.failure:
+        console.print('no event came, so no snapshot was saved')
+    if outcome.failure or outcome.lost or not all(sound):
+        raise typer.Exit(1)
+
+
+def _told(folder: Path, console: Console) -> bool:
+    """Print what is there of a recording, and return whether nothing is known to be lost."""
+    from mount_bags.audit import audit
+    from mount_bags.audit_report import is_lossless, sentences
+    from mount_bags.reading import open_recording
+
+    recording = open_recording(folder)
+    audits = audit(recording)
+    for warning in recording.warnings:
+        _print('note', warning, console)
+    if not any(entry.present for name, entry in audits.items() if name != '/diagnostics'):
+        _print('note', 'only /diagnostics had messages; does a graph run in this domain, namespace?', console)
+    _print('audit', sentences(audits, recording)[-1], console)
+    _print('recording', folder, console)
+    return is_lossless(audits, recording)
+
+
+def _print(word: str, what: Any, console: Console) -> None:
+    console.print(f'{word:<10} {what}', soft_wrap=True, highlight=False, markup=False)

@@ -1,0 +1,1 @@
+"""A run without middleware: the same controller and simulator, called one after the other."""

@@ -1,0 +1,125 @@
+"""The processes of the graph: started with their parameters, watched, ended in order."""
+
+import contextlib
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import yaml
+
+from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings
+
+_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
+_INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that was asked to end is terminated
+_TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
+_RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for what it misses is gone
+
+
+class NodeProcess:
+    """One process of the graph with the nodes that live in it; its output goes to a log file."""
+
+    def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
+        self.nodes = tuple(nodes)
+        self.name = ' + '.join(node.name for node in nodes)
+        stem = '_'.join(node.name for node in nodes)
+        self.log_file = folder / f'{stem}.log'
+        parameter_file = folder / f'{stem}.yaml'
+        parameter_file.write_text(_parameter_text(self.nodes, settings))
+        command = [sys.executable, '-c', _program(self.nodes), '--ros-args']
+        command += ['--params-file', str(parameter_file)]
+        if settings.namespace:
+            command += ['-r', f'__ns:=/{settings.namespace.strip("/")}']
+        with self.log_file.open('wb') as log:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'},
+                start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
+                preexec_fn=partial(_prepare_child, self._scheduling(settings)),
+            )
+
+    def _scheduling(self, settings: GraphSettings) -> Callable[[], None]:
+        if not settings.priority:
+            return lambda: None
+        share = _RECORDER_SHARE if RECORDER in self.nodes else 1.0
+        priority = max(1, round(share * settings.priority))
+        return partial(os.sched_setscheduler, 0, os.SCHED_FIFO, os.sched_param(priority))
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while the process runs."""
+        return self._process.poll()
+
+    def last_words(self) -> str:
+        """Return the last error line of the log, or its last line."""
+        lines = [line for line in self.log_file.read_text(errors='replace').splitlines() if line.strip()]
+        errors = [line for line in lines if '[ERROR]' in line or '[FATAL]' in line or 'Error: ' in line]
+        return (errors or lines or ['(it said nothing)'])[-1]
+
+    def ask_to_end(self) -> None:
+        """Send SIGINT, to which a node answers by going to 0 A and ending with code 0."""
+        if self.exit_code is None:
+            self._process.send_signal(signal.SIGINT)
+
+    def wait(self) -> int:
+        """Return the exit code; a node that does not end is terminated, then killed."""
+        for limit, harder in ((_INTERRUPT_LIMIT, signal.SIGTERM), (_TERMINATE_LIMIT, signal.SIGKILL)):
+            try:
+                return self._process.wait(limit)
+            except subprocess.TimeoutExpired:
+                self._process.send_signal(harder)
+        return self._process.wait()
+
+
+def end_all(processes: list[NodeProcess]) -> list[str]:
+    """End the nodes one after the other, last started first; return a sentence per unclean end."""
+    complaints = []
+    for process in reversed(processes):
+        died_before = process.exit_code is not None
+        process.ask_to_end()
+        begin = time.monotonic()
+        code = process.wait()
+        if code != 0 and not died_before:
+            complaints.append(
+                f'{process.name} ended with code {code} after {time.monotonic() - begin:.1f} s: '
+                f'{process.last_words()}'
+            )
+    return complaints
+
+
+def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> list[NodeProcess]:
+    """Start the processes of `nodes` in order."""
+    groups = [nodes] if settings.together else [[node] for node in nodes]
+    return [NodeProcess(group, settings, folder) for group in groups]
+
+
+def _program(nodes: Sequence[GraphNode]) -> str:
+    imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in nodes)
+    classes = ', '.join(node.class_name for node in nodes)
+    return f'{imports}; from mount_ros.process import run_nodes; run_nodes([{classes}])'
+
+
+def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
+    tables = {
+        f'/**/{node.name}': {'ros__parameters': dict(settings.parameters.get(node.name, {}))}
+        for node in nodes
+    }
+    return yaml.safe_dump(tables, sort_keys=True)
+
+
+def _prepare_child(schedule: Callable[[], None]) -> None:
+    # Without its supervisor a node must not go on driving the coil.
+    ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGINT)
+    # Before the middleware makes its threads, so that those that receive inherit it; those that send
+    # again are taken out of real time by `mount_ros.scheduling`. Where it is not permitted the node runs as
+    # any other process.
+    with contextlib.suppress(PermissionError):
+        schedule()

@@ -1,0 +1,1 @@
+"""From recordings to the friction of a specimen, its drift, and what temperature leaves."""

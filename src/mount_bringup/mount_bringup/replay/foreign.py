@@ -1,0 +1,266 @@
+"""A displacement recorded by somebody else: chosen by topic and field, checked, scaled, at 1 kHz."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mount_bags.reading import ReadingError, Recording, open_recording
+from mount_bags.series import Series, SeriesError
+from mount_bringup.core.chain import Parameters, chosen_specimen, control_parameters
+from mount_bringup.recording_path import open_run
+from mount_bringup.replay.input import (
+    SECOND,
+    Column,
+    ControlRun,
+    Messages,
+    ReplayError,
+    ReplayInput,
+    Times,
+    dated,
+)
+from mount_bringup.replay.ramps import MeasuredGap, measured_gaps
+from mount_init.parameters import InitParameters
+from mount_models.closing import ClosingMechanics
+from mount_models.force_table import contact_force, current_force_table, offset_current
+from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME
+from mount_ros import topics
+from mount_ros.force_table_message import ForceTable
+from mount_ros.scalars import ScalarsLayout
+from mount_sim.recorded import RecordedInputError, RecordedSignal, load_signal, resample
+
+LOWEST_RATE = 100.0  # Hz, chosen: five times the 20 Hz up to which an engine moves on its mounts
+DEFAULT_TABLE = 'default'
+_DISPLACEMENT = 'displacement'
+_ENGINE, _CHASSIS = 'engine_displacement', 'chassis_displacement'
+_PERIOD = round(SAMPLE_TIME * SECOND)
+_SHORTEST = 0.5  # s, chosen: four periods of the band
+
+
+@dataclass(frozen=True)
+class ForeignOrder:
+    """How a foreign recording becomes a displacement in m: value * scale - offset.
+
+    `fields` is {`displacement`: place} or {`engine_displacement`: place, `chassis_displacement`: place}, a
+    place being `/topic.field` of a bag or a column of a CSV or NPY file. `offset` is in m, or `mean`.
+    """
+
+    fields: Mapping[str, str]
+    scale: float = 1.0
+    offset: str = 'mean'
+
+
+def foreign_order(maps: list[str], scale: float, offset: str) -> ForeignOrder:
+    """Return the order that the options of the command describe, or raise `ReplayError`."""
+    fields = {}
+    for text in maps:
+        name, equals, place = text.partition('=')
+        if not (equals and place) or name not in (_DISPLACEMENT, _ENGINE, _CHASSIS):
+            raise ReplayError(
+                f'--map {text}: write displacement=/topic.field, or engine_displacement=/topic.field and '
+                'chassis_displacement=/topic.field'
+            )
+        fields[name] = place
+    if set(fields) not in ({_DISPLACEMENT}, {_ENGINE, _CHASSIS}):
+        raise ReplayError(
+            f'--map names {" and ".join(fields)}; needed is displacement, or engine_displacement and '
+            'chassis_displacement together: the displacement of the mount is their difference'
+        )
+    if not (math.isfinite(scale) and scale != 0.0):
+        raise ReplayError(f'--scale ({scale:g}) must be a number other than 0')
+    if offset != 'mean' and not _is_number(offset):
+        raise ReplayError(f'--offset {offset!r} must be a number of m, or mean')
+    return ForeignOrder(fields, scale, offset)
+
+
+def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: MeasuredGap) -> ReplayInput:
+    """Return what a foreign recording gives to replay with the force table of `gap`; raises `ReplayError`.
+
+    A gap in the samples may be no longer than one period of the band, because what happened in it cannot be
+    interpolated; a longer one, or a rate below `LOWEST_RATE`, is refused.
+    """
+    notes: list[str] = []
+    longest_gap = 1.0 / control_parameters(parameters).eigenfrequency
+    signals = {name: _signal(path, place, notes) for name, place in order.fields.items()}
+    for signal in signals.values():
+        _check_band(signal[1], longest_gap)
+    stamps, values = _on_one_grid(signals, notes)
+    if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
+        stamps = stamps + SECOND
+    values = order.scale * values
+    offset = float(np.mean(values)) if order.offset == 'mean' else float(order.offset)
+    notes.append(
+        f'factor {order.scale:g} to m; offset {1e3 * offset:.3f} mm removed '
+        f'({"the mean" if order.offset == "mean" else "as given"})'
+    )
+    if order.offset == 'mean':
+        notes.append('without its mean the rest position is taken as 0; --offset keeps another one')
+    displacement = values - offset
+    _check_size(displacement, control_parameters(parameters).displacement_range, order, notes)
+    run = ControlRun(stamps, displacement, dated(gap, int(stamps[0]) - _PERIOD))
+    layout = ScalarsLayout(topics.DISPLACEMENT)
+    pairs = zip(stamps.tolist(), displacement.tolist(), strict=True)
+    messages = Messages('/' + _DISPLACEMENT, [layout.pack(stamp, (value,)) for stamp, value in pairs], stamps)
+    given = {_DISPLACEMENT: messages}
+    name = f'{path.parent.name}/{path.name}' if path.name == 'recording' else path.name
+    source = f'{name}: ' + ', '.join(order.fields.values())
+    plain = {node: dict(values) for node, values in parameters.items()}
+    return ReplayInput(source, [run], plain, None, given, int(stamps[0]), 0, {}, notes)
+
+
+def default_gap(parameters: Parameters) -> MeasuredGap:
+    """Return the nominal gaps and the force table of the specimen in use, as if just measured."""
+    specimen, nominal = chosen_specimen(parameters), ClosingMechanics()
+    light_pressure = with_flattened(InitParameters(), parameters.get('mount_init', {})).light_pressure
+    rest, contact = nominal.rest_gap, nominal.contact_gap
+    law, spring = specimen.force_law, specimen.spring_stiffness
+    table = current_force_table(law, spring, specimen.pad_stiffness, rest, contact, specimen.current_limit)
+    numbers = {
+        'rest_gap': rest,
+        'contact_gap': contact,
+        'rest_gap_std': 0.0,
+        'contact_gap_std': 0.0,
+        'contact_force': contact_force(spring, rest, contact),
+        'offset_current': offset_current(law, spring, rest, contact, light_pressure),
+    }
+    return MeasuredGap(0, numbers, ForceTable(0, table[0], table[1]))
+
+
+def chosen_gap(table: str, parameters: Parameters) -> tuple[MeasuredGap, str]:
+    """Return the last measured gap of the recording `table`, or the default one, and a sentence on which."""
+    if table in ('', DEFAULT_TABLE):
+        gap, name = default_gap(parameters), chosen_specimen(parameters).name
+        rest, contact = (1e6 * gap.numbers[which] for which in ('rest_gap', 'contact_gap'))
+        return gap, (
+            f'current-force table: calculated for the specimen {name!r} with the nominal gaps {rest:.0f} um '
+            f'at rest and {contact:.0f} um in contact; nothing was measured on this mount'
+        )
+    recording = open_run(Path(table))
+    gaps = measured_gaps(recording)
+    if not gaps:
+        raise ReplayError(f'--table {table}: that recording holds no air_gap with its current_force_table')
+    return gaps[-1], f'current-force table: measured in {Path(table).name} at {gaps[-1].stamp / 1e9:.3f} s'
+
+
+# One signal.
+
+_Signal = tuple[int, RecordedSignal]  # stamp (ns) of its first sample, and the samples
+
+
+def _signal(path: Path, place: str, notes: list[str]) -> _Signal:
+    if not path.exists():
+        raise ReplayError(f'{path} does not exist; give a bag, or a CSV or NPY file')
+    if path.suffix.lower() in ('.csv', '.txt', '.npy') or (path.is_dir() and not any(path.glob('*.mcap'))):
+        try:
+            signal = load_signal(path, column=place)
+        except RecordedInputError as error:
+            raise ReplayError(str(error)) from None
+        notes.append(f'{place}: {len(signal.values)} samples at {signal.rate:.4g} Hz, median of its times')
+        return 0, signal
+    topic, dot, name = place.partition('.')
+    if not dot:
+        raise ReplayError(f'--map {place}: name a field too, as in {topic}.field')
+    recording = open_recording(path)
+    stamps, values, clock = _field(recording, topic, name)
+    order = np.argsort(stamps, kind='stable')
+    stamps, first = np.unique(stamps[order], return_index=True)
+    values = values[order][first]
+    known = np.isfinite(values)
+    if not known.all():
+        notes.append(f'{place}: {np.count_nonzero(~known)} samples without a number are left out')
+    stamps, values = stamps[known], values[known]
+    if len(stamps) < 2:
+        raise ReplayError(f'{place} has {len(stamps)} samples with a time of their own; more are needed')
+    signal = RecordedSignal(place, (stamps - stamps[0]) / SECOND, values)
+    notes.append(f'{place}: {len(values)} samples at {signal.rate:.4g} Hz, median of their {clock}')
+    return int(stamps[0]), signal
+
+
+def _field(recording: Recording, topic: str, name: str) -> tuple[Times, Column, str]:
+    try:
+        series = recording[topic]
+        values = series[name]
+    except (ReadingError, SeriesError) as error:
+        raise ReplayError(f'--map {topic}.{name}: {error}') from None
+    stamps = _header_stamps(series)
+    if stamps is not None and np.any(stamps > 0):
+        return stamps, values, 'header stamps'
+    return series.receive_times, values, 'times of arrival (the messages carry none of their own)'
+
+
+def _header_stamps(series: Series) -> Times | None:
+    try:
+        return series.stamps
+    except SeriesError:
+        return None
+
+
+def _check_band(signal: RecordedSignal, longest_gap: float) -> None:
+    if signal.rate < LOWEST_RATE:
+        raise ReplayError(
+            f'{signal.name} has {signal.rate:.4g} samples per second; the band of the controller needs at '
+            f'least {LOWEST_RATE:g} (is its time in seconds?)'
+        )
+    steps = np.diff(signal.times)
+    if steps.max() > longest_gap:
+        place = int(steps.argmax())
+        raise ReplayError(
+            f'{signal.name} has a gap of {steps.max():.3f} s at {signal.times[place]:.3f} s, longer than one '
+            f'period of the band ({longest_gap:.3f} s); cut the recording there'
+        )
+
+
+def _on_one_grid(signals: dict[str, _Signal], notes: list[str]) -> tuple[Times, Column]:
+    """Return stamps of 1 kHz and the displacement on them, not scaled."""
+    even = {name: (begin, _resampled(signal, notes)) for name, (begin, signal) in signals.items()}
+    begin = max(begin for begin, _ in even.values())
+    end = min(begin + len(values) * _PERIOD for begin, values in even.values())
+    if end - begin < _SHORTEST * SECOND:
+        spans = '; '.join(
+            f'{signals[name][1].name}: {begin / 1e9:.3f} .. {begin / 1e9 + len(values) * SAMPLE_TIME:.3f} s'
+            for name, (begin, values) in even.items()
+        )
+        raise ReplayError(f'no overlap of {_SHORTEST:g} s or more: {spans}')
+    count = (end - begin) // _PERIOD
+    times = SAMPLE_TIME * np.arange(count)
+    columns = {
+        # Grids of two signals stand less than a sample apart, far above the band: a straight line is enough.
+        name: np.interp(times, (first - begin) / SECOND + SAMPLE_TIME * np.arange(len(values)), values)
+        for name, (first, values) in even.items()
+    }
+    stamps = begin + _PERIOD * np.arange(count, dtype=np.int64)
+    if _DISPLACEMENT in columns:
+        return stamps, columns[_DISPLACEMENT]
+    return stamps, columns[_ENGINE] - columns[_CHASSIS]
+
+
+def _resampled(signal: RecordedSignal, notes: list[str]) -> Column:
+    steps = np.diff(signal.times)
+    if np.allclose(steps, SAMPLE_TIME, rtol=0.0, atol=1e-6):
+        return signal.values
+    try:
+        values = resample(signal, SAMPLE_TIME) + np.mean(signal.values)  # the offset is dealt with later
+    except ValueError as error:
+        raise ReplayError(f'{signal.name} cannot be resampled to 1 kHz: {error}') from None
+    notes.append(f'{signal.name}: resampled from {signal.rate:.4g} Hz to 1 kHz, band-limited')
+    return values
+
+
+def _check_size(displacement: Column, largest: float, order: ForeignOrder, notes: list[str]) -> None:
+    size = float(np.max(np.abs(displacement)))
+    notes.append(f'largest displacement {1e3 * size:.3f} mm')
+    if size > largest:
+        raise ReplayError(
+            f'the displacement reaches {size:.4g} m, more than displacement_range ({largest:g} m), with '
+            f'factor {order.scale:g} to m; is its unit another one (--scale) or its zero (--offset)?'
+        )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
