@@ -101,7 +101,7 @@ def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_list
 
 def test_nodes_end_when_their_supervisor_is_killed(command, bus_listener):
     process, _ = command.start_drive(*ENDLESS)
-    wait_until(lambda: len(bus_listener) > 500, 'setpoints', LIMIT)
+    wait_until(lambda: len(bus_listener) > 100, 'setpoints', LIMIT)
     nodes = _node_pids(process.pid)
     assert len(nodes) == 5
     process.kill()

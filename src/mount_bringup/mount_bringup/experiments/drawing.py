@@ -17,12 +17,13 @@ from PIL import Image
 BLUE, RED, GREY, GREEN = '#1f5fa8', '#b03030', '#666666', '#3a8a4d'
 _WIDTH = 10.0  # inches
 _DPI = 100
+_LAYOUT = 'constrained'
 _COLOURS = 256  # the most that a palette holds
 
 
 def new_figure(title: str, height: float = 5.0) -> Figure:
     """Return an empty picture of 1000 pixels width and `height` (inches)."""
-    figure = Figure(figsize=(_WIDTH, height), layout='constrained')
+    figure = Figure(figsize=(_WIDTH, height), layout=_LAYOUT)
     figure.suptitle(title)
     return figure
 
