@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 
@@ -17,7 +17,7 @@ from PIL import Image
 BLUE, RED, GREY, GREEN = '#1f5fa8', '#b03030', '#666666', '#3a8a4d'
 _WIDTH = 10.0  # inches
 _DPI = 100
-_LAYOUT = 'constrained'
+_LAYOUT: Literal['constrained'] | None = 'constrained'
 _COLOURS = 256  # the most that a palette holds
 
 
