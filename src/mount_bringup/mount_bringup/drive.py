@@ -17,7 +17,6 @@ from mount_bags.audit_report import as_table, sentences
 from mount_bags.reading import Recording, open_recording
 from mount_bags.recorder_parameters import RecorderParameters, split_of
 from mount_bags.snapshot import saved_snapshots
-from mount_bringup.commands.progress_bar import progress_bar
 from mount_bringup.core.chain import Parameters, control_parameters
 from mount_bringup.core.recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
@@ -27,6 +26,7 @@ from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor, session_text
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.preflight import preflight
+from mount_bringup.progress_bar import progress_bar
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import (
     print_summary,

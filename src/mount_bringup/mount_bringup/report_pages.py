@@ -9,7 +9,7 @@ from mount_bags.alignment import ComparisonError
 from mount_bags.compare import compare
 from mount_bags.reading import Recording
 from mount_bags.report.report import ReportError, make_report, subjects_of
-from mount_bringup.commands.progress_bar import progress_bar
+from mount_bringup.progress_bar import progress_bar
 from mount_bringup.run_facts import run_facts
 
 PAGE = 'report.html'

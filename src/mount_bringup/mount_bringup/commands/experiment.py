@@ -46,10 +46,10 @@ def experiment(
 
     A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
     """
-    from mount_bringup.commands.progress_bar import progress_bar
     from mount_bringup.experiments.orders import orders, run_all
     from mount_bringup.experiments.page import print_outcome, write_page
     from mount_bringup.experiments.registry import EXPERIMENTS, experiments_named
+    from mount_bringup.progress_bar import progress_bar
     from mount_bringup.summary import write_json
 
     console = Console()

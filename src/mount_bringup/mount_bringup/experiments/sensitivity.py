@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bringup.experiments.closed_loop import settings_of_run
+from mount_bringup.experiments.closed_loop import FloatArray, settings_of_run
 from mount_bringup.experiments.contract import (
     Experiment,
     Holds,
@@ -19,7 +19,6 @@ from mount_bringup.experiments.numbers import numbers_of
 from mount_bringup.experiments.sensitivity_grid import Job, run_all
 from mount_bringup.experiments.sensitivity_maps import (
     Axes,
-    FloatArray,
     Maps,
     SensitivityParameters,
     share_won,

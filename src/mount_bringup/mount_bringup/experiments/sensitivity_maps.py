@@ -6,10 +6,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_bringup.experiments.closed_loop import FloatArray
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_models.quantity import Quantity
 
-FloatArray = npt.NDArray[np.float64]
 EVEN_WITHIN = 0.02
 """Two mounts count as even where their ratio differs from 1 by at most so much (chosen)."""
 
