@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from mount_bags.signals.signal import SignalError
 from mount_bringup.command import app
 from mount_bringup.experiments import page, recorded_drive
 from mount_bringup.experiments.contract import ExperimentError, Holds, Order
@@ -21,7 +22,7 @@ from mount_bringup.experiments.recorded_drive_evaluation import (
 )
 from mount_bringup.experiments.registry import experiments_named
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.recorded import RecordedInputError, load_signal, resample
+from mount_sim.recorded import acceleration_at, recorded_acceleration
 from mount_sim.scenario import STEP_TIME
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -126,7 +127,7 @@ def test_without_a_file_it_says_what_to_give(tmp_path):
 
 
 def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
-    with pytest.raises(RecordedInputError, match='does not exist'):
+    with pytest.raises(SignalError, match='does not exist'):
         run(tmp_path / 'out', tmp_path / 'none.csv')
     with pytest.raises(ExperimentError, match=r'duration \(5 s\) must be at least 12\.3 s'):
         run(tmp_path / 'out', tmp_path / 'none.csv', duration=5.0)
@@ -146,8 +147,8 @@ def test_alone_its_own_page_is_the_page(driven, tmp_path):
 
 @needs_i280
 def test_the_committed_page_tells_of_this_recording():
-    signal = load_signal(I280, column='accelerometer.2')
-    values = resample(signal, STEP_TIME)[:: round(SAMPLE_TIME / STEP_TIME)]
+    signal = recorded_acceleration(I280, column='accelerometer.2')
+    values = acceleration_at(signal, -1.0, STEP_TIME)[:: round(SAMPLE_TIME / STEP_TIME)]
     text = (REPOSITORY / 'docs' / 'recorded_drive.md').read_text()
     told = re.findall(r'([\d.]+) m/s\^2 from', text)
     assert [float(number) for number in told] == pytest.approx(rms_in_bands(values), abs=0.001)

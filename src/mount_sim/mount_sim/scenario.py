@@ -3,11 +3,12 @@
 from dataclasses import replace
 from typing import Annotated, NamedTuple, Protocol
 
+from mount_bags.signals.even_grid import EvenSignal
 from mount_models.quantity import ParameterError, Quantity
 from mount_models.road import Gap, RandomRoad, Sweep
 from mount_sim import excitation
 from mount_sim.excitation import Excitation, Seat
-from mount_sim.recorded import RecordedSignal, load_signal, resample
+from mount_sim.recorded import acceleration_at, recorded_acceleration
 
 SCENARIO_NAMES = ('motorway', 'bench', 'sweep', 'recorded')
 STEP_TIME = 5e-5  # s, chosen: step of the plant, 20 in each sample
@@ -150,9 +151,9 @@ def build_excitation(scenarios: Scenarios) -> Excitation:
     return replace(shaken, engine_forces=forces)
 
 
-def recorded_signal(recorded: RecordedScenario) -> RecordedSignal:
-    """Return the signal as it was recorded, not yet scaled; raises what `load_signal` raises."""
-    return load_signal(
+def recorded_signal(recorded: RecordedScenario) -> EvenSignal:
+    """Return the signal evenly spaced, not yet scaled; raises `SignalError`."""
+    return recorded_acceleration(
         recorded.file,
         column=recorded.column,
         time_column=recorded.time_column,
@@ -221,7 +222,7 @@ def _recorded(scenarios: Scenarios) -> Excitation:
     if not recorded.file:
         raise ParameterError('scenario recorded needs a file: CSV, NPY or MCAP (recorded.file, or --file)')
     signal = recorded_signal(recorded)
-    values = recorded.scale * resample(signal, STEP_TIME)
+    values = acceleration_at(signal, recorded.scale, STEP_TIME)
     if timeline.duration:
         available = len(values) * STEP_TIME
         if timeline.duration > available + 0.001:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from mount_bags.signals.csv_file import read_csv
 from mount_models.actuator.reluctance import force
-from mount_sim.csv_table import read_table
 from mount_sim.rack import (
     GAPS,
     Rack,
@@ -65,9 +65,9 @@ def test_drawn_racks_differ_and_come_again_by_their_seed():
 
 def test_files_hold_what_was_measured(tmp_path):
     rack = Rack(seed=2)
-    table = read_table(write_force(rack, tmp_path / 'force.csv'))
+    table = read_csv(write_force(rack, tmp_path / 'force.csv'))
     assert table.header == ('gap_um', 'current_a', 'force_n')
     assert table.columns(2)[0] == pytest.approx(measure_force(rack)['force_n'], rel=1e-8)
     files = write_ripple(rack, tmp_path / 'ripple', GAPS[:2], 60.0)
     assert [file.name for file in files] == ['ripple_270um_+60degC.csv', 'ripple_290um_+60degC.csv']
-    assert read_table(files[0]).columns(1)[0] == pytest.approx(270.0)
+    assert read_csv(files[0]).columns(1)[0] == pytest.approx(270.0)

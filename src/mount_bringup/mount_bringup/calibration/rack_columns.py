@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_sim.csv_table import CsvTable, read_table
+from mount_bags.signals.csv_file import read_csv
+from mount_bags.signals.table import Table
 
 FloatArray = NDArray[np.float64]
 
@@ -45,9 +46,9 @@ def read_columns(
     """Return the channels of a CSV `file` in SI units (temperatures in degC), by name.
 
     A channel is the column `<name>_<unit>`, or the one `chosen` for it, by its header or as HEADER:UNIT.
-    Raises `RackRecordingError` or `RecordedInputError`.
+    Raises `RackRecordingError` or `SignalError`.
     """
-    table = read_table(file)
+    table = read_csv(file)
     found = {}
     for channel in (*channels, *optional):
         column = _column(table, channel, chosen.get(channel.name, ''))
@@ -91,7 +92,7 @@ _LONGEST_STUCK = 12  # rows, chosen: coarse converters repeat themselves for a f
 _BRACKET = re.compile(r'[\[(]\s*([\w/]+)\s*[\])]\s*$')
 
 
-def _column(table: CsvTable, channel: Channel, chosen: str) -> tuple[int, str] | None:
+def _column(table: Table, channel: Channel, chosen: str) -> tuple[int, str] | None:
     """Return place and unit of the channel's column; the unit is empty where the name tells none."""
     if chosen:
         header, colon, unit = chosen.rpartition(':')
@@ -124,7 +125,7 @@ def _unit_of(header: str, channel: Channel) -> str:
     return max(suffixes, key=len, default='')
 
 
-def _check_finite(table: CsvTable, header: str, values: FloatArray) -> None:
+def _check_finite(table: Table, header: str, values: FloatArray) -> None:
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise RackRecordingError(
@@ -133,7 +134,7 @@ def _check_finite(table: CsvTable, header: str, values: FloatArray) -> None:
         )
 
 
-def _in_si(table: CsvTable, channel: Channel, header: str, unit: str, values: FloatArray) -> FloatArray:
+def _in_si(table: Table, channel: Channel, header: str, unit: str, values: FloatArray) -> FloatArray:
     reach = f'{values.min():g} .. {values.max():g}'
     guess = _guess(channel, values)
     if not unit:

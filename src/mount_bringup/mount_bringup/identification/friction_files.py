@@ -3,13 +3,15 @@
 Units end here: everything behind is in SI units.
 """
 
-import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from mount_bags.signals.csv_file import read_csv
+from mount_bags.signals.json_file import read_json
+from mount_bags.signals.table import Table
 from mount_bringup.recording_path import open_run
 from mount_models.friction.identification.recording import (
     COEFFICIENT_RANGE,
@@ -32,6 +34,8 @@ TOPICS = {
 }
 _NEEDED = ('displacement', 'friction_force', 'normal_force')
 _DESIRED = 'desired_displacement'
+_RIG_HEADER = ('time_s', 'displacement_in', 'friction_force_kip', 'velocity_in_per_s')
+_RIG_PULLS = ('actuator_1_lb', 'actuator_2_lb')
 _REST = 0.1  # s at the beginning
 _AT_REST = 0.01  # of the range of displacement
 
@@ -47,7 +51,10 @@ class Channel:
 def read_recording(
     path: Path, channels: dict[str, Channel] | None = None, clamp: str = 'sliding'
 ) -> FrictionRecording:
-    """Return the checked recording in `path`; `channels` name columns or topics, `clamp` see `_rig`."""
+    """Return the checked recording in `path`; `channels` name columns or topics, `clamp` see `_rig`.
+
+    Raises `IdentificationError` and the readers' errors.
+    """
     chosen = channels or {}
     if not path.exists():
         raise IdentificationError(
@@ -56,9 +63,9 @@ def read_recording(
     if path.is_dir() or path.suffix == '.mcap':
         return _mcap(path, chosen)
     if path.suffix.lower() == '.json':
-        return _rig(path, clamp)
+        return _rig(path, chosen, clamp)
     if path.suffix.lower() in ('.csv', '.txt'):
-        return _csv(path, chosen)
+        return _rack(read_csv(path), chosen)
     raise IdentificationError(
         f'{path.name}: files of type {path.suffix or "(none)"} are not read; use .csv, .json, .mcap'
     )
@@ -79,36 +86,42 @@ def parsed_channels(texts: list[str]) -> dict[str, Channel]:
             raise IdentificationError(
                 f'--channel {text}: unit {unit!r} is unknown; known are {", ".join(UNITS)}'
             )
+        if name == 'time' and unit:
+            raise IdentificationError(f'--channel {text}: time is in s and takes no unit; write time=COLUMN')
         found[name] = Channel(source, UNITS[unit.lower()] if unit else None)
     return found
 
 
-def _csv(path: Path, channels: dict[str, Channel]) -> FrictionRecording:
-    from mount_sim.csv_table import read_table
-    from mount_sim.recorded import signal_of
+def _rack(table: Table, channels: dict[str, Channel]) -> FrictionRecording:
+    columns = _columns(table, channels, _NEEDED)
+    return checked_recording(
+        table.path.name, columns['time'], columns['displacement'], columns['friction_force'],
+        columns['normal_force'], columns.get(_DESIRED),
+    )  # fmt: skip
 
-    table = read_table(path)
+
+def _columns(table: Table, channels: dict[str, Channel], needed: tuple[str, ...]) -> dict[str, FloatArray]:
+    """Return the time (s) and the quantities in SI units, by channel or by heading."""
     header = list(table.header)
-    time_column = channels['time'].source if 'time' in channels else ''
-    times: FloatArray | None = None
-    values: dict[str, FloatArray] = {}
+    places = {'time': table.time_place(channels['time'].source if 'time' in channels else '')}
+    factors = {'time': 1.0}
     for name in (*_NEEDED, _DESIRED):
-        place = channels.get(name) or _by_heading(header, name)
-        if place is None:
-            if name == _DESIRED:
+        channel = channels.get(name) or _by_heading(header, name)
+        if channel is None:
+            if name not in needed:
                 continue
             raise IdentificationError(
-                f'{path.name} has no column for {name} (its columns: {", ".join(header)}); name it as in '
-                f'--channel {name}=COLUMN:UNIT'
+                f'{table.path.name} has no column for {name} (its columns: {", ".join(header)}); name it as '
+                f'in --channel {name}=COLUMN:UNIT'
             )
-        signal = signal_of(table, place.source, time_column)
-        factor = place.factor if place.factor is not None else _factor_of(place.source, name, path.name)
-        times, values[name] = signal.times, signal.values * factor
-    assert times is not None
-    return checked_recording(
-        path.name, times, values['displacement'], values['friction_force'], values['normal_force'],
-        values.get(_DESIRED),
-    )  # fmt: skip
+        places[name] = table.place(channel.source)
+        factors[name] = (
+            _factor_of(header[places[name]], name, table.path.name)
+            if channel.factor is None
+            else channel.factor
+        )
+    rows = table.columns(*places.values())
+    return {name: factors[name] * row for name, row in zip(places, rows, strict=True)}
 
 
 def _by_heading(header: list[str], name: str) -> Channel | None:
@@ -126,9 +139,15 @@ def _factor_of(column: str, name: str, file: str) -> float:
 
 
 def _mcap(path: Path, channels: dict[str, Channel]) -> FrictionRecording:
+    if 'time' in channels:
+        raise IdentificationError(
+            f'{path}: the times of a recording are its stamps; leave --channel '
+            f'time={channels["time"].source} out'
+        )
     recording = open_run(path)
     series = {}
-    for name, (topic, field) in TOPICS.items():
+    for name in (*_NEEDED, *({_DESIRED} & channels.keys())):
+        topic, field = TOPICS.get(name, ('', ''))
         factor = 1.0
         if name in channels:
             topic, _, field = channels[name].source.partition('.')
@@ -146,15 +165,18 @@ def _mcap(path: Path, channels: dict[str, Channel]) -> FrictionRecording:
     first, last = (pick(each[0][place] for each in series.values()) for pick, place in ((max, 0), (min, -1)))
     inside = (time >= first) & (time <= last)
     time = time[inside]
-    force, clamp = (np.interp(time, *series[name]) for name in ('friction_force', 'normal_force'))
-    return checked_recording(path.name, time, displacement[inside], force, clamp)
+    matched = {name: np.interp(time, *each) for name, each in series.items() if name != 'displacement'}
+    return checked_recording(
+        path.name, time, displacement[inside], matched['friction_force'], matched['normal_force'],
+        matched.get(_DESIRED),
+    )  # fmt: skip
 
 
-def _rig(path: Path, clamp: str) -> FrictionRecording:
+def _rig(path: Path, channels: dict[str, Channel], clamp: str) -> FrictionRecording:
     """Return a test of the measured friction damper: a band round a drum, an actuator pulls at either end.
 
-    Columns: time s, displacement inch, friction force kip, velocity inch/s (not used), ..., and last the pull
-    of the two actuators in lb. The force's zero is that of the rest before the motion.
+    Columns: `_RIG_HEADER`, others by their number, and last `_RIG_PULLS`; `channels` may name others, by name
+    or number. The force's zero is that of the rest before the motion.
 
     What presses the band onto the drum is its tension. At rest that is the clamp that was set, but a band
     tightens itself while it slides: the taut end then carries the friction force, with a factor that depends
@@ -165,10 +187,14 @@ def _rig(path: Path, clamp: str) -> FrictionRecording:
       sensor measures them, but only during the test: the level of the force is then measured, not foretold;
     - 'rest': the two pulls together before the motion, known beforehand;
     - 'none': nothing is known of the clamp (1 N; coefficients are then forces in N).
+
+    A channel `normal_force` is measured, and taken instead of all this.
     """
+    if clamp not in CLAMPS:
+        raise IdentificationError(f'clamp {clamp!r} must be one of {", ".join(CLAMPS)}')
     table = _rig_table(path)
-    time = table[:, 0]
-    displacement, force = UNITS['in'] * table[:, 1], UNITS['kip'] * table[:, 2]
+    columns = _columns(table, channels, _NEEDED[:2])
+    time, displacement, force = columns['time'], columns['displacement'], columns['friction_force']
     notes = []
     quiet = time <= time[0] + _REST
     if np.ptp(displacement[quiet]) <= _AT_REST * np.ptp(displacement):
@@ -177,49 +203,41 @@ def _rig(path: Path, clamp: str) -> FrictionRecording:
         notes.append(f'force zero {zero:.1f} N, from the {_REST:g} s of rest at the beginning')
     else:
         notes.append('force zero as recorded: there is no rest at the beginning')
-    pulls = UNITS['lb'] * table[:, -2:]
-    normal = _rig_normal_force(path.name, clamp, np.gradient(displacement, time), pulls, quiet)
-    notes.append(
-        f'normal force ({clamp}): {normal[0]:.0f} N to the positive, {normal[1]:.0f} N to the negative side'
-    )
+    measured = columns.get('normal_force')
+    if measured is None:
+        pulls = UNITS['lb'] * table.columns(*map(table.place, _RIG_PULLS)).T
+        normal = _rig_normal_force(path.name, clamp, np.gradient(displacement, time), pulls, quiet)
+        notes.append(
+            f'normal force ({clamp}): {normal[0]:.0f} N to the positive, {normal[1]:.0f} N to the negative '
+            'side'
+        )
     return checked_recording(
         path.stem,
         time,
         displacement,
         force,
-        np.tile(normal, (time.size, 1)),
+        np.tile(normal, (time.size, 1)) if measured is None else measured,
+        columns.get(_DESIRED),
         notes=tuple(notes),
-        coefficient_range=COEFFICIENT_RANGE if clamp == 'sliding' else (0.0, np.inf),
+        coefficient_range=COEFFICIENT_RANGE if measured is not None or clamp == 'sliding' else (0.0, np.inf),
     )
 
 
-def _rig_table(path: Path) -> FloatArray:
-    try:
-        content = json.loads(path.read_text(encoding='utf-8'))
-        table = np.array(content['data'], float)
-    except (ValueError, KeyError, TypeError) as error:
+def _rig_table(path: Path) -> Table:
+    table = read_json(path)
+    width, known = len(table.header), (*_RIG_HEADER, *_RIG_PULLS)
+    if width < len(known):
         raise IdentificationError(
-            f'{path.name} is no recording of the friction damper ({error!r}); expected is {{"data": [['
-            'time s, displacement inch, friction force kip, velocity inch/s, actuator 1 lb, actuator 2 lb], '
-            '...]}'
-        ) from None
-    if table.ndim != 2 or table.shape[0] < 2 or table.shape[1] < 6:
-        raise IdentificationError(
-            f'{path.name} holds data of shape {table.shape}; at least 50 rows of 6 numbers are needed'
+            f'{path.name} holds data of shape ({len(table.rows)}, {width}); at least 50 rows of {len(known)} '
+            f'numbers are needed: {", ".join(known)}'
         )
-    if not np.isfinite(table).all():
-        row = int(np.argmax(~np.isfinite(table).all(axis=1)))
-        raise IdentificationError(
-            f'{path.name}: row {row} holds a value that is no number; repair or cut it there'
-        )
-    return table
+    between = table.header[len(_RIG_HEADER) : -len(_RIG_PULLS)]
+    return replace(table, header=(*_RIG_HEADER, *between, *_RIG_PULLS))
 
 
 def _rig_normal_force(
     name: str, clamp: str, velocity: FloatArray, pulls: FloatArray, quiet: FloatArray
 ) -> FloatArray:
-    if clamp not in CLAMPS:
-        raise IdentificationError(f'clamp {clamp!r} must be one of {", ".join(CLAMPS)}')
     if clamp == 'none':
         return np.ones(2)
     if clamp == 'rest':

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.reading import ReadingError, Recording, open_recording
-from mount_bags.series import Series, SeriesError
+from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
+from mount_bags.signals.loading import is_recording, load_signal
+from mount_bags.signals.plausibility import check_size
+from mount_bags.signals.resampling import has_step, resampled
+from mount_bags.signals.signal import SECOND, mean_of
 from mount_bringup.core.chain import Parameters, chosen_specimen, control_parameters
 from mount_bringup.recording_path import open_run
 from mount_bringup.replay.input import (
-    SECOND,
     Column,
     ControlRun,
     Messages,
@@ -30,7 +32,6 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
 from mount_ros.force_table_message import ForceTable
 from mount_ros.scalars import ScalarsLayout
-from mount_sim.recorded import RecordedInputError, RecordedSignal, load_signal, resample
 
 LOWEST_RATE = 100.0  # Hz, chosen: five times the 20 Hz up to which an engine moves on its mounts
 DEFAULT_TABLE = 'default'
@@ -77,21 +78,20 @@ def foreign_order(maps: list[str], scale: float, offset: str) -> ForeignOrder:
 
 
 def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: MeasuredGap) -> ReplayInput:
-    """Return what a foreign recording gives to replay with the force table of `gap`; raises `ReplayError`.
+    """Return what a foreign recording gives to replay with the force table of `gap`.
 
     A gap in the samples may be no longer than one period of the band, because what happened in it cannot be
-    interpolated; a longer one, or a rate below `LOWEST_RATE`, is refused.
+    interpolated; a longer one, or a rate below `LOWEST_RATE`, is refused. Raises `ReplayError` or
+    `SignalError`.
     """
     notes: list[str] = []
     longest_gap = 1.0 / control_parameters(parameters).eigenfrequency
-    signals = {name: _signal(path, place, notes) for name, place in order.fields.items()}
-    for signal in signals.values():
-        _check_band(signal[1], longest_gap)
+    signals = {name: _signal(path, place, longest_gap, notes) for name, place in order.fields.items()}
     stamps, values = _on_one_grid(signals, notes)
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
-        stamps = stamps + SECOND
+        stamps = stamps - stamps[0] + SECOND
     values = order.scale * values
-    offset = float(np.mean(values)) if order.offset == 'mean' else float(order.offset)
+    offset = mean_of(values) if order.offset == 'mean' else float(order.offset)
     notes.append(
         f'factor {order.scale:g} to m; offset {1e3 * offset:.3f} mm removed '
         f'({"the mean" if order.offset == "mean" else "as given"})'
@@ -99,7 +99,13 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     if order.offset == 'mean':
         notes.append('without its mean the rest position is taken as 0; --offset keeps another one')
     displacement = values - offset
-    _check_size(displacement, control_parameters(parameters).displacement_range, order, notes)
+    largest = control_parameters(parameters).displacement_range
+    check_size(
+        'displacement at 1 kHz', displacement, SAMPLE_TIME, largest, 'm',
+        f'with factor {order.scale:g} to m: is its unit another one (--scale) or its zero (--offset), or is '
+        'this sample a fault to cut or repair?',
+    )  # fmt: skip
+    notes.append(f'largest displacement {1e3 * float(np.max(np.abs(displacement))):.3f} mm')
     run = ControlRun(stamps, displacement, dated(gap, int(stamps[0]) - _PERIOD))
     layout = ScalarsLayout(topics.DISPLACEMENT)
     pairs = zip(stamps.tolist(), displacement.tolist(), strict=True)
@@ -145,118 +151,47 @@ def chosen_gap(table: str, parameters: Parameters) -> tuple[MeasuredGap, str]:
     return gaps[-1], f'current-force table: measured in {Path(table).name} at {gaps[-1].stamp / 1e9:.3f} s'
 
 
-# One signal.
-
-_Signal = tuple[int, RecordedSignal]  # stamp (ns) of its first sample, and the samples
+# Signals.
 
 
-def _signal(path: Path, place: str, notes: list[str]) -> _Signal:
-    if not path.exists():
-        raise ReplayError(f'{path} does not exist; give a bag, or a CSV or NPY file')
-    if path.suffix.lower() in ('.csv', '.txt', '.npy') or (path.is_dir() and not any(path.glob('*.mcap'))):
-        try:
-            signal = load_signal(path, column=place)
-        except RecordedInputError as error:
-            raise ReplayError(str(error)) from None
-        notes.append(f'{place}: {len(signal.values)} samples at {signal.rate:.4g} Hz, median of its times')
-        return 0, signal
-    topic, dot, name = place.partition('.')
-    if not dot:
-        raise ReplayError(f'--map {place}: name a field too, as in {topic}.field')
-    recording = open_recording(path)
-    stamps, values, clock = _field(recording, topic, name)
-    order = np.argsort(stamps, kind='stable')
-    stamps, first = np.unique(stamps[order], return_index=True)
-    values = values[order][first]
-    known = np.isfinite(values)
-    if not known.all():
-        notes.append(f'{place}: {np.count_nonzero(~known)} samples without a number are left out')
-    stamps, values = stamps[known], values[known]
-    if len(stamps) < 2:
-        raise ReplayError(f'{place} has {len(stamps)} samples with a time of their own; more are needed')
-    signal = RecordedSignal(place, (stamps - stamps[0]) / SECOND, values)
-    notes.append(f'{place}: {len(values)} samples at {signal.rate:.4g} Hz, median of their {clock}')
-    return int(stamps[0]), signal
+def _signal(path: Path, place: str, longest_gap: float, notes: list[str]) -> EvenSignal:
+    if is_recording(path):
+        topic, dot, field = place.partition('.')
+        if not dot:
+            raise ReplayError(f'--map {place}: name a field too, as in {topic}.field')
+        signal = load_signal(path, column=field, topic=topic)
+    else:
+        signal = load_signal(path, column=place)
+    even = evenly_spaced(signal, longest_gap, LOWEST_RATE)
+    notes.append(f'{place}: {len(signal.values)} samples at {even.rate:.4g} Hz, by their {signal.clock}')
+    notes += [f'{place}: {note}' for note in even.notes]
+    return even
 
 
-def _field(recording: Recording, topic: str, name: str) -> tuple[Times, Column, str]:
-    try:
-        series = recording[topic]
-        values = series[name]
-    except (ReadingError, SeriesError) as error:
-        raise ReplayError(f'--map {topic}.{name}: {error}') from None
-    stamps = _header_stamps(series)
-    if stamps is not None and np.any(stamps > 0):
-        return stamps, values, 'header stamps'
-    return series.receive_times, values, 'times of arrival (the messages carry none of their own)'
-
-
-def _header_stamps(series: Series) -> Times | None:
-    try:
-        return series.stamps
-    except SeriesError:
-        return None
-
-
-def _check_band(signal: RecordedSignal, longest_gap: float) -> None:
-    if signal.rate < LOWEST_RATE:
-        raise ReplayError(
-            f'{signal.name} has {signal.rate:.4g} samples per second; the band of the controller needs at '
-            f'least {LOWEST_RATE:g} (is its time in seconds?)'
-        )
-    steps = np.diff(signal.times)
-    if steps.max() > longest_gap:
-        place = int(steps.argmax())
-        raise ReplayError(
-            f'{signal.name} has a gap of {steps.max():.3f} s at {signal.times[place]:.3f} s, longer than one '
-            f'period of the band ({longest_gap:.3f} s); cut the recording there'
-        )
-
-
-def _on_one_grid(signals: dict[str, _Signal], notes: list[str]) -> tuple[Times, Column]:
+def _on_one_grid(signals: dict[str, EvenSignal], notes: list[str]) -> tuple[Times, Column]:
     """Return stamps of 1 kHz and the displacement on them, not scaled."""
-    even = {name: (begin, _resampled(signal, notes)) for name, (begin, signal) in signals.items()}
-    begin = max(begin for begin, _ in even.values())
-    end = min(begin + len(values) * _PERIOD for begin, values in even.values())
-    if end - begin < _SHORTEST * SECOND:
+    begin = max(even.begin for even in signals.values())
+    end = min(even.begin + round(even.length * SECOND) for even in signals.values())
+    count = round((end - begin) / _PERIOD) + 1
+    if count * SAMPLE_TIME < _SHORTEST:
         spans = '; '.join(
-            f'{signals[name][1].name}: {begin / 1e9:.3f} .. {begin / 1e9 + len(values) * SAMPLE_TIME:.3f} s'
-            for name, (begin, values) in even.items()
+            f'{even.name}: {even.begin / 1e9:.3f} .. {even.begin / 1e9 + even.length:.3f} s'
+            for even in signals.values()
         )
         raise ReplayError(f'no overlap of {_SHORTEST:g} s or more: {spans}')
-    count = (end - begin) // _PERIOD
-    times = SAMPLE_TIME * np.arange(count)
     columns = {
-        # Grids of two signals stand less than a sample apart, far above the band: a straight line is enough.
-        name: np.interp(times, (first - begin) / SECOND + SAMPLE_TIME * np.arange(len(values)), values)
-        for name, (first, values) in even.items()
+        name: resampled(even, SAMPLE_TIME, (begin - even.begin) / SECOND, count)
+        for name, even in signals.items()
     }
+    notes += [
+        f'{even.name}: resampled from {even.rate:.4g} Hz to 1 kHz, band-limited'
+        for even in signals.values()
+        if not has_step(even, SAMPLE_TIME)
+    ]
     stamps = begin + _PERIOD * np.arange(count, dtype=np.int64)
     if _DISPLACEMENT in columns:
         return stamps, columns[_DISPLACEMENT]
     return stamps, columns[_ENGINE] - columns[_CHASSIS]
-
-
-def _resampled(signal: RecordedSignal, notes: list[str]) -> Column:
-    steps = np.diff(signal.times)
-    if np.allclose(steps, SAMPLE_TIME, rtol=0.0, atol=1e-6):
-        return signal.values
-    try:
-        values = resample(signal, SAMPLE_TIME) + np.mean(signal.values)  # the offset is dealt with later
-    except ValueError as error:
-        raise ReplayError(f'{signal.name} cannot be resampled to 1 kHz: {error}') from None
-    notes.append(f'{signal.name}: resampled from {signal.rate:.4g} Hz to 1 kHz, band-limited')
-    return values
-
-
-def _check_size(displacement: Column, largest: float, order: ForeignOrder, notes: list[str]) -> None:
-    size = float(np.max(np.abs(displacement)))
-    notes.append(f'largest displacement {1e3 * size:.3f} mm')
-    if size > largest:
-        raise ReplayError(
-            f'the displacement reaches {size:.4g} m, more than displacement_range ({largest:g} m), with '
-            f'factor {order.scale:g} to m; is its unit another one (--scale) or its zero (--offset)?'
-        )
 
 
 def _is_number(text: str) -> bool:

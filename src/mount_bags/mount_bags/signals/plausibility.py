@@ -1,0 +1,38 @@
+"""What a recorded signal and its resampled form may look like."""
+
+import numpy as np
+
+from mount_bags.signals.even_grid import EvenSignal
+from mount_bags.signals.signal import FloatArray, SignalError
+
+OVERSHOOT = 0.5
+"""Share of the range of the samples, chosen: a sine of a quarter of the rate, met on its flanks, has 0.21."""
+_ROUNDING = 1e-12
+
+
+def check_range(even: EvenSignal, resampled: FloatArray, first: float, step_time: float) -> None:
+    """Raise `SignalError` where resampled values leave the range of the samples by more than `OVERSHOOT`."""
+    low, high = float(even.values.min()), float(even.values.max())
+    margin = OVERSHOOT * (high - low) + _ROUNDING * max(abs(low), abs(high))
+    beyond = np.maximum(low - resampled, resampled - high)
+    if beyond.max() <= margin:
+        return
+    worst = int(beyond.argmax())
+    at = first + worst * step_time
+    raise SignalError(
+        f'{even.name}: resampled it is {resampled[worst]:.4g} at {at:.4f} s, near sample '
+        f'{round(at / even.period)}; its samples are {low:.4g} .. {high:.4g}, and it may leave that range by '
+        f'{OVERSHOOT:g} of it: are samples there faulty? Cut or repair them'
+    )
+
+
+def check_size(name: str, values: FloatArray, step_time: float, limit: float, unit: str, remedy: str) -> None:
+    """Raise `SignalError` with the first of `values` (n,), `step_time` s apart, that is beyond +- `limit`."""
+    beyond = np.abs(values) > limit
+    if not beyond.any():
+        return
+    place = int(np.argmax(beyond))
+    raise SignalError(
+        f'{name}: sample {place} at {place * step_time:.4f} s is {values[place]:.4g} {unit}, beyond '
+        f'+-{limit:g} {unit} ({np.count_nonzero(beyond)} such of {len(values)}); {remedy}'
+    )

@@ -1,0 +1,59 @@
+"""A signal as it was recorded, and the sentence why one cannot be used."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+SECOND = 1_000_000_000  # ns
+_FEWEST = 10
+
+
+class SignalError(ValueError):
+    """A recorded signal cannot be used; the text says why, where, and what would help."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """Samples in the order of the file: times in s after `begin` (ns) and values, both (n,).
+
+    `clock` says in words whose times they are, `notes` what of the recording is not in the samples.
+    """
+
+    name: str
+    times: FloatArray
+    values: FloatArray
+    begin: int = 0
+    clock: str = 'times'
+    notes: tuple[str, ...] = ()
+
+
+def signal_of(name: str, times: FloatArray, values: FloatArray) -> Signal:
+    """Return the signal with `times` in s of any clock, both (n,); raises `SignalError`."""
+    if len(times) != len(values):
+        raise SignalError(
+            f'{name}: {len(times)} times but {len(values)} values; both must be of equal length'
+        )
+    for what, numbers in (('value', values), ('time', times)):
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if len(bad):
+            raise SignalError(
+                f'{name}: {what} number {bad[0]} is {numbers[bad[0]]} '
+                f'({len(bad)} such of {len(numbers)}); remove or repair these samples first'
+            )
+    check_count(name, len(values))
+    return Signal(name, times - times[0], values, round(SECOND * float(times[0])))
+
+
+def check_count(name: str, count: int) -> None:
+    """Raise `SignalError` if a signal has too few samples to be one."""
+    if count < _FEWEST:
+        raise SignalError(f'{name} has {count} samples; at least {_FEWEST} are needed')
+
+
+def mean_of(values: FloatArray) -> float:
+    """Return the mean, to the last bit the same on every processor."""
+    return math.fsum(values.tolist()) / len(values)
