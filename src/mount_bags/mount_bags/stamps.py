@@ -3,8 +3,13 @@
 The step between neighbouring stamps is rounded to whole sample periods. So a clock of the electronics
 that runs a little fast or slow, as every clock does, is not taken for lost samples, and where the rate
 is kept the expected number is round((last - first) * rate) + 1.
+
+Stamps that jitter, as a phone's do, have no such steps. Each sample then has a place on the grid of the rate,
+which follows the stamps slowly, and one that shares a place because its stamp is late or early takes the
+empty one near it. Only equal stamps, or more samples than places, are samples twice.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -14,6 +19,9 @@ from numpy.typing import NDArray
 _NANOSECONDS = 1_000_000_000
 _LEAST_SAMPLES = 10
 _MOSTLY = 0.9  # share, chosen
+_JITTER = 0.25  # periods, chosen: steps so far from whole ones are no clock's drift
+_FOLLOWS = 0.05  # chosen: share of a stamp's distance by which the grid follows it
+_NEAR = 3  # periods, chosen: a stamp farther off than that is no late one
 _MOST = 0.7  # share, chosen: a topic that lost more than that has no rate to speak of
 
 
@@ -35,16 +43,47 @@ def stamp_statistics(stamps: NDArray[np.int64], rate: float) -> StampStatistics:
         return StampStatistics(0, 0, 0, 0, 0, math.nan)
     ordered = np.sort(stamps)
     differences = ordered[1:] - ordered[:-1]
-    steps = np.rint(differences * (rate / _NANOSECONDS)).astype(np.int64)
+    periods = differences * (rate / _NANOSECONDS)
+    steps = np.rint(periods)
+    if np.any((np.abs(periods - steps) > _JITTER) | ((steps == 0) & (differences > 0))):
+        expected, taken = _places(np.unique(ordered), rate)
+    else:
+        expected, taken = int(steps.sum()) + 1, 1 + int(np.count_nonzero(steps))
     latest = np.maximum.accumulate(stamps)
     return StampStatistics(
-        expected=int(steps.sum()) + 1,
+        expected=expected,
         present=int(stamps.size),
-        lost=int((steps[steps > 1] - 1).sum()),
-        duplicated=int(np.count_nonzero(steps == 0)),
+        lost=expected - taken,
+        duplicated=int(stamps.size) - taken,
         out_of_order=int(np.count_nonzero(stamps[1:] < latest[:-1])),
         longest_gap=float(differences.max()) / _NANOSECONDS if differences.size else math.nan,
     )
+
+
+def _places(stamps: NDArray[np.int64], rate: float) -> tuple[int, int]:
+    """Return how many places the grid under jittering `stamps` (ns, rising) has, and how many are taken."""
+    places, phase, place = [], 0.0, 0
+    for position in ((stamps - stamps[0]) * (rate / _NANOSECONDS)).tolist():
+        place = max(place, round(position - phase))
+        phase += _FOLLOWS * (position - phase - place)
+        places.append(place)
+    first, last, taken = 0, places[-1], set(places)
+    for place in _shared(places):
+        near = sorted(range(place - _NEAR, place + _NEAR + 1), key=lambda one: abs(one - place))
+        inside = [one for one in near if one not in taken and first <= one <= last]
+        if inside:
+            taken.add(inside[0])
+        elif place - first < _NEAR:  # a late first stamp hides the place before it
+            first -= 1
+            taken.add(first)
+        elif last - place < _NEAR:
+            last += 1
+            taken.add(last)
+    return last - first + 1, len(taken)
+
+
+def _shared(places: list[int]) -> list[int]:
+    return [place for place, following in itertools.pairwise(places) if place == following]
 
 
 @dataclass(frozen=True)
@@ -83,7 +122,7 @@ def regular_rate(stamps: NDArray[np.int64]) -> float | None:
 
 
 class StampWatch:
-    """Counts the same while the samples arrive, one by one."""
+    """Counts the same while the samples of a regular clock arrive, one by one."""
 
     def __init__(self, rate: float):
         self.present = 0

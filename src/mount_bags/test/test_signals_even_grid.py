@@ -154,6 +154,13 @@ def test_what_cannot_be_used_is_refused_with_the_place(times, reason):
     assert reason in refusal(times)
 
 
+def test_a_clock_that_runs_a_little_slow_has_the_rate_of_its_name():
+    signal = signal_of('z', 1.005 * TIMES, VALUES)
+    assert evenly_spaced(signal, 0.125, 100.0).rate == pytest.approx(99.5, rel=1e-3)
+    with pytest.raises(SignalError, match='at least 101 are needed'):
+        evenly_spaced(signal, 0.125, 101.0)
+
+
 def test_no_error_of_a_stamp_makes_a_spike():
     """Two stamps 1 us apart, anywhere, leave what is resampled nearly as it was."""
     clean = resampled(even(TIMES), 1e-3)

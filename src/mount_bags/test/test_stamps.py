@@ -53,6 +53,59 @@ def test_jitter_below_a_third_of_the_period_is_no_loss():
     assert (found.lost, found.duplicated, found.out_of_order) == (0, 0, 0)
 
 
+def counts_at(positions):
+    """Counts of samples at times given in periods."""
+    found = stamp_statistics(np.rint(np.asarray(positions) * PERIOD).astype(np.int64), RATE)
+    assert found.expected == found.present - found.duplicated + found.lost
+    return found.expected, found.present, found.lost, found.duplicated
+
+
+def moved(**stamps):
+    positions = np.arange(6000.0)
+    for name, position in stamps.items():
+        positions[int(name[1:])] = position
+    return positions
+
+
+@pytest.mark.parametrize(
+    'positions',
+    [
+        moved(_1000=1000.9),
+        moved(_1000=999.2),
+        moved(_1000=1001.7),
+        moved(_1000=1001.6, _2000=2000.7, _3000=2999.3),
+        moved(_0=0.7),
+        moved(_5999=5998.3),
+    ],
+    ids=['late', 'early', 'later than the next', 'several', 'first', 'last'],
+)
+def test_a_stamp_beside_its_place_is_neither_lost_nor_twice(positions):
+    assert counts_at(positions) == (6000, 6000, 0, 0)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_jitter_of_a_third_of_the_period_is_no_loss(seed):
+    jitter = np.random.default_rng(seed).uniform(-0.35, 0.35, 6000)
+    assert counts_at(np.sort(np.arange(6000) * 1.0001 + jitter)) == (6000, 6000, 0, 0)
+
+
+def test_under_jitter_lost_and_doubled_samples_are_still_counted():
+    jitter = np.random.default_rng(2).uniform(-0.3, 0.3, 6000)
+    positions = np.arange(6000) + jitter
+    assert counts_at(np.delete(positions, [100, 101, 3000])) == (6000, 5997, 3, 0)
+    assert counts_at(np.insert(positions, 101, positions[100])) == (6000, 6001, 0, 1)
+    assert counts_at(np.insert(positions, 101, positions[100] + 0.1)) == (6000, 6001, 0, 1)
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.lists(st.floats(0.0, 50.0), min_size=1, max_size=60))
+def test_the_counts_of_any_stamps_add_up(positions):
+    expected, present, lost, duplicated = counts_at(positions)
+    assert present == len(positions)
+    assert min(lost, duplicated) >= 0
+    assert expected >= 1
+
+
 @settings(deadline=None, derandomize=True)
 @given(st.lists(st.integers(0, 200), min_size=1, max_size=100))
 def test_expected_is_the_span_and_the_counts_add_up(indices):

@@ -293,3 +293,54 @@ def _run(*words: str) -> None:
     with pytest.raises(SystemExit) as ended:
         main(list(words))
     assert ended.value.code == 0
+
+
+def _rig_file(folder, swapped=False):
+    """A test of the measured damper, with its columns 1 and 2 swapped or not."""
+    time = np.arange(2048) / 1024.0
+    motion = np.clip(time - 0.2, 0.0, None)
+    x = np.sin(2.0 * np.pi * motion)
+    force = 0.5 * np.tanh(20.0 * np.cos(2.0 * np.pi * motion) * (motion > 0.0)) + 0.01 * x
+    columns = [time, x, force, 0.0 * x, 600.0 + 0.0 * x, 650.0 + 0.0 * x]
+    if swapped:
+        columns[1], columns[2] = columns[2], columns[1]
+    path = folder / f'rig_{swapped}.json'
+    path.write_text(json.dumps({'data': np.column_stack(columns).tolist()}))
+    return path
+
+
+def test_channels_are_heard_for_json_too(tmp_path):
+    as_made = read_recording(_rig_file(tmp_path), clamp='none')
+    swapped = _rig_file(tmp_path, swapped=True)
+    for texts in (
+        ['displacement=2:inch', 'friction_force=1:kip'],
+        ['displacement=friction_force_kip:inch', 'friction_force=displacement_in:kip'],
+    ):
+        found = read_recording(swapped, parsed_channels(texts), clamp='none')
+        np.testing.assert_array_equal(found.displacement, as_made.displacement)
+        np.testing.assert_array_equal(found.force, as_made.force)
+    in_mm = read_recording(_rig_file(tmp_path), parsed_channels(['displacement=1:mm']), clamp='none')
+    np.testing.assert_allclose(in_mm.displacement, as_made.displacement / 25.4)
+    clamped = read_recording(_rig_file(tmp_path), parsed_channels(['normal_force=4']))
+    np.testing.assert_allclose(clamped.normal_force, 600.0 * 4.4482216152605)
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('displacement=9:mm', "column '9' is not in"),
+        ('friction_force=cell:kN', "column 'cell' is not in"),
+        ('friction_force=velocity_in_per_s', 'does not say its unit'),
+        ('time=cell', "time column 'cell' is not in"),
+    ],
+)
+def test_a_channel_that_json_does_not_have_is_refused(text, words, tmp_path):
+    with pytest.raises(ValueError, match=words):
+        read_recording(_rig_file(tmp_path), parsed_channels([text]))
+
+
+def test_a_channel_that_cannot_be_heard_is_refused(tmp_path):
+    with pytest.raises(IdentificationError, match='time is in s and takes no unit'):
+        parsed_channels(['time=t:mm'])
+    with pytest.raises(IdentificationError, match='the times of a recording are its stamps'):
+        read_recording(tmp_path, parsed_channels(['time=t']))

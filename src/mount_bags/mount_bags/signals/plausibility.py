@@ -27,12 +27,11 @@ def check_range(even: EvenSignal, resampled: FloatArray, first: float, step_time
 
 
 def check_size(name: str, values: FloatArray, step_time: float, limit: float, unit: str, remedy: str) -> None:
-    """Raise `SignalError` with the first of `values` (n,), `step_time` s apart, that is beyond +- `limit`."""
-    beyond = np.abs(values) > limit
-    if not beyond.any():
+    """Raise `SignalError` with the largest of `values` (n,), `step_time` s apart, if it is beyond +- `limit`."""
+    place = int(np.argmax(np.abs(values)))
+    if abs(values[place]) <= limit:
         return
-    place = int(np.argmax(beyond))
     raise SignalError(
         f'{name}: sample {place} at {place * step_time:.4f} s is {values[place]:.4g} {unit}, beyond '
-        f'+-{limit:g} {unit} ({np.count_nonzero(beyond)} such of {len(values)}); {remedy}'
+        f'+-{limit:g} {unit} ({np.count_nonzero(np.abs(values) > limit)} such of {len(values)}); {remedy}'
     )
