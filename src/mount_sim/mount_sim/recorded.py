@@ -28,10 +28,10 @@ def acceleration_at(even: EvenSignal, scale: float, step_time: float) -> FloatAr
 
     Raises `SignalError`, with the sample, beyond `LARGEST_ACCELERATION`.
     """
-    values = scale * (even.values - mean_of(even.values))
+    values = even.values - mean_of(even.values)
     check_size(
-        even.name, values, even.period, LARGEST_ACCELERATION, 'm/s^2 without the mean',
+        even.name, scale * values, even.period, LARGEST_ACCELERATION, 'm/s^2 without the mean',
         'a chassis is not shaken so (the limit is chosen): is its unit another one (--scale), the column no '
         'acceleration, or this sample a fault to cut or repair?',
     )  # fmt: skip
-    return resampled(replace(even, values=values), step_time)
+    return scale * resampled(replace(even, values=values), step_time)

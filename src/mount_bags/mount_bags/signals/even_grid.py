@@ -26,7 +26,7 @@ CROWDED = 0.25
 """Share of the mean period, chosen: no sensor with a clock of its own samples again so soon."""
 LONGEST_BURST = 0.25
 """s, chosen: stamps of one burst may be so far from the line."""
-_SLOW_CLOCK = 0.01  # chosen: so much slower than its name may a sensor of just the lowest rate be
+_SLOW_CLOCK = 0.005  # chosen: so much slower than its name may a sensor of just the lowest rate be
 _AS_GOOD = 1.1  # chosen: even spacing is taken unless stamps foretell the samples better by more than that
 _FARTHEST_BACK = 2.0  # mean periods, chosen: so late a sample may come in the file
 _MOST_BACK = 0.1  # share of samples, chosen

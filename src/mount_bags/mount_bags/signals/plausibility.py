@@ -27,7 +27,7 @@ def check_range(even: EvenSignal, resampled: FloatArray, first: float, step_time
 
 
 def check_size(name: str, values: FloatArray, step_time: float, limit: float, unit: str, remedy: str) -> None:
-    """Raise `SignalError` with the largest of `values` (n,), `step_time` s apart, if it is beyond +- `limit`."""
+    """Raise `SignalError` with the largest of `values` (n,), `step_time` s apart, if beyond +- `limit`."""
     place = int(np.argmax(np.abs(values)))
     if abs(values[place]) <= limit:
         return
