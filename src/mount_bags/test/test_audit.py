@@ -11,6 +11,7 @@ import mount_bags
 from mount_bags.audit import audit, setpoint_coverage
 from mount_bags.audit_report import as_json, as_table
 from mount_bags.writer import BagWriter
+from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 
@@ -69,6 +70,20 @@ def test_topics_without_a_rate_have_no_expectation(tmp_path):
     assert audits['/session'].expected is None
     assert audits['/session'].present == 1
     assert audits['/displacement'].remark == 'no message'
+
+
+def test_late_stamps_of_a_phone_are_neither_losses_nor_repetitions(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/phone', DISPLACEMENT.type)
+    stamps = START + 10 * PERIOD * np.arange(6000)
+    late = np.random.default_rng(1).choice(6000, 8, replace=False)
+    stamps[late] += 7 * PERIOD
+    for stamp in stamps.tolist():
+        writer.write('/phone', ScalarsLayout(DISPLACEMENT).pack(stamp, (0.0,)), stamp)
+    writer.close()
+    entry = audit(mount_bags.open(tmp_path / 'bag'))['/phone']
+    assert (entry.expected, entry.present, entry.lost, entry.duplicated) == (6000, 6000, 0, 0)
+    assert entry.remark == 'rate of 100 Hz taken from the stamps'
 
 
 def test_json_holds_the_figures_and_no_nan(tmp_path):

@@ -88,6 +88,9 @@ def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[s
     Raises as `drive` does.
     """
     excitation = preflight(order.parameters)
+    for note in excitation.notes:
+        console.print('[yellow]note[/yellow]', end=' ')
+        console.print(note, soft_wrap=True, highlight=False, markup=False)
     folder = make_run_folder(order.out, order.scenario)
     complaints: list[str] = []
     if order.mode == 'core':

@@ -22,6 +22,7 @@ class Excitation:
     """Numbers at the plant's step from `start` (s of simulated time) on; before it: rest.
 
     `values` (n,) in the unit of the seat; `engine_forces` (n,) in N, upwards on the engine, None for none.
+    `notes` say what had to be done to a recording to get them.
     """
 
     seat: Seat
@@ -29,6 +30,7 @@ class Excitation:
     step_time: float
     start: float
     engine_forces: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:

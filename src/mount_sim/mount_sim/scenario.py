@@ -220,7 +220,9 @@ def _sweep(scenarios: Scenarios) -> Excitation:
 def _recorded(scenarios: Scenarios) -> Excitation:
     timeline, recorded = scenarios.timeline, scenarios.recorded
     if not recorded.file:
-        raise ParameterError('scenario recorded needs a file: CSV, NPY or MCAP (recorded.file, or --file)')
+        raise ParameterError(
+            'scenario recorded needs a file: CSV, NPY, JSON or MCAP (recorded.file, or --file)'
+        )
     signal = recorded_signal(recorded)
     values = acceleration_at(signal, recorded.scale, STEP_TIME)
     if timeline.duration:
@@ -231,4 +233,5 @@ def _recorded(scenarios: Scenarios) -> Excitation:
                 f'({available:.3f} s); ask for at most that'
             )
         values = values[: round(timeline.duration / STEP_TIME)]
-    return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, timeline.start)
+    notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
+    return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, timeline.start, notes=notes)

@@ -142,6 +142,15 @@ def test_a_recording_shakes_the_chassis_and_gives_its_length(parameters, recordi
     np.testing.assert_array_equal(shorter.values, excitation.values[:80_000])
 
 
+def test_what_was_done_to_a_recording_is_told(parameters, recording):
+    assert build_excitation(parameters(scenario='recorded', recorded__file=recording)).notes == ()
+    times = np.load(recording.replace('value', 't'))
+    times[500] = times[499] + 1e-6
+    np.save(recording.replace('value', 't'), times)
+    (note,) = build_excitation(parameters(scenario='recorded', recorded__file=recording)).notes
+    assert note.startswith('z.0: taken as evenly spaced at 200 Hz: ')
+
+
 def test_a_recording_is_scaled(parameters, recording):
     plain, scaled = (
         build_excitation(parameters(scenario='recorded', recorded__file=recording, recorded__scale=scale))
@@ -151,6 +160,8 @@ def test_a_recording_is_scaled(parameters, recording):
 
 
 def test_what_a_recording_cannot_give_is_refused(parameters, recording):
-    assert 'scenario recorded needs a file: CSV, NPY or MCAP' in _refusal(parameters(scenario='recorded'))
+    assert 'scenario recorded needs a file: CSV, NPY, JSON or MCAP' in _refusal(
+        parameters(scenario='recorded')
+    )
     too_long = parameters(scenario='recorded', recorded__file=recording, timeline__duration=10.5)
     assert 'duration (10.5 s) is longer than the recording z.0 (9.995 s)' in _refusal(too_long)

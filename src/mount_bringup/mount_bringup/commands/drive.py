@@ -30,12 +30,13 @@ def drive(
         str, typer.Option(help='friction, friction_off, friction_always_on, hydro or elastomer')
     ] = '',
     file: Annotated[
-        Path | None, typer.Option(help='recorded: CSV, NPY, folder of NPY pairs, or MCAP')
+        Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
     ] = None,
     column: Annotated[
-        str, typer.Option(help='recorded: column (CSV), signal.number (NPY) or field of the message (MCAP)')
+        str,
+        typer.Option(help='recorded: column (CSV, JSON), signal.number (NPY), field of the message (MCAP)'),
     ] = '',
-    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV)')] = '',
+    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV, JSON)')] = '',
     topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
     scale: Annotated[
         float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')

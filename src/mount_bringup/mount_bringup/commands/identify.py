@@ -49,7 +49,8 @@ def friction(
     channel: Annotated[
         list[str] | None,
         typer.Option(
-            metavar='NAME=COLUMN:UNIT', help='CSV column or MCAP topic.field of a quantity; repeatable'
+            metavar='NAME=COLUMN:UNIT',
+            help='CSV or JSON column, or MCAP topic.field, of a quantity; repeatable',
         ),
     ] = None,
     clamp: Annotated[

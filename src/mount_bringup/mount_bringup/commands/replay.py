@@ -25,7 +25,7 @@ EPILOG = """Examples:
 
 def replay(
     recording: Annotated[
-        Path, typer.Argument(help='folder of a recording, or MCAP file; with --map CSV and NPY too')
+        Path, typer.Argument(help='folder of a recording, or MCAP file; with --map CSV, NPY and JSON too')
     ],
     core: Annotated[
         bool, typer.Option('--core', help='through the controller as function calls; the default')

@@ -46,7 +46,7 @@ class ForeignOrder:
     """How a foreign recording becomes a displacement in m: value * scale - offset.
 
     `fields` is {`displacement`: place} or {`engine_displacement`: place, `chassis_displacement`: place}, a
-    place being `/topic.field` of a bag or a column of a CSV or NPY file. `offset` is in m, or `mean`.
+    place being `/topic.field` of a bag or a column of a CSV, NPY or JSON file. `offset` is in m, or `mean`.
     """
 
     fields: Mapping[str, str]
