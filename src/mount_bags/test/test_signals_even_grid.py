@@ -148,6 +148,8 @@ def test_what_fills_a_gap_stays_near_the_samples_beside_it():
         (TIMES * 2.1, 'at least 50 are needed'),
         (TIMES + 0.12 * (NUMBERS > 500), 'has a gap of 0.130 s at 5.000 s; up to 0.125 s are interpolated'),
         (TIMES + 3.0 * (NUMBERS > 500), 'has a gap of 3.010 s at 5.000 s'),
+        (TIMES + 0.2 * (NUMBERS > COUNT - 10), 'has a gap of 0.210 s at 29.900 s'),
+        (changed(9, TIMES[8] + 1e-6) + 0.2 * (NUMBERS > COUNT - 10), 'has a gap of 0.210 s at 29.900 s'),
     ],
 )
 def test_what_cannot_be_used_is_refused_with_the_place(times, reason):

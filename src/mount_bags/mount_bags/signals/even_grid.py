@@ -29,7 +29,7 @@ LONGEST_BURST = 0.25
 _SLOW_CLOCK = 0.005  # chosen: so much slower than its name may a sensor of just the lowest rate be
 _AS_GOOD = 1.1  # chosen: even spacing is taken unless stamps foretell the samples better by more than that
 _FARTHEST_BACK = 2.0  # mean periods, chosen: so late a sample may come in the file
-_MOST_BACK = 0.1  # share of samples, chosen
+_OFTEN = 0.1  # share of steps, chosen: what is more frequent is a habit of the logger, or of the file
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,8 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
     late = rising - (first + period * np.arange(rising.size))
     if np.abs(late).max() <= ON_THE_LINE * period:
         return _checked(signal, first, period, values[order], lowest_rate, ())
-    if _is_level(late, period) and _is_even(rising, values, order, late, period):
+    gap = np.diff(rising).max() > longest_gap and not _in_bursts(rising)
+    if not gap and _is_level(late, period) and _is_even(rising, values, order, late, period):
         note = (
             f'taken as evenly spaced at {1.0 / period:.4g} Hz: the stamps are up to '
             f'{1e3 * np.abs(late).max():.3g} ms off a line through them'
@@ -81,7 +82,7 @@ def _refuse_time_that_goes_back(signal: Signal) -> None:
     steps = np.diff(times)
     mean = (times.max() - times.min()) / steps.size
     bad = steps < -_FARTHEST_BACK * mean
-    if np.mean(steps < 0.0) > _MOST_BACK or mean == 0.0:
+    if np.mean(steps < 0.0) > _OFTEN or mean == 0.0:
         bad = steps <= 0.0
     if bad.any():
         place = int(np.argmax(bad))
@@ -94,13 +95,19 @@ def _refuse_time_that_goes_back(signal: Signal) -> None:
 def _once(signal: Signal) -> NDArray[np.bool_]:
     """Return which samples to keep: once those that stand twice, if without the copies no stamps crowd."""
     again = np.concatenate([[False], (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)])
-    if again.any() and again.sum() < again.size - 2 and not _is_crowded(np.sort(signal.times[~again])):
+    if again.any() and again.sum() < again.size - 2 and not _crowd(np.sort(signal.times[~again])).any():
         return ~again
     return np.ones(again.size, bool)
 
 
-def _is_crowded(rising: FloatArray) -> bool:
-    return bool(np.diff(rising).min() < CROWDED * (rising[-1] - rising[0]) / (rising.size - 1))
+def _crowd(rising: FloatArray) -> NDArray[np.bool_]:
+    """Return which steps between stamps are shorter than a sensor's."""
+    return np.asarray(np.diff(rising) < CROWDED * (rising[-1] - rising[0]) / (rising.size - 1))
+
+
+def _in_bursts(rising: FloatArray) -> bool:
+    """Whether pauses between stamps are those between bursts rather than gaps."""
+    return bool(np.mean(_crowd(rising)) > _OFTEN)
 
 
 @compiled
@@ -134,7 +141,7 @@ def _is_even(
     rising: FloatArray, values: FloatArray, order: NDArray[np.intp], late: FloatArray, period: float
 ) -> bool:
     """Whether samples `values` in the order of the file were taken evenly rather than when stamps say."""
-    if _is_crowded(rising):
+    if _crowd(rising).any():
         return True
     off = np.abs(late) > 10.0 * ON_THE_LINE * period
     if not off.any():
