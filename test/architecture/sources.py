@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -10,16 +11,10 @@ PACKAGES = sorted(file.parent.name for file in SOURCES.glob('*/package.xml'))
 LOADERS = ('import_module', 'importlib.import_module', 'importlib.resources.files')
 
 
-def modules_of(file: Path) -> Iterator[str]:
+@cache
+def modules_of(file: Path) -> tuple[str, ...]:
     """Return what a file imports, inside functions too; a name that is imported may be a module itself."""
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            yield node.module
-            yield from (f'{node.module}.{alias.name}' for alias in node.names)
-        elif isinstance(node, ast.Call) and ast.unparse(node.func) in LOADERS:
-            yield from (name.value for name in node.args[:1] if isinstance(name, ast.Constant))
+    return tuple(_imported(file))
 
 
 def module_files() -> dict[str, Path]:
@@ -45,3 +40,14 @@ def _with_parents(names: Iterable[str]) -> Iterator[str]:
     for name in names:
         parts = name.split('.')
         yield from ('.'.join(parts[:count]) for count in range(1, len(parts) + 1))
+
+
+def _imported(file: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            yield node.module
+            yield from (f'{node.module}.{alias.name}' for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) in LOADERS:
+            yield from (name.value for name in node.args[:1] if isinstance(name, ast.Constant))

@@ -38,36 +38,37 @@ for name in wanted:
 def test_what_the_car_starts_loads_where_nothing_of_the_desk_is_installed(wanted):
     car = files_behind(BEGIN)
     ours = {name for name, file in module_files().items() if file not in car}
-    absent = ours | (set(LIBRARIES) - third_party(car) - {'msgpack'})
-    assert {'plotly', 'matplotlib', 'skfem', 'typer', 'rich', 'mount_bringup.command'} <= absent
+    desk = ours | set(LIBRARIES) - libraries_of_the_car()
+    assert {'plotly', 'matplotlib', 'skfem', 'typer', 'rich', 'mount_bringup.command'} <= desk
     launch = {module for file in car for module in modules_of(file) if module.startswith('launch')}
-    arguments = [' '.join(sorted(names)) for names in ({wanted}, launch, absent)]
-    ended = subprocess.run([sys.executable, '-c', LOAD, *arguments], capture_output=True, text=True)
+    arguments = [' '.join(sorted(names)) for names in ({wanted}, launch, desk)]
+    command = [sys.executable, '-c', LOAD, *arguments]
+    ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
 
 
-def test_what_rosdep_does_not_know_of_the_car_is_in_the_file_that_the_readme_installs():
-    without_key = {LIBRARIES[name].project for name in third_party(files_behind(BEGIN))}
-    without_key -= {library.project for library in LIBRARIES.values() if library.key}
+def test_what_the_car_loads_and_rosdep_cannot_install_is_in_the_file_that_the_readme_names():
+    by_pip = {LIBRARIES[name].project for name in libraries_of_the_car() if not LIBRARIES[name].key}
     pinned = re.findall(r'^([\w-]+)==', (REPOSITORY / 'requirements-car.txt').read_text(), re.MULTILINE)
-    assert set(pinned) == without_key
+    assert set(pinned) == by_pip
     assert 'python3 -m pip install -r requirements-car.txt' in lines_for_the_car()
 
 
 def test_the_readme_lets_rosdep_skip_what_only_the_desk_loads():
-    (rosdep,) = [shlex.split(line) for line in lines_for_the_car() if line.startswith('rosdep install')]
-    of_car = {LIBRARIES[name].key for name in third_party(files_behind(BEGIN))} | {LIBRARIES['msgpack'].key}
     declared = {
         key
         for file in SOURCES.glob('*/package.xml')
         for key in re.findall('<exec_depend>(.+)</exec_depend>', file.read_text())
     }
-    skipped = rosdep[rosdep.index('--skip-keys') + 1].split()
-    assert skipped == sorted(declared & {library.key for library in LIBRARIES.values()} - of_car)
+    of_desk = {str(LIBRARIES[name].key) for name in set(LIBRARIES) - libraries_of_the_car()}
+    (rosdep,) = [shlex.split(line) for line in lines_for_the_car() if line.startswith('rosdep install')]
+    assert rosdep[rosdep.index('--skip-keys') + 1].split() == sorted(declared & of_desk)
 
 
-def third_party(files: set[Path]) -> set[str]:
-    return {module.split('.')[0] for file in files for module in modules_of(file)} & set(LIBRARIES)
+def libraries_of_the_car() -> set[str]:
+    """Return what the car's files import, inside functions too, and what python-can needs for multicast."""
+    imported = {module.split('.')[0] for file in files_behind(BEGIN) for module in modules_of(file)}
+    return imported & set(LIBRARIES) | {'msgpack'}
 
 
 def lines_for_the_car() -> list[str]:
