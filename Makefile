@@ -47,7 +47,7 @@ identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes
 	@$(BIN)/engine-mount calibrate inductance $(RACK)/ripple_*.csv --base $(RACK)/default.yaml --out $(RACK)/default.yaml
 	@$(BIN)/engine-mount identify friction --step sawtooth --train $(RACK)/friction_ramp.csv $(RACK)/friction_[46]0N.csv $(RACK)/friction_1?0N.csv --held-out $(RACK)/friction_80N.csv --base $(RACK)/default.yaml --out $(SPECIMEN)
 
-bench: $(VENV)/.ready-dev ## performance figures as ratios, side by side in one run
+bench: $(VENV)/.ready ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench
 
 lint: $(VENV)/.ready-dev ## style, types
@@ -70,7 +70,7 @@ $(VENV)/.created:
 	@$(PYTHON) -m venv $(VENV) || { echo 'No environment could be made in $(VENV) with $(PYTHON)'; rm -rf $(VENV); exit 1; }
 	@touch $@
 
-$(VENV)/.ready: $(VENV)/.created requirements.txt $(wildcard src/*/setup.py)
+$(VENV)/.ready: $(VENV)/.created requirements.txt requirements-car.txt $(wildcard src/*/setup.py)
 	@echo 'Setting up (once, about two minutes) ...'
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --use-pep517 \

@@ -1,6 +1,5 @@
 """The arrows between the packages point one way."""
 
-import ast
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -8,8 +7,8 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from sources import PACKAGES, SOURCES, module_files, modules_of
 
-SOURCES = Path(__file__).resolve().parents[2] / 'src'
 MAY_IMPORT = {
     'mount_models': set(),
     'mount_ros': {'mount_models'},
@@ -39,18 +38,14 @@ def test_packages_import_only_what_lies_below_them(package: str):
 
 
 def test_no_module_needs_itself_by_way_of_others():
-    files = {
-        '.'.join(file.relative_to(SOURCES / package).with_suffix('').parts).removesuffix('.__init__'): file
-        for package in MAY_IMPORT
-        for file in (SOURCES / package / package).rglob('*.py')
-    }
-    needs = {module: set(_modules_of(file)) & set(files) for module, file in files.items()}
+    files = module_files()
+    needs = {module: set(modules_of(file)) & set(files) for module, file in files.items()}
     assert 'mount_models.quantity' in needs['mount_models.specimen']  # such arrows are seen
     tuple(TopologicalSorter(needs).static_order())  # raises CycleError, which names the circle
 
 
 def test_every_package_is_covered():
-    assert {path.name for path in SOURCES.iterdir() if (path / 'package.xml').exists()} == set(MAY_IMPORT)
+    assert set(PACKAGES) == set(MAY_IMPORT)
 
 
 @pytest.mark.parametrize('package', MAY_TOUCH_ROS)
@@ -89,18 +84,9 @@ def test_the_controller_never_sees_the_truth():
 
 def _imports(package: str) -> Iterator[tuple[Path, str]]:
     for file in sorted((SOURCES / package / package).rglob('*.py')):
-        for module in _modules_of(file):
+        for module in modules_of(file):
             yield file, module.split('.')[0]
 
 
 def _modules(package: str) -> set[str]:
-    return {m for file in (SOURCES / package / package).rglob('*.py') for m in _modules_of(file)}
-
-
-def _modules_of(file: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            yield node.module
-            yield from (f'{node.module}.{alias.name}' for alias in node.names)  # may be modules too
+    return {m for file in (SOURCES / package / package).rglob('*.py') for m in modules_of(file)}

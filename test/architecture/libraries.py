@@ -1,0 +1,45 @@
+"""What the code may import from others, and where an installation gets it from.
+
+The keys are those of rosdistro's `rosdep/python.yaml`; ROS packages bear the name that is imported.
+"""
+
+from typing import NamedTuple
+
+
+class Library(NamedTuple):
+    """A library by its project on PyPI and its key in rosdep; without a key it comes by pip everywhere."""
+
+    project: str
+    key: str | None = None
+
+
+LIBRARIES = {
+    'PIL': Library('pillow', 'python3-pil'),
+    'bitstruct': Library('bitstruct'),
+    'can': Library('python-can', 'python3-can'),
+    'cantools': Library('cantools', 'python3-cantools-pip'),
+    'e2e': Library('autosar-e2e'),
+    'hypothesis': Library('hypothesis', 'python3-hypothesis'),
+    'lz4': Library('lz4'),
+    'matplotlib': Library('matplotlib', 'python3-matplotlib'),
+    'mcap': Library('mcap'),
+    'mcap_ros2': Library('mcap-ros2-support', 'mcap-ros2-support'),
+    'msgpack': Library('msgpack', 'python3-msgpack'),
+    'numba': Library('numba'),  # python3-numba is a key, but of a package that Ubuntu 24.04 does not have
+    'numpy': Library('numpy', 'python3-numpy'),
+    'plotly': Library('plotly'),
+    'pytest': Library('pytest', 'python3-pytest'),
+    'rich': Library('rich', 'python3-rich'),
+    'rosbags': Library('rosbags', 'python3-rosbags-pip'),
+    'scipy': Library('scipy', 'python3-scipy'),
+    'skfem': Library('scikit-fem'),
+    'threadpoolctl': Library('threadpoolctl'),
+    'typer': Library('typer', 'python3-typer'),
+    'yaml': Library('PyYAML', 'python3-yaml'),
+    'zstandard': Library('zstandard'),
+}
+
+ROS = {
+    'ament_index_python', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros', 'lifecycle_msgs',
+    'rcl_interfaces', 'rclpy', 'sensor_msgs', 'std_msgs', 'std_srvs',
+}  # fmt: skip

@@ -1,0 +1,76 @@
+"""What runs in the car loads nothing of the desk, and the lines of the README install what it loads."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from libraries import LIBRARIES
+from sources import REPOSITORY, SOURCES, files_behind, module_files, modules_of
+
+from mount_bringup.graph.nodes import SIMULATED
+
+LAUNCH_FILES = sorted((SOURCES / 'mount_bringup' / 'launch').glob('*.launch.py'))
+MODULES = [*(f'{node.package}.node' for node in SIMULATED), 'mount_bringup.graph.supervisor']
+BEGIN = [*LAUNCH_FILES, *(module_files()[name] for name in MODULES)]
+
+LOAD = """
+import importlib.util, runpy, sys
+from unittest.mock import MagicMock
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name in desk or name.split('.')[0] in desk:
+            raise ModuleNotFoundError(f'{name} is of the desk', name=name)
+
+wanted, launch, desk = (argument.split() for argument in sys.argv[1:])
+sys.meta_path.insert(0, Absent())
+if importlib.util.find_spec('launch') is None:  # it comes with a ROS installation
+    sys.modules.update(dict.fromkeys(launch, MagicMock()))
+for name in wanted:
+    runpy.run_path(name) if name.endswith('.py') else importlib.import_module(name)
+"""
+
+
+@pytest.mark.parametrize('wanted', [*map(str, LAUNCH_FILES), *MODULES], ids=lambda name: Path(name).name)
+def test_what_the_car_starts_loads_where_nothing_of_the_desk_is_installed(wanted):
+    car = files_behind(BEGIN)
+    ours = {name for name, file in module_files().items() if file not in car}
+    desk = ours | set(LIBRARIES) - libraries_of_the_car()
+    assert {'plotly', 'matplotlib', 'skfem', 'typer', 'rich', 'mount_bringup.command'} <= desk
+    launch = {module for file in car for module in modules_of(file) if module.startswith('launch')}
+    arguments = [' '.join(sorted(names)) for names in ({wanted}, launch, desk)]
+    command = [sys.executable, '-c', LOAD, *arguments]
+    ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_what_the_car_loads_and_rosdep_cannot_install_is_in_the_file_that_the_readme_names():
+    by_pip = {LIBRARIES[name].project for name in libraries_of_the_car() if not LIBRARIES[name].key}
+    pinned = re.findall(r'^([\w-]+)==', (REPOSITORY / 'requirements-car.txt').read_text(), re.MULTILINE)
+    assert set(pinned) == by_pip
+    assert 'python3 -m pip install -r requirements-car.txt' in lines_for_the_car()
+
+
+def test_the_readme_lets_rosdep_skip_what_only_the_desk_loads():
+    declared = {
+        key
+        for file in SOURCES.glob('*/package.xml')
+        for key in re.findall('<exec_depend>(.+)</exec_depend>', file.read_text())
+    }
+    of_desk = {str(LIBRARIES[name].key) for name in set(LIBRARIES) - libraries_of_the_car()}
+    (rosdep,) = [shlex.split(line) for line in lines_for_the_car() if line.startswith('rosdep install')]
+    assert rosdep[rosdep.index('--skip-keys') + 1].split() == sorted(declared & of_desk)
+
+
+def libraries_of_the_car() -> set[str]:
+    """Return what the car's files import, inside functions too, and what python-can needs for multicast."""
+    imported = {module.split('.')[0] for file in files_behind(BEGIN) for module in modules_of(file)}
+    return imported & set(LIBRARIES) | {'msgpack'}
+
+
+def lines_for_the_car() -> list[str]:
+    section = (REPOSITORY / 'README.md').read_text().split('\n## In the car\n')[1].split('\n## ')[0]
+    return [line for block in section.split('```')[1::2] for line in block.strip().splitlines()]

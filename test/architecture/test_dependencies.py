@@ -1,0 +1,101 @@
+"""Every package.xml, the requirement files and the imports name the same libraries."""
+
+import re
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from libraries import LIBRARIES, ROS
+from sources import PACKAGES, REPOSITORY, SOURCES, modules_of
+
+from mount_bringup.graph.nodes import SIMULATED
+from mount_ros.topics import RACK_TOPICS, TOPICS
+
+LAUNCH_COMMAND = 'ros2launch'
+UNSEEN = {  # what is needed without an import that can be seen
+    'mount_ros': {topic.type.split('/')[0] for topic in TOPICS + RACK_TOPICS},
+    'mount_driver': {'msgpack'},  # of python-can, for frames by multicast
+    'mount_bringup': {LAUNCH_COMMAND} | {node.package for node in SIMULATED},
+}
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_a_package_names_what_its_code_imports_and_nothing_else(package):
+    needed = keys(imported(code_of(package)) | UNSEEN.get(package, set()))
+    assert declared(package, 'exec_depend') == needed - {package}
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_a_package_names_what_its_tests_import_besides(package):
+    code = declared(package, 'exec_depend')
+    assert declared(package, 'test_depend') == keys(imported(own_tests_of(package))) - code - {package}
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_a_package_names_what_builds_it(package):
+    assert imported([SOURCES / package / 'setup.py']) == {'setuptools'}
+    assert declared(package, 'buildtool_depend') == {'python3-setuptools'}
+
+
+def test_where_there_is_no_ros_the_requirements_pin_what_the_code_imports_and_nothing_else():
+    assert pinned('requirements.txt') == projects(code_of)
+
+
+def test_the_requirements_of_tests_pin_what_tests_import():
+    assert projects(own_tests_of) <= pinned('requirements-dev.txt')
+
+
+def code_of(package: str) -> list[Path]:
+    """Return the sources of a package; the plugin for tests is one of them only where it lies."""
+    files = [*(SOURCES / package / package).rglob('*.py'), *(SOURCES / package / 'launch').glob('*.py')]
+    return [file for file in files if file.name != 'testing.py']
+
+
+def own_tests_of(package: str) -> list[Path]:
+    return [*(SOURCES / package / 'test').glob('*.py'), *(SOURCES / package / package).glob('testing.py')]
+
+
+def imported(files: Sequence[Path]) -> set[str]:
+    """Return the packages that files import, without Python's own and what tests keep beside themselves."""
+    beside = {path.stem for file in files for path in file.parent.glob('*.py') if file.parent.name == 'test'}
+    found = {module.split('.')[0] for file in files for module in modules_of(file)}
+    return found - beside - sys.stdlib_module_names
+
+
+def keys(modules: Iterable[str]) -> set[str]:
+    """Return the names in package.xml; what rosdep does not know has none."""
+    libraries = {module: LIBRARIES[module].key for module in modules if module in LIBRARIES}
+    others = set(modules) - set(libraries)
+    unknown = others - ROS - set(PACKAGES) - {LAUNCH_COMMAND}
+    assert not unknown, f'{unknown}: say in libraries.py where an installation gets them from'
+    return others | {key for key in libraries.values() if key}
+
+
+def declared(package: str, kind: str) -> set[str]:
+    """Return what a package.xml names as `kind`, such as exec_depend."""
+    root = ElementTree.parse(SOURCES / package / 'package.xml').getroot()
+    names = [str(element.text) for element in root.iter(kind)]
+    assert len(names) == len(set(names)), f'{package}/package.xml names one twice'
+    return set(names)
+
+
+def projects(files_of) -> set[str]:
+    """Return the projects on PyPI that the files of all packages need, those of ROS aside."""
+    modules = {module for package in PACKAGES for module in imported(files_of(package))}
+    modules |= {name for names in UNSEEN.values() for name in names} if files_of is code_of else set()
+    return {LIBRARIES[module].project for module in modules if module in LIBRARIES}
+
+
+def pinned(name: str) -> set[str]:
+    return {project for project in _requirements(REPOSITORY / name) if not project.startswith('ros-jazzy-')}
+
+
+def _requirements(file: Path) -> Iterator[str]:
+    for line in file.read_text().splitlines():
+        if line.startswith('-r '):
+            yield from _requirements(file.with_name(line.removeprefix('-r ')))
+        elif line and not line.startswith('#'):
+            project, _ = re.fullmatch(r'([\w-]+)(?:\[\w+\])?==(.+)', line).groups()
+            yield project
