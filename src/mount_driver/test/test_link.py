@@ -100,6 +100,12 @@ def test_a_status_is_kept_and_a_corrupt_one_is_not(link):
     assert link.statuses.corrupt == 1
 
 
+def test_statuses_that_tell_of_doubtful_setpoints_are_counted(link):
+    for alive, e2e_error in enumerate([False, True, False, True]):
+        link.take_status(CODEC.encode_status(Status(13.5, 40.0, e2e_error=e2e_error), alive))
+    assert link.setpoint_errors == 2
+
+
 def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
     feed(link, range(65_530, 65_540))
     assert link.answer(65_537 * MS, 1.25, now=65_539 * MS) == Setpoint(1.25, 1, True)
@@ -286,7 +292,7 @@ events = st.lists(
 def test_no_current_ever_stands_on_a_sample_older_than_20_ms_nor_rises_without_a_new_one(happenings):
     link = Link(CODEC, 20 * MS)
     now, index, taken = 0, 0, {}  # SampleCounter -> when it was taken
-    on_bus = Setpoint(0.0, -1, False)
+    on_bus, answered = Setpoint(0.0, 0, False), 0
     for kind, *details in happenings:
         sent = None
         if kind == 'wait':
@@ -303,9 +309,10 @@ def test_no_current_ever_stands_on_a_sample_older_than_20_ms_nor_rises_without_a
             sent = link.answer_again(index, now)
         if sent is not None:
             assert now - taken[sent.answered_counter] <= 20 * MS
-            assert sent.answered_counter >= on_bus.answered_counter
-            assert sent.answered_counter > on_bus.answered_counter or sent.current <= on_bus.current
-            on_bus = sent
+            assert sent.answered_counter > answered or (
+                sent.answered_counter == answered and sent.current <= on_bus.current
+            )
+            on_bus, answered = sent, sent.answered_counter
         if link.off_is_due(now):
             on_bus = link.off()
         assert not on_bus.enable or now - taken[on_bus.answered_counter] <= 20 * MS

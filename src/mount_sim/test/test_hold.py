@@ -26,7 +26,7 @@ _channels = itertools.count()
 
 
 class Car:
-    """Electronics, driver and a node that answers with 3 A; `setpoints[k]`: what the coil followed up to it."""
+    """Electronics, driver and a node that answers with 3 A; `setpoints[k]` led the coil up to k."""
 
     def __init__(self, mount):
         self.channel = f'test_hold_of_electronics_{next(_channels)}'
