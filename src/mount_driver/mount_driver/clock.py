@@ -1,8 +1,7 @@
 """From the microsecond counter of the electronics to time stamps.
 
 `ElectronicsClock` is for real time, `CounterClock` for lock-step; both answer
-`stamp(microseconds, received_monotonic_ns) -> ns` and `taken(stamp, received_monotonic_ns) -> ns`, the time
-of the sample on the clock by which its age is judged, and count what interrupted them.
+`stamp(microseconds, received_monotonic_ns) -> ns` and count what interrupted them.
 """
 
 import math
@@ -48,10 +47,6 @@ class CounterClock:
         self._microseconds = microseconds
         self._stamp = self._base + microseconds * _NS
         return self._stamp
-
-    def taken(self, stamp: int, received_monotonic_ns: int = 0) -> int:
-        """Return the time of a sample on the clock of the watches: its stamp."""
-        return stamp
 
 
 class ElectronicsClock:
@@ -108,14 +103,6 @@ class ElectronicsClock:
         self._microseconds = microseconds
         self._received = received_monotonic_ns
         return self._stamp
-
-    def taken(self, stamp: int, received_monotonic_ns: int) -> int:
-        """Return the time of a sample on the steady clock, ns: by its stamp, but not after its arrival.
-
-        The stamp tells the age of a frame that lay in a queue; the arrival bounds what a mapping that began
-        with a late frame would call the future.
-        """
-        return min(stamp - self._epoch_offset, received_monotonic_ns)
 
     def _begin(self, arrival: int) -> None:
         self._stamp = max(arrival, self._stamp + _SPACING_NS) if self._running else arrival

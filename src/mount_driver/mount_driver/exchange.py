@@ -34,8 +34,6 @@ class Clock(Protocol):
 
     def stamp(self, microseconds: int, received_monotonic_ns: int) -> int: ...
 
-    def taken(self, stamp: int, received_monotonic_ns: int) -> int: ...
-
 
 class Exchange:
     """Owns the bus between `start` and `stop`; every way out of it sends 0 A first.
@@ -186,7 +184,7 @@ class Exchange:
         self.bus_off = False
         self.last_received = received
         stamp = self.clock.stamp(sample.microseconds, received)
-        link.remember(stamp, sample.sample_counter, self.clock.taken(stamp, received))
+        link.remember(stamp, sample.sample_counter, stamp if self._lockstep else received)
         self._on_sample(stamp, sample)
 
     def _take_status(self, message: can.Message) -> None:

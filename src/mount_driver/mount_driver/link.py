@@ -3,8 +3,8 @@
 No bus and no clock here: frames and times come in, decisions go out. Times are ns; whoever calls decides
 whether they are the steady clock (real time) or the stamps (lock-step).
 
-The hold: a current stands on the bus only while the sample that it answers is no older than the setpoint
-timeout. So nothing but a new sample and its own answer can prolong it, whoever repeats himself.
+The hold: a current stands on the bus only while the sample that it answers is no older, since its arrival, than
+the setpoint timeout. So nothing but a new sample and its own answer prolongs it, whoever repeats himself.
 """
 
 from enum import Enum, IntEnum
@@ -71,7 +71,7 @@ class Link:
 
         self._highest_current = codec.current.high
         self._timeout = setpoint_timeout_ns
-        self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and time of the last samples
+        self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, of the last
         self._stamps = [-1] * _REMEMBERED
         self._place = 0
         self._answered_stamp = -1
@@ -94,15 +94,15 @@ class Link:
         self.last_sample = sample
         return sample
 
-    def remember(self, stamp: int, sample_counter: int, taken: int) -> None:
+    def remember(self, stamp: int, sample_counter: int, arrival: int) -> None:
         """Note the stamp under which a sample is published, so that a setpoint can name it.
 
-        `taken` is the time of the sample on the clock of `now` in what follows.
+        `arrival` is its time on the clock of `now` in what follows.
         """
         place = self._place
         self._samples.pop(self._stamps[place], None)
         self._stamps[place] = stamp
-        self._samples[stamp] = sample_counter, taken
+        self._samples[stamp] = sample_counter, arrival
         self._place = (place + 1) % _REMEMBERED
         self.latest_stamp = stamp
 
@@ -125,8 +125,8 @@ class Link:
         if sample is None:
             self.refuse(Refusal.UNKNOWN_SAMPLE)
             return None
-        counter, taken = sample
-        reason = self._objection(stamp, current, now - taken)
+        counter, arrival = sample
+        reason = self._objection(stamp, current, now - arrival)
         if reason is not None:
             self.refuse(reason)
             return None
@@ -135,7 +135,7 @@ class Link:
             current = self._highest_current
         self.setpoints += 1
         self._answered_stamp = stamp
-        self._off_at = taken + self._timeout
+        self._off_at = arrival + self._timeout
         self._last_setpoint = Setpoint(current, counter, True)
         return self._last_setpoint
 

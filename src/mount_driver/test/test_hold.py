@@ -148,18 +148,6 @@ def test_made_up_stamps_of_the_future_move_nothing(car):
     assert car.went_off() == HOLD + 1
 
 
-def test_samples_that_lay_in_a_queue_for_a_minute_are_answered_in_vain(car):
-    """As after SIGSTOP of the driver: what the kernel kept is old, though it arrives now."""
-    for index in range(GOOD + 1, GOOD + 200):
-        car.send_sample(index)
-    car.now += 60_000 * MS
-    while car.exchange.poll():
-        car.answer()
-    car.look()
-    assert car.went_off() > HOLD
-    assert car.exchange.link.refusals[Refusal.STALE] == 199
-
-
 def test_a_node_that_comes_to_itself_is_obeyed_again(car):
     car.drive(100, nothing)
     assert not car.on_bus().enable

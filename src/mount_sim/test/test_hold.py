@@ -135,8 +135,8 @@ def test_one_answer_that_is_very_late(car):
     assert car.held() == HOLD
 
 
-def test_a_driver_that_stood_still_and_sends_what_lay_in_its_queue(car):
-    """The samples of 500 ms were stamped, answered and sent before, say, a bridge held the frames back."""
+def test_a_driver_that_stood_still_and_answers_what_lay_in_its_queue(car):
+    """To it the samples of 500 ms arrive now; how old they are only the electronics know."""
     held_back, gateway, alive = [], car.bus(), itertools.count(GOOD)
     frozen = CODEC.decode_setpoint(car.last_frame.data)
     car.drive(500, lambda: None, driver_lives=False)
