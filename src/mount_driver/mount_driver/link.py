@@ -3,8 +3,8 @@
 No bus and no clock here: frames and times come in, decisions go out. Times are ns; whoever calls decides
 whether they are the steady clock (real time) or the stamps (lock-step).
 
-The hold: a current stands on the bus only while the sample that it answers is no older, since its arrival, than
-the setpoint timeout. So nothing but a new sample and its own answer prolongs it, whoever repeats himself.
+The hold: a current stands on the bus only while the sample that it answers has arrived no longer ago than the
+setpoint timeout. So nothing but a new sample and its own answer prolongs it, whoever repeats himself.
 """
 
 from enum import Enum, IntEnum
