@@ -4,6 +4,7 @@ from collections import deque
 from typing import NamedTuple
 
 from mount_driver.codec import Status
+from mount_driver.e2e_receiver import Outcome
 from mount_driver.exchange import Exchange
 from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
@@ -23,12 +24,15 @@ class Snapshot(NamedTuple):
     corrupt: int = 0
     late: int = 0
     resent: int = 0
+    repeated: int = 0
+    wrong_sequence: int = 0
     invalid_displacements: int = 0
     setpoints: int = 0
     limited: int = 0
     refused: int = 0
     timeouts: int = 0
     unsent: int = 0
+    unsent_reason: str = ''
     restarts: int = 0
     gaps: int = 0
     recoveries: int = 0
@@ -41,6 +45,7 @@ class Snapshot(NamedTuple):
     trouble: str = ''
     failure: str = ''
     status: Status | None = None
+    setpoint_errors: int = 0  # statuses that tell of setpoint frames with a failed check
 
 
 def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
@@ -54,12 +59,17 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         corrupt=link.arrivals[Arrival.CORRUPT] + link.statuses.corrupt,
         late=link.arrivals[Arrival.LATE],
         resent=link.arrivals[Arrival.RESENT],
+        repeated=link.samples.counts[Outcome.REPEATED] + link.statuses.counts[Outcome.REPEATED],
+        wrong_sequence=(
+            link.samples.counts[Outcome.WRONG_SEQUENCE] + link.statuses.counts[Outcome.WRONG_SEQUENCE]
+        ),
         invalid_displacements=link.invalid_displacements,
         setpoints=link.setpoints,
         limited=link.limited,
         refused=sum(link.refusals.values()),
         timeouts=link.timeouts,
         unsent=exchange.unsent,
+        unsent_reason=exchange.unsent_reason,
         restarts=clock.restarts,
         gaps=clock.gaps,
         recoveries=exchange.recoveries,
@@ -72,6 +82,7 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         trouble=exchange.trouble,
         failure=exchange.failure,
         status=link.status,
+        setpoint_errors=link.setpoint_errors,
     )
 
 
@@ -95,7 +106,7 @@ def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, loc
     for level, sentence in (
         *_bus_findings(now, where, parameters),
         *(() if lockstep else _silence_findings(now, where, parameters)),
-        *_fault_findings(now, parameters),
+        *_fault_findings(now, earlier, parameters),
         *_quality_findings(now, earlier, parameters),
         *_setpoint_findings(now, earlier, parameters),
     ):
@@ -128,7 +139,7 @@ def _silence_findings(now: Snapshot, where: str, parameters: DriverParameters) -
     return [(Level.ERROR, f'no frames from the electronics for {silent}; {remedy}')]
 
 
-def _fault_findings(now: Snapshot, parameters: DriverParameters) -> Findings:
+def _fault_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
     status = now.status
     if status is None:
         return []
@@ -137,8 +148,9 @@ def _fault_findings(now: Snapshot, parameters: DriverParameters) -> Findings:
     serious = [fault for fault in status.faults if fault in _SERIOUS_FAULTS]
     if serious:
         found.append((Level.ERROR, f'the electronics report {", ".join(serious)} ({figures})'))
-    if 'e2e_error' in status.faults:
-        found.append((Level.WARN, 'the electronics report damaged or missing setpoints; check the bus'))
+    if now.setpoint_errors > earlier.setpoint_errors:
+        text = 'the electronics report setpoint frames that were damaged, repeated or of wrong sequence'
+        found.append((Level.WARN, f'{text}; they do not use them: check the bus, does another node send?'))
     limit = parameters.temperature_warning_celsius
     if status.coil_temperature_celsius > limit:
         text = f'coil temperature ({status.coil_temperature_celsius:.1f} degC) is above {limit:g} degC'
@@ -161,9 +173,13 @@ def _quality_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParame
         found.append((Level.WARN, f'{text}; check the displacement sensor'))
     if now.restarts > earlier.restarts:
         found.append((Level.WARN, 'the electronics have restarted; activate the graph again'))
+    repeated, disordered = now.repeated - earlier.repeated, now.wrong_sequence - earlier.wrong_sequence
+    if repeated or disordered:
+        text = f'{repeated} frames repeated and {disordered} of wrong sequence in the last second, not used'
+        found.append((Level.WARN, f'{text}; did the electronics restart, does another node send theirs?'))
     if now.unsent > earlier.unsent:
         text = f'{now.unsent - earlier.unsent} setpoint frames were not taken by the bus in the last second'
-        found.append((Level.WARN, f'{text}; does another node acknowledge?'))
+        found.append((Level.WARN, f'{text} ({now.unsent_reason}); does another node acknowledge?'))
     return found
 
 
@@ -193,6 +209,8 @@ def _figures(now: Snapshot) -> dict[str, object]:
         'corrupt': now.corrupt,
         'late': now.late,
         'resent': now.resent,
+        'repeated': now.repeated,
+        'wrong_sequence': now.wrong_sequence,
         'invalid_displacements': now.invalid_displacements,
         'setpoints': now.setpoints,
         'limited': now.limited,

@@ -1,24 +1,29 @@
-"""The receiving side of the end-to-end protection: every frame is judged and counted."""
+"""The receiving side of the end-to-end protection: each frame is judged and counted, a doubtful one not used.
+
+AUTOSAR E2E profile 5 as the DBC tells it to those who build either end; both ends of the bus run this code.
+"""
 
 from collections.abc import Callable
 from enum import IntEnum
 from typing import Generic, TypeVar
 
 from mount_driver.codec import OutOfRangeError, WrongCrcError, WrongLengthError, alive_counter_of
+from mount_driver.layout import MessageLayout
 
 M = TypeVar('M')
 
 
 class Outcome(IntEnum):
-    """What became of a frame."""
+    """What became of a frame: the first two are used, those from `REPEATED` on have failed a check."""
 
     OK = 0  # the next one
-    REPEATED = 1  # the same alive counter as the last one
-    LOST = 2  # good, but frames before it are missing: see `E2EReceiver.lost`
-    LATE = 3  # good, but older than the last one
-    WRONG_CRC = 4
-    WRONG_LENGTH = 5
-    OUT_OF_RANGE = 6  # protected and complete, but its content is not allowed
+    LOST = 1  # in order, but frames before it are missing: see `E2EReceiver.lost`
+    SYNCHRONISING = 2  # in order, but too soon after a wrong sequence or the start to be believed
+    REPEATED = 3  # the same alive counter as the last one
+    WRONG_SEQUENCE = 4  # its counter went back, or farther ahead than frames may be missing
+    WRONG_CRC = 5
+    WRONG_LENGTH = 6
+    OUT_OF_RANGE = 7  # protected and complete, but its content is not allowed
 
 
 class AliveCounter:
@@ -37,7 +42,7 @@ class AliveCounter:
 class E2EReceiver(Generic[M]):
     """Decodes the frames of one message, judges their order by the alive counter and counts outcomes."""
 
-    def __init__(self, decode: Callable[[bytes | bytearray], M]):
+    def __init__(self, decode: Callable[[bytes | bytearray], M], layout: MessageLayout):
         self.outcome = Outcome.OK
         """Of the last frame."""
         self.counts = [0] * len(Outcome)
@@ -45,46 +50,50 @@ class E2EReceiver(Generic[M]):
         self.lost = 0
         """Frames missing so far."""
         self._decode = decode
-        self._last = -1
-        self._late = -1
+        self._longest_step = layout.max_delta_counter
+        self._sync_frames = layout.sync_frames
+        self._last = -1  # alive counter of the last frame whose CRC was good; none yet
+        self._awaited = 0  # frames in order that must still come before one is used
 
     def receive(self, data: bytes | bytearray) -> M | None:
-        """Return the message of a frame, or None where its CRC, length or content is wrong; see `outcome`."""
+        """Return the message of a frame, or None where it must not be used; see `outcome`."""
+        message = None
         try:
             message = self._decode(data)
         except WrongCrcError:
-            outcome, message = Outcome.WRONG_CRC, None
+            outcome = Outcome.WRONG_CRC
         except WrongLengthError:
-            outcome, message = Outcome.WRONG_LENGTH, None
+            outcome = Outcome.WRONG_LENGTH
         except OutOfRangeError:
-            outcome, message = Outcome.OUT_OF_RANGE, None
+            outcome = Outcome.OUT_OF_RANGE
             self._follow(alive_counter_of(data))
         else:
             outcome = self._follow(alive_counter_of(data))
         self.outcome = outcome
         self.counts[outcome] += 1
-        return message
+        return message if outcome <= Outcome.LOST else None
 
     @property
     def corrupt(self) -> int:
         """Frames that were not used because of their CRC, length or content."""
         return sum(self.counts[Outcome.WRONG_CRC :])
 
+    @property
+    def failed(self) -> int:
+        """Frames that failed a check: the corrupt, the repeated and those of wrong sequence."""
+        return sum(self.counts[Outcome.REPEATED :])
+
     def _follow(self, alive: int) -> Outcome:
-        last = self._last
-        step = (alive - last) & 0xFF
-        if last < 0 or step == 1:
-            self._last = alive
-            return Outcome.OK
+        last, self._last = self._last, alive
+        step = (alive - last) & 0xFF if last >= 0 else alive + 1  # a receiver that starts counts on from 255
         if step == 0:
             return Outcome.REPEATED
-        if step < 128:
-            self._last = alive
-            self.lost += step - 1
-            return Outcome.LOST
-        # A late frame does not set the count back; two in a row in order are a sender that began anew.
-        if self._late >= 0 and alive == (self._late + 1) & 0xFF:
-            self._last, self._late = alive, -1
-        else:
-            self._late = alive
-        return Outcome.LATE
+        if step > self._longest_step:
+            self._awaited = self._sync_frames
+            return Outcome.WRONG_SEQUENCE if last >= 0 else Outcome.SYNCHRONISING
+        self.lost += step - 1
+        if self._awaited > 0:
+            self._awaited -= 1
+            if self._awaited > 0:
+                return Outcome.SYNCHRONISING
+        return Outcome.OK if step == 1 else Outcome.LOST

@@ -8,6 +8,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from typing import Protocol
 
 import can
@@ -19,7 +20,7 @@ from mount_driver.frame import Frame
 from mount_driver.link import Arrival, Link, Refusal
 from mount_driver.parameters import DriverParameters
 
-_WAKE = 0.005  # s: how often the watch looks at the clock when no frames come
+_WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
 _REOPEN_PERIOD = 0.2  # s, chosen
 _OFF_FRAMES = 3  # chosen: so that one lost frame does not leave the coil on until the electronics' own watch
 _BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
@@ -39,6 +40,7 @@ class Exchange:
 
     `on_sample(stamp_ns, measurement)` is called in the receiving thread for every new sample, and
     `on_temperature(stamp_ns, celsius)` for a status with a coil temperature, with the last sample's stamp.
+    `steady() -> ns` is the clock by which ages are judged; in lock-step the stamps are.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class Exchange:
         *,
         lockstep: bool,
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
+        steady: Callable[[], int] = time.monotonic_ns,
     ):
         self.clock = clock
         self.link = Link(codec, round(parameters.setpoint_timeout * 1e9))
@@ -62,6 +65,8 @@ class Exchange:
         self.error_frames = 0
         self.unsent = 0
         """Setpoint frames that the bus did not take."""
+        self.unsent_reason = ''
+        """Why it did not take the last one of them."""
         self.last_received = 0
         """Steady clock at the last sound measurement frame, ns; 0 before the first."""
         self._parameters = parameters
@@ -70,6 +75,7 @@ class Exchange:
         self._on_temperature = on_temperature
         self._temperature_stamp: int | None = None  # of the temperature told last
         self._lockstep = lockstep
+        self._steady = steady
         self._ids = (codec.measurement.frame_id, codec.status.frame_id)
         self._bus: can.BusABC | None = None
         self._alive = AliveCounter()
@@ -83,20 +89,23 @@ class Exchange:
         """Open the bus and begin to receive, in a thread or by `poll`; raises `CanLinkError`."""
         self._bus = self._open()
         self._accepting = True
-        if threaded:
-            self._thread = threading.Thread(target=self._serve, name='can_receive', daemon=True)
-            self._thread.start()
         atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
+        if threaded:
+            thread = threading.Thread(target=self._serve, name='can_receive', daemon=True)
+            thread.start()
+            self._thread = thread
 
     def stop(self) -> None:
-        """Send 0 A, end the thread, close the bus; safe to call twice."""
+        """Send 0 A, end the thread, close the bus; safe to call twice.
+
+        Whatever one step raises, the others are done. Raises `CanLinkError` where the bus did not take 0 A.
+        """
         self._ending.set()
-        self._leave_off()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join()
-            self._thread = None
-        self._close()
-        atexit.unregister(self.stop)
+        with ExitStack() as steps:  # the last one first
+            steps.callback(atexit.unregister, self.stop)
+            steps.callback(self._close)
+            steps.callback(self._join)
+            steps.callback(self._leave_off)
 
     def send_setpoint(self, stamp: int, current: float) -> bool:
         """Send the current (A) that answers the sample of `stamp` (ns) at once; False if it was refused."""
@@ -112,9 +121,24 @@ class Exchange:
         bus = self._bus
         return bus is not None and may_have_frames(bus) and self._attempt(0.0)
 
+    def watch(self) -> None:
+        """Send 0 A if the sample that was answered last is too old for its current."""
+        if self._lockstep and self.link.last_sample is None:
+            return  # time has not begun
+        with self._sending:
+            if self._accepting and self.link.off_is_due(self._now()):
+                self._send(self.link.off())
+
     def _serve(self) -> None:
         while not self._ending.is_set() and not self.failure:
-            self._attempt(_WAKE)
+            self._attempt(self._sleep())
+
+    def _sleep(self) -> float:
+        """Return how long to wait for a frame, s: no longer than until 0 A is due."""
+        if self._lockstep:
+            return _WAKE
+        with self._sending:
+            return min(_WAKE, max(0.0, 1e-9 * self.link.time_until_off(self._now())))
 
     def _attempt(self, wait: float) -> bool:
         """Handle the frame that comes within `wait` s; what cannot be recovered ends the exchange safely."""
@@ -123,11 +147,15 @@ class Exchange:
                 return self._receive(wait)
             except can.CanError as error:
                 self._recover(error)
-        except Exception as error:
+        except BaseException as error:
             # The border of the thread: whatever the reason, say it and be safe.
-            known = isinstance(error, CanLinkError)
-            self.failure = str(error) if known else f'{type(error).__name__}: {error}'
-            self._leave_off()
+            self.failure = str(error) if isinstance(error, CanLinkError) else _named(error)
+            try:
+                self._leave_off()
+            except CanLinkError as unsent:
+                self.failure += f'; {unsent}'
+            if not isinstance(error, Exception):
+                raise
         return False
 
     def _receive(self, wait: float) -> bool:
@@ -135,7 +163,7 @@ class Exchange:
         if bus is None or self.failure:
             return False
         message = bus.recv(wait)
-        received = time.monotonic_ns()
+        received = self._steady()
         if message is not None:
             if message.is_error_frame:
                 self._take_error_frame(message)
@@ -143,7 +171,7 @@ class Exchange:
                 self._take_measurement(message, received)
             elif message.arbitration_id == self._ids[1]:
                 self._take_status(message)
-        self._watch()
+        self.watch()
         return message is not None
 
     def _take_measurement(self, message: can.Message, received: int) -> None:
@@ -156,7 +184,7 @@ class Exchange:
         self.bus_off = False
         self.last_received = received
         stamp = self.clock.stamp(sample.microseconds, received)
-        link.remember(stamp, sample.sample_counter)
+        link.remember(stamp, sample.sample_counter, stamp if self._lockstep else received)
         self._on_sample(stamp, sample)
 
     def _take_status(self, message: can.Message) -> None:
@@ -174,43 +202,56 @@ class Exchange:
         if message.arbitration_id & _BUS_OFF:
             self.bus_off = True
 
-    def _watch(self) -> None:
-        if self._lockstep and self.link.last_sample is None:
-            return  # time has not begun
-        with self._sending:
-            if self._accepting and self.link.off_is_due(self._now()):
-                self._send(self.link.off())
-
     def _answer_again(self) -> None:
         with self._sending:
             last = self.link.last_sample
-            setpoint = self.link.answer_again(last.sample_counter) if last and self._accepting else None
+            if last is None or not self._accepting:
+                return
+            setpoint = self.link.answer_again(last.sample_counter, self._now())
             if setpoint is not None:
                 self._send(setpoint)
 
     def _now(self) -> int:
         # In lock-step the stamps are all the time there is.
-        return self.link.latest_stamp if self._lockstep else time.monotonic_ns()
+        return self.link.latest_stamp if self._lockstep else self._steady()
 
     def _send(self, setpoint: Setpoint) -> bool:
-        """Send one frame; call it with the lock held."""
-        if self._bus is None:
+        """Send one frame and return whether the bus took it; call it with the lock held."""
+        bus = self._bus
+        if bus is None:
+            self.unsent_reason = self.trouble
             return False
-        self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
         try:
-            self._bus.send(self._frame)
-        except can.CanError:
+            self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
+            bus.send(self._frame)
+        except Exception as error:
+            # The adapters of python-can raise whatever they like; no frame behind this one may suffer.
             self.unsent += 1
+            self.unsent_reason = _named(error)
             return False
         return True
 
     def _leave_off(self) -> None:
+        """Send 0 A and nothing more; raises `CanLinkError` where the bus did not take it."""
+        taken: list[bool] = []
         with self._sending:
             if not self._accepting:
                 return
             self._accepting = False
-            for _ in range(_OFF_FRAMES):
-                self._send(self.link.off())
+            with ExitStack() as frames:  # what interrupts one frame must not keep back the others
+                for _ in range(_OFF_FRAMES):
+                    frames.callback(lambda: taken.append(self._send(self.link.off())))
+        if not all(taken):
+            raise CanLinkError(
+                f'{taken.count(False)} of {_OFF_FRAMES} frames with 0 A were not taken by the bus '
+                f'({self.unsent_reason}); the electronics go to 0 A by their own watch'
+            )
+
+    def _join(self) -> None:
+        thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            thread.join()
+            self._thread = None
 
     def _recover(self, error: can.CanError) -> None:
         """Open the bus again and again until it works, we are told to end, or the time is over."""
@@ -218,7 +259,8 @@ class Exchange:
         deadline = time.monotonic() + self._parameters.recovery_time
         while not self._ending.is_set():
             with self._sending:
-                self._close()
+                with suppress(Exception):  # it is lost already: how it ends says nothing new
+                    self._close()
                 try:
                     self._bus = self._open()
                 except CanLinkError as refused:
@@ -249,3 +291,7 @@ class Exchange:
         bus, self._bus = self._bus, None
         if bus is not None:
             bus.shutdown()
+
+
+def _named(error: BaseException) -> str:
+    return f'{type(error).__name__}: {error}'

@@ -74,6 +74,8 @@ class MessageLayout:
         self.frame_id = message.frame_id
         self.length = message.length
         self.data_id = _attribute(message, 'E2EDataId')
+        self.max_delta_counter = _attribute(message, 'E2EMaxDeltaCounter')
+        self.sync_frames = _attribute(message, 'E2ESyncFrames')
         self._bits = bitstruct.c.compile(_reversed_bit_format(message, signals))
         # The bit format runs from the last bit to the first.
         known.reverse()

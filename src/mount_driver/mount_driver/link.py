@@ -2,14 +2,17 @@
 
 No bus and no clock here: frames and times come in, decisions go out. Times are ns; whoever calls decides
 whether they are the steady clock (real time) or the stamps (lock-step).
+
+The hold: a current stands on the bus only while the sample that it answers has arrived no longer ago than the
+setpoint timeout. So nothing but a new sample and its own answer prolongs it, whoever repeats himself.
 """
 
 from enum import Enum, IntEnum
 
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
-from mount_driver.e2e_receiver import E2EReceiver
+from mount_driver.e2e_receiver import E2EReceiver, Outcome
 
-_REMEMBERED = 64  # chosen: samples that a setpoint may name; setpoints older than 20 ms are refused anyway
+_REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 20 ms are refused anyway
 _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFF_FFFF
 _LATE_US = 1_000_000  # chosen: a sample that is older than this is no late one but a restart
@@ -22,6 +25,7 @@ class Arrival(IntEnum):
     RESENT = 1  # the sample that came last, once more
     LATE = 2  # older than the last one: not used
     CORRUPT = 3  # wrong CRC or length: not used
+    DISORDERED = 4  # repeated or of wrong sequence by its alive counter, or soon after such: not used
 
 
 class Refusal(Enum):
@@ -32,6 +36,7 @@ class Refusal(Enum):
     UNKNOWN_SAMPLE = 'its stamp is that of none of the last 64 samples'
     STALE = 'it answers a sample that is older than the setpoint timeout'
     SUPERSEDED = 'a later sample is already answered'
+    NOT_LOWER = 'its sample is already answered, and an answer may only be lowered'
     MALFORMED = 'the message lacks the coil current'
     BUS_LOST = 'the CAN bus is not there'
 
@@ -40,8 +45,8 @@ class Link:
     """Judges every measurement and every setpoint, and counts."""
 
     def __init__(self, codec: MountCodec, setpoint_timeout_ns: int):
-        self.samples = E2EReceiver(codec.decode_measurement)
-        self.statuses = E2EReceiver(codec.decode_status)
+        self.samples = E2EReceiver(codec.decode_measurement, codec.measurement)
+        self.statuses = E2EReceiver(codec.decode_status, codec.status)
         self.arrival = Arrival.NEW
         self.arrivals = [0] * len(Arrival)
         """Measurement frames by `Arrival`."""
@@ -52,6 +57,8 @@ class Link:
         self.latest_stamp = 0
         """Stamp of the newest sample, ns; 0 before the first."""
         self.status: Status | None = None
+        self.setpoint_errors = 0
+        """Statuses in which the electronics told of setpoint frames that failed their check."""
 
         self.setpoints = 0
         """Setpoints that were let through."""
@@ -60,25 +67,24 @@ class Link:
         self.refusals = dict.fromkeys(Refusal, 0)
         self.last_refusal: Refusal | None = None
         self.timeouts = 0
-        """Times that setpoints stopped for longer than the timeout."""
+        """Times that the answered sample became older than the timeout before the next answer."""
 
         self._highest_current = codec.current.high
         self._timeout = setpoint_timeout_ns
-        self._counters: dict[int, int] = {}  # stamp -> SampleCounter of the last samples
+        self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, of the last
         self._stamps = [-1] * _REMEMBERED
         self._place = 0
         self._answered_stamp = -1
         # No sample of the first minute bears this number: 0 A sent before any answer answers nothing.
         self._last_setpoint = Setpoint(0.0, _COUNTER_MASK, False)
-        self._fed = -1  # time of the last setpoint
-        self._off_sent = -1
+        self._off_at: int | None = None  # time after which 0 A is due; the watch begins with its first look
 
     # From the electronics.
 
     def take_measurement(self, data: bytes | bytearray) -> Measurement | None:
         """Return the sample of a frame if it is a new one, else None; `arrival` says what it was."""
         sample = self.samples.receive(data)
-        arrival = Arrival.CORRUPT if sample is None else self._order(sample)
+        arrival = self._arrival_of_none() if sample is None else self._order(sample)
         self.arrival = arrival
         self.arrivals[arrival] += 1
         if arrival is not Arrival.NEW or sample is None:
@@ -88,12 +94,15 @@ class Link:
         self.last_sample = sample
         return sample
 
-    def remember(self, stamp: int, sample_counter: int) -> None:
-        """Note the stamp under which a sample is published, so that a setpoint can name it."""
+    def remember(self, stamp: int, sample_counter: int, arrival: int) -> None:
+        """Note the stamp under which a sample is published, so that a setpoint can name it.
+
+        `arrival` is its time on the clock of `now` in what follows.
+        """
         place = self._place
-        self._counters.pop(self._stamps[place], None)
+        self._samples.pop(self._stamps[place], None)
         self._stamps[place] = stamp
-        self._counters[stamp] = sample_counter
+        self._samples[stamp] = sample_counter, arrival
         self._place = (place + 1) % _REMEMBERED
         self.latest_stamp = stamp
 
@@ -102,6 +111,7 @@ class Link:
         status = self.statuses.receive(data)
         if status is not None:
             self.status = status
+            self.setpoint_errors += status.e2e_error
         return status
 
     # To the electronics.
@@ -111,17 +121,21 @@ class Link:
 
         `current` in A; above the limit of 3 A it is limited.
         """
-        counter = self._counters.get(stamp)
-        reason = self._objection(stamp, current, counter)
-        if reason is not None or counter is None:
-            self.refuse(reason or Refusal.UNKNOWN_SAMPLE)
+        sample = self._samples.get(stamp)
+        if sample is None:
+            self.refuse(Refusal.UNKNOWN_SAMPLE)
+            return None
+        counter, arrival = sample
+        reason = self._objection(stamp, current, now - arrival)
+        if reason is not None:
+            self.refuse(reason)
             return None
         if current > self._highest_current:
             self.limited += 1
             current = self._highest_current
         self.setpoints += 1
         self._answered_stamp = stamp
-        self._fed = now
+        self._off_at = arrival + self._timeout
         self._last_setpoint = Setpoint(current, counter, True)
         return self._last_setpoint
 
@@ -130,30 +144,33 @@ class Link:
         self.refusals[reason] += 1
         self.last_refusal = reason
 
-    def answer_again(self, sample_counter: int) -> Setpoint | None:
-        """Return the last setpoint if it answered this sample, for electronics that did not get it."""
+    def answer_again(self, sample_counter: int, now: int) -> Setpoint | None:
+        """Return the last setpoint if it holds and answered this sample: the electronics did not get it."""
         last = self._last_setpoint
-        return last if last.enable and last.answered_counter == sample_counter else None
+        holds = last.enable and self.time_until_off(now) >= 0
+        return last if holds and last.answered_counter == sample_counter else None
 
     def off(self) -> Setpoint:
         """Return the setpoint that switches the coil off; it answers no new sample."""
         self._last_setpoint = Setpoint(0.0, self._last_setpoint.answered_counter, False)
         return self._last_setpoint
 
-    def off_is_due(self, now: int) -> bool:
-        """Whether no setpoint came for longer than the timeout, so that 0 A must be sent.
+    def time_until_off(self, now: int) -> int:
+        """Return how long until 0 A is due, ns; negative when it is."""
+        if self._off_at is None:
+            self._off_at = now + self._timeout
+        return self._off_at - now
 
-        True once when setpoints stop and then once per timeout, so that a lost frame does no harm.
+    def off_is_due(self, now: int) -> bool:
+        """Whether the sample answered last is older than the timeout, so that 0 A must be sent.
+
+        True once when that happens and then once per timeout, so that a lost frame does no harm.
         """
-        if self._fed < 0:
-            self._fed = now  # the watch begins with its first look
-        if now - self._fed <= self._timeout or (
-            self._off_sent >= 0 and now - self._off_sent <= self._timeout
-        ):
+        if self.time_until_off(now) >= 0:
             return False
         if self._last_setpoint.enable:
             self.timeouts += 1
-        self._off_sent = now
+        self._off_at = now + self._timeout
         return True
 
     @property
@@ -161,18 +178,22 @@ class Link:
         """Whether the last frame to the electronics was a setpoint and not 0 A from here."""
         return self._last_setpoint.enable
 
-    def _objection(self, stamp: int, current: float, counter: int | None) -> Refusal | None:
+    def _objection(self, stamp: int, current: float, age: int) -> Refusal | None:
         if current != current:
             return Refusal.NOT_A_NUMBER
         if current < 0.0:
             return Refusal.NEGATIVE
-        if counter is None:
-            return Refusal.UNKNOWN_SAMPLE
-        if self.latest_stamp - stamp > self._timeout:
+        if age > self._timeout:
             return Refusal.STALE
         if stamp < self._answered_stamp:
             return Refusal.SUPERSEDED
+        # 0 A may be said again: whoever ends says it for the sample that he has answered.
+        if stamp == self._answered_stamp and current > 0.0 and current >= self._last_setpoint.current:
+            return Refusal.NOT_LOWER
         return None
+
+    def _arrival_of_none(self) -> Arrival:
+        return Arrival.CORRUPT if self.samples.outcome >= Outcome.WRONG_CRC else Arrival.DISORDERED
 
     def _order(self, sample: Measurement) -> Arrival:
         last = self.last_sample

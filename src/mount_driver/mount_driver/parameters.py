@@ -24,7 +24,7 @@ class DriverParameters(NamedTuple):
         int, Quantity('bit/s', 'data bit rate of CAN FD, likewise', 10_000, 8_000_000)
     ] = 2_000_000
     setpoint_timeout: Annotated[
-        float, Quantity('s', 'without a new setpoint for this long the coil goes to 0 A', 0.002, 0.020)
+        float, Quantity('s', 'greatest age of the sample that a current answers; then 0 A', 0.002, 0.020)
     ] = 0.020
     frame_timeout: Annotated[
         float, Quantity('s', 'without a frame for this long the link counts as dead', 0.01, 10.0)

@@ -29,19 +29,19 @@ class FarEnd:
 
     def __init__(self, interface: str, channel: str, port: int):
         self.bus = open_bus(interface, channel, port=port, receive=(CODEC.setpoint.frame_id,))
-        self._alive = AliveCounter()
+        self._measurement_alive, self._status_alive = AliveCounter(), AliveCounter()
         self._streaming = threading.Event()
         self._thread: threading.Thread | None = None
 
     def send(self, measurement: Measurement, damage: int = 0) -> None:
         """Send a sample; `damage` is laid over its 13th byte."""
-        data = CODEC.encode_measurement(measurement, self._alive.next())
+        data = CODEC.encode_measurement(measurement, self._measurement_alive.next())
         data[12] ^= damage
         self.send_raw(CODEC.measurement.frame_id, data)
 
     def send_status(self, status: Status) -> None:
         """Send a status."""
-        self.send_raw(CODEC.status.frame_id, CODEC.encode_status(status, self._alive.next()))
+        self.send_raw(CODEC.status.frame_id, CODEC.encode_status(status, self._status_alive.next()))
 
     def send_raw(self, number: int, data: bytes | bytearray, **options) -> None:
         """Send any frame."""

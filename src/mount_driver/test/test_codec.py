@@ -221,6 +221,15 @@ def test_the_dbc_is_can_fd_complete_and_says_what_every_signal_means():
         assert all(signal.comment and signal.minimum is not None for signal in message.signals)
 
 
+def test_the_dbc_tells_those_who_build_the_electronics_what_to_refuse():
+    rule = DATABASE.buses[0].comment
+    assert all(word in rule for word in ('repeated: not used', 'goes back: not used', 'E2ESyncFrames'))
+    for layout in (CODEC.measurement, CODEC.setpoint, CODEC.status):
+        assert (layout.max_delta_counter, layout.sync_frames) == (5, 3)
+    assert 'answers one of the last 20 samples' in SETPOINT.comment
+    assert 'repeated, of wrong sequence' in STATUS.get_signal_by_name('E2EError').comment
+
+
 def test_a_dbc_without_a_needed_signal_is_refused(tmp_path):
     text = DATABASE_FILE.read_text(encoding='utf-8').replace('DisplacementValid', 'Renamed')
     (tmp_path / 'other.dbc').write_text(text, encoding='utf-8')

@@ -1,11 +1,16 @@
-"""Every frame is judged: next, repeated, some lost, late, damaged."""
+"""Every frame is judged: next, repeated, some lost, of wrong sequence, damaged; what is in order is used."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mount_driver.codec import Measurement, MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter, E2EReceiver, Outcome
 
 CODEC = MountCodec()
+OK, REPEATED, SYNCHRONISING = Outcome.OK, Outcome.REPEATED, Outcome.SYNCHRONISING
+WRONG = Outcome.WRONG_SEQUENCE
+USED = {Outcome.OK, Outcome.LOST}
 
 
 def frame(alive):
@@ -14,40 +19,93 @@ def frame(alive):
 
 @pytest.fixture
 def receiver():
-    return E2EReceiver(CODEC.decode_setpoint)
+    return E2EReceiver(CODEC.decode_setpoint, CODEC.setpoint)
 
 
 def outcomes(receiver, counters):
+    """Return what becomes of frames with these counters; only those in order are handed on."""
     seen = []
     for alive in counters:
-        assert receiver.receive(frame(alive)) is not None
+        message = receiver.receive(frame(alive))
+        assert (message is not None) == (receiver.outcome in USED)
         seen.append(receiver.outcome)
     return seen
 
 
 def test_frames_in_order_are_ok_across_the_wrap(receiver):
-    assert set(outcomes(receiver, range(200, 600))) == {Outcome.OK}
+    assert set(outcomes(receiver, range(600))) == {Outcome.OK}
     assert receiver.lost == 0
-    assert receiver.counts[Outcome.OK] == 400
+    assert receiver.counts[Outcome.OK] == 600
 
 
-def test_a_frame_twice_is_repeated(receiver):
-    assert outcomes(receiver, [5, 5, 6]) == [Outcome.OK, Outcome.REPEATED, Outcome.OK]
+def test_a_frame_twice_is_used_once(receiver):
+    assert outcomes(receiver, [0, 0, 1, 1, 1, 2]) == [OK, REPEATED, OK, REPEATED, REPEATED, OK]
+    assert receiver.failed == 3
 
 
-@pytest.mark.parametrize('missing', [1, 2, 50, 126])
-def test_missing_frames_are_counted(receiver, missing):
-    assert outcomes(receiver, [250, 251 + missing]) == [Outcome.OK, Outcome.LOST]
+def test_a_frozen_frame_is_never_used_again(receiver):
+    outcomes(receiver, range(10))
+    assert set(outcomes(receiver, [9] * 1000)) == {REPEATED}
+
+
+@pytest.mark.parametrize('missing', [1, 2, 4])
+def test_a_few_missing_frames_are_counted(receiver, missing):
+    outcomes(receiver, range(251))
+    assert outcomes(receiver, [251 + missing]) == [Outcome.LOST]
     assert receiver.lost == missing
+    assert receiver.failed == 0
 
 
-def test_a_late_frame_does_not_set_the_count_back(receiver):
-    assert outcomes(receiver, [10, 12, 11, 13]) == [Outcome.OK, Outcome.LOST, Outcome.LATE, Outcome.OK]
-    assert receiver.lost == 1
+@pytest.mark.parametrize('missing', [5, 126, 127, 128, 254])
+def test_after_many_missing_frames_the_counter_says_nothing_until_three_follow_in_order(receiver, missing):
+    outcomes(receiver, range(251))
+    next_one = 251 + missing
+    assert outcomes(receiver, range(next_one, next_one + 5)) == [WRONG, SYNCHRONISING, SYNCHRONISING, OK, OK]
 
 
-def test_a_sender_that_begins_anew_is_followed(receiver):
-    assert outcomes(receiver, [90, 0, 1, 2]) == [Outcome.OK, Outcome.LATE, Outcome.LATE, Outcome.OK]
+def test_a_counter_that_goes_back_is_refused_until_three_follow_in_order(receiver):
+    outcomes(receiver, range(11))
+    assert outcomes(receiver, [9, 11, 12, 13]) == [WRONG, SYNCHRONISING, SYNCHRONISING, OK]
+
+
+def test_old_frames_between_the_new_keep_both_from_being_used(receiver):
+    outcomes(receiver, range(100))
+    mixed = [counter for k in range(100) for counter in (50 + k, 100 + k)]
+    assert not USED & set(outcomes(receiver, mixed))
+
+
+def test_a_sender_that_begins_anew_is_followed_from_its_fourth_frame_and_noticed_once(receiver):
+    outcomes(receiver, range(91))
+    assert outcomes(receiver, range(6)) == [WRONG, SYNCHRONISING, SYNCHRONISING, OK, OK, OK]
+    assert receiver.failed == 1
+
+
+def test_a_receiver_that_begins_amid_the_frames_believes_the_fourth_and_complains_of_none(receiver):
+    assert outcomes(receiver, range(255, 260)) == [SYNCHRONISING, SYNCHRONISING, SYNCHRONISING, OK, OK]
+    assert receiver.failed == 0
+
+
+def test_a_repeated_frame_does_not_help_to_be_believed(receiver):
+    assert outcomes(receiver, [70, 70, 70, 71, 71, 72, 73]) == [
+        SYNCHRONISING,
+        REPEATED,
+        REPEATED,
+        SYNCHRONISING,
+        REPEATED,
+        SYNCHRONISING,
+        OK,
+    ]
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.integers(0, 255), max_size=60))
+def test_whatever_comes_only_a_step_of_one_to_five_is_used(counters):
+    receiver = E2EReceiver(CODEC.decode_setpoint, CODEC.setpoint)
+    last = 255
+    for alive in counters:
+        if receiver.receive(frame(alive)) is not None:
+            assert 1 <= (alive - last) % 256 <= CODEC.setpoint.max_delta_counter == 5
+        last = alive
 
 
 def test_damage_is_never_handed_on(receiver):
@@ -70,7 +128,7 @@ def test_damage_does_not_disturb_the_order(receiver):
 
 
 def test_a_measurement_goes_through():
-    receiver = E2EReceiver(CODEC.decode_measurement)
+    receiver = E2EReceiver(CODEC.decode_measurement, CODEC.measurement)
     sample = Measurement(3, 5, 0.001, 0.5, 1.0, 2.0)
     assert receiver.receive(CODEC.encode_measurement(sample, 0)) == sample
 

@@ -38,7 +38,7 @@ def samples():
 
 @pytest.fixture
 def make(multicast, samples):
-    """Return a function that starts an exchange, and the far end of its bus."""
+    """Return a function that starts an exchange, and returns it with the far end of its bus."""
     group, port = multicast
     opened = []
 
@@ -242,13 +242,17 @@ def test_bus_off_drops_setpoints_until_a_sample_comes_again(make, samples):
 
 
 class BreakingBus:
-    """A bus whose next reception fails."""
+    """A bus whose next reception fails, and its end too."""
 
     def __init__(self, bus):
         self._bus = bus
 
     def recv(self, timeout):
         raise can.CanOperationError('network is down')
+
+    def shutdown(self):
+        self._bus.shutdown()
+        raise OSError('bad file descriptor')
 
     def __getattr__(self, name):
         return getattr(self._bus, name)
@@ -301,6 +305,9 @@ def test_a_bus_that_does_not_take_frames_is_counted(make, samples, monkeypatch):
     monkeypatch.setattr(exchange._bus, 'send', refuse)
     assert not exchange.send_setpoint(0, 1.0)
     assert exchange.unsent == 1
+    assert exchange.unsent_reason == 'CanOperationError: Transmit buffer full'
+    with pytest.raises(exchange_module.CanLinkError, match=r'3 of 3 frames with 0 A .* \(.*buffer full\)'):
+        exchange.stop()
 
 
 def test_a_process_that_ends_by_an_exception_sends_0_ampere(multicast):

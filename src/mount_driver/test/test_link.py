@@ -19,17 +19,17 @@ def link():
     return Link(CODEC, 20 * MS)
 
 
-def frame(index, alive=None, **changes):
+def frame(index, alive, **changes):
     sample = SAMPLE._replace(sample_counter=index % 65536, microseconds=index * 1000 % 2**32)
-    return CODEC.encode_measurement(sample._replace(**changes), (index if alive is None else alive) & 0xFF)
+    return CODEC.encode_measurement(sample._replace(**changes), alive & 0xFF)
 
 
-def feed(link, indices):
-    """Let samples arrive and be stamped: sample k at k ms."""
+def feed(link, indices, first_alive=0):
+    """Let samples arrive and be stamped: sample k at k ms, in one frame after the other."""
     arrivals = []
-    for index in indices:
-        if link.take_measurement(frame(index)) is not None:
-            link.remember(index * MS, index % 65536)
+    for alive, index in enumerate(indices, first_alive):
+        if link.take_measurement(frame(index, alive)) is not None:
+            link.remember(index * MS, index % 65536, index * MS)
         arrivals.append(link.arrival)
     return arrivals
 
@@ -46,15 +46,25 @@ def test_missing_samples_are_counted_by_their_number(link, missing):
 
 
 def test_the_alive_counter_alone_could_not_have_counted_300_missing_samples(link):
-    feed(link, [10, 311])
-    assert (link.lost, link.samples.lost) == (300, 300 % 256)
+    feed(link, [10])
+    feed(link, range(311, 314), first_alive=301)
+    assert link.arrivals[Arrival.DISORDERED] == 3
+    feed(link, [314], first_alive=304)
+    assert (link.lost, link.samples.lost) == (303, 0)  # 300 and the three that were not believed
 
 
 def test_the_same_sample_again_is_resent_and_not_handed_on(link):
     feed(link, [10, 11])
-    assert link.take_measurement(frame(11)) is None
-    assert link.take_measurement(frame(11, alive=12)) is None
+    assert link.take_measurement(frame(11, alive=2)) is None
+    assert link.take_measurement(frame(11, alive=3)) is None
     assert link.arrivals[Arrival.RESENT] == 2
+
+
+def test_the_same_frame_again_is_no_sample_at_all(link):
+    feed(link, [10, 11])
+    assert link.take_measurement(frame(11, alive=1)) is None
+    assert link.arrivals[Arrival.RESENT] == 0
+    assert link.arrivals[Arrival.DISORDERED] == 1
 
 
 def test_a_late_sample_is_not_handed_on(link):
@@ -63,12 +73,12 @@ def test_a_late_sample_is_not_handed_on(link):
 
 def test_a_restart_of_the_electronics_loses_nothing_and_goes_on(link):
     feed(link, range(30_000, 30_010))
-    assert set(feed(link, range(10))) == {Arrival.NEW}
+    assert feed(link, range(10)) == [Arrival.DISORDERED] * 3 + [Arrival.NEW] * 7
     assert link.lost == 0
 
 
 def test_a_corrupt_frame_is_counted_and_not_handed_on(link):
-    data = frame(0)
+    data = frame(0, 0)
     data[12] ^= 4
     assert link.take_measurement(data) is None
     assert link.arrivals[Arrival.CORRUPT] == 1
@@ -76,7 +86,7 @@ def test_a_corrupt_frame_is_counted_and_not_handed_on(link):
 
 
 def test_displacements_that_are_not_valid_are_counted(link):
-    sample = link.take_measurement(frame(0, displacement=math.nan))
+    sample = link.take_measurement(frame(0, 0, displacement=math.nan))
     assert math.isnan(sample.displacement)
     assert link.invalid_displacements == 1
 
@@ -90,9 +100,15 @@ def test_a_status_is_kept_and_a_corrupt_one_is_not(link):
     assert link.statuses.corrupt == 1
 
 
+def test_statuses_that_tell_of_doubtful_setpoints_are_counted(link):
+    for alive, e2e_error in enumerate([False, True, False, True]):
+        link.take_status(CODEC.encode_status(Status(13.5, 40.0, e2e_error=e2e_error), alive))
+    assert link.setpoint_errors == 2
+
+
 def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
     feed(link, range(65_530, 65_540))
-    assert link.answer(65_537 * MS, 1.25, now=0) == Setpoint(1.25, 1, True)
+    assert link.answer(65_537 * MS, 1.25, now=65_539 * MS) == Setpoint(1.25, 1, True)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +125,7 @@ def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
 )
 def test_a_doubtful_setpoint_is_refused_counted_and_the_reason_kept(link, stamp, current, reason):
     feed(link, range(100))
-    assert link.answer(stamp, current, now=0) is None
+    assert link.answer(stamp, current, now=99 * MS) is None
     assert link.refusals[reason] == 1
     assert link.last_refusal is reason
     assert link.setpoints == 0
@@ -117,13 +133,20 @@ def test_a_doubtful_setpoint_is_refused_counted_and_the_reason_kept(link, stamp,
 
 def test_a_setpoint_20_ms_old_is_still_sent(link):
     feed(link, range(100))
-    assert link.answer(79 * MS, 1.0, now=0) is not None
+    assert link.answer(79 * MS, 1.0, now=99 * MS) is not None
+
+
+def test_age_is_that_of_the_clock_and_not_that_of_the_newest_sample(link):
+    feed(link, [0])
+    assert link.answer(0, 1.0, now=20 * MS + 1) is None
+    assert link.answer(0, 1.0, now=60_000 * MS) is None
+    assert link.refusals[Refusal.STALE] == 2
 
 
 def test_a_setpoint_for_an_older_sample_than_the_last_answered_is_refused(link):
     feed(link, range(100))
-    link.answer(99 * MS, 1.0, now=0)
-    assert link.answer(98 * MS, 2.0, now=0) is None
+    link.answer(99 * MS, 1.0, now=99 * MS)
+    assert link.answer(98 * MS, 2.0, now=99 * MS) is None
     assert link.last_refusal is Refusal.SUPERSEDED
 
 
@@ -144,21 +167,21 @@ def test_more_than_3_ampere_is_limited_and_counted(link, current):
 def test_no_setpoint_outside_0_to_3_ampere_ever_leaves(current, stamp):
     link = Link(CODEC, 20 * MS)
     feed(link, range(100))
-    setpoint = link.answer(stamp, current, now=0)
+    setpoint = link.answer(stamp, current, now=99 * MS)
     assert setpoint is None or 0.0 <= setpoint.current <= 3.0
 
 
 def test_only_the_last_64_samples_are_remembered(link):
     feed(link, range(1000))
-    assert len(link._counters) == 64
+    assert len(link._samples) == 64
 
 
 def test_off_is_due_when_setpoints_stop_for_longer_than_the_timeout(link):
     feed(link, [0])
     assert not link.off_is_due(0)
     link.answer(0, 1.0, now=5 * MS)
-    assert not link.off_is_due(25 * MS)
-    assert link.off_is_due(25 * MS + 1)
+    assert not link.off_is_due(20 * MS)  # after the sample, however late its answer came
+    assert link.off_is_due(20 * MS + 1)
     assert link.off() == Setpoint(0.0, 0, False)
     assert link.timeouts == 1
     assert not link.driving
@@ -177,11 +200,12 @@ def test_off_is_repeated_once_per_timeout_and_counted_once(link):
 
 
 def test_a_new_setpoint_ends_the_timeout(link):
-    feed(link, [0, 1])
+    feed(link, [0])
     link.answer(0, 1.0, now=0)
     assert link.off_is_due(30 * MS)
     link.off()
-    assert link.answer(1 * MS, 1.0, now=31 * MS).enable
+    feed(link, [31], first_alive=1)
+    assert link.answer(31 * MS, 1.0, now=31 * MS).enable
     assert not link.off_is_due(51 * MS)
     assert link.off_is_due(52 * MS)
     assert link.driving
@@ -204,9 +228,91 @@ def test_a_refused_setpoint_does_not_feed_the_watch(link):
 
 def test_the_last_setpoint_is_given_again_only_for_the_sample_that_it_answered(link):
     feed(link, [6, 7])
-    assert link.answer_again(7) is None
-    link.answer(7 * MS, 1.5, now=0)
-    assert link.answer_again(7) == Setpoint(1.5, 7, True)
-    assert link.answer_again(8) is None
+    assert link.answer_again(7, now=7 * MS) is None
+    link.answer(7 * MS, 1.5, now=7 * MS)
+    assert link.answer_again(7, now=27 * MS) == Setpoint(1.5, 7, True)
+    assert link.answer_again(7, now=27 * MS + 1) is None
+    assert link.answer_again(8, now=7 * MS) is None
     link.off()
-    assert link.answer_again(7) is None
+    assert link.answer_again(7, now=7 * MS) is None
+
+
+# The hold: whoever repeats himself, comes late or invents stamps
+
+
+def test_one_sample_and_then_the_same_answer_for_10_s_holds_the_current_for_20_ms(link):
+    """Every 10 ms the answer that was good once: it is sent once, and 0 A is due 20 ms behind its sample."""
+    feed(link, [0])
+    accepted, off = [], []
+    for now in range(0, 10_000 * MS, 10 * MS):
+        if link.answer(0, 3.0, now) is not None:
+            accepted.append(now)
+        if link.off_is_due(now):
+            link.off()
+            off.append(now)
+    assert accepted == [0]
+    assert off[0] == 30 * MS  # the first look behind 20 ms
+    assert link.refusals[Refusal.NOT_LOWER] == 2
+    assert link.refusals[Refusal.STALE] == 997
+
+
+def test_a_first_answer_60_s_behind_its_sample_is_refused(link):
+    feed(link, [0])
+    assert link.answer(0, 3.0, now=60_000 * MS) is None
+    assert link.last_refusal is Refusal.STALE
+    assert not link.driving
+
+
+def test_a_second_answer_to_a_sample_may_only_lower_and_does_not_prolong(link):
+    feed(link, [0])
+    assert link.answer(0, 1.5, now=0).current == 1.5
+    for current in (1.5, 1.6, 3.0, math.inf):
+        assert link.answer(0, current, now=1 * MS) is None
+    assert link.answer(0, 1.0, now=15 * MS).current == 1.0
+    assert link.answer(0, 1.2, now=16 * MS) is None
+    assert [link.answer(0, 0.0, now=17 * MS).current for _ in range(2)] == [0.0, 0.0]
+    assert link.answer(0, 0.1, now=18 * MS) is None
+    assert not link.off_is_due(20 * MS)
+    assert link.off_is_due(20 * MS + 1)
+
+
+events = st.lists(
+    st.one_of(
+        st.tuples(st.just('wait'), st.integers(0, 30 * MS)),
+        st.tuples(st.just('sample')),
+        st.tuples(st.just('answer'), st.integers(-3, 30), st.floats(0.0, 3.0)),  # samples ago
+        st.tuples(st.just('again')),
+    ),
+    max_size=80,
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(events)
+def test_no_current_ever_stands_on_a_sample_older_than_20_ms_nor_rises_without_a_new_one(happenings):
+    link = Link(CODEC, 20 * MS)
+    now, index, arrivals = 0, 0, {}
+    on_bus, answered = Setpoint(0.0, 0, False), 0
+    for kind, *details in happenings:
+        sent = None
+        if kind == 'wait':
+            now += details[0]
+        elif kind == 'sample':
+            now += MS
+            index += 1
+            assert link.take_measurement(frame(index, index - 1)) is not None
+            arrivals[index] = now
+            link.remember(1000 * index, index, now)
+        elif kind == 'answer':
+            sent = link.answer(1000 * (index - details[0]), details[1], now)
+        else:
+            sent = link.answer_again(index, now)
+        if sent is not None:
+            assert now - arrivals[sent.answered_counter] <= 20 * MS
+            assert sent.answered_counter > answered or (
+                sent.answered_counter == answered and sent.current <= on_bus.current
+            )
+            on_bus, answered = sent, sent.answered_counter
+        if link.off_is_due(now):
+            on_bus = link.off()
+        assert not on_bus.enable or now - arrivals[on_bus.answered_counter] <= 20 * MS

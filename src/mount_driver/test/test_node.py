@@ -231,6 +231,17 @@ def test_deactivation_sends_0_ampere_and_setpoints_no_longer_leave(active, contr
     assert far.nothing_for(0.05)
 
 
+def test_a_deactivation_that_goes_wrong_before_sends_0_ampere_all_the_same(active, far, monkeypatch):
+    driver = active()
+
+    def fail():
+        raise RuntimeError('the data thread is gone')
+
+    monkeypatch.setattr(driver._path, 'leave_work', fail)
+    assert driver.trigger_deactivate() == SUCCESS
+    assert [far.setpoint() for _ in range(3)] == [Setpoint(0.0, 0xFFFF, False)] * 3
+
+
 def test_the_driver_can_be_activated_again(active, controller, far):
     driver = active()
     far.send(sample(500))

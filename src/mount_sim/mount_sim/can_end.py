@@ -28,6 +28,13 @@ class ReceivedSetpoint:
         """Whether it answers the sample with this counter."""
         return self.setpoint.enable and self.setpoint.answered_counter == counter
 
+    def late(self, number: int) -> int:
+        """Return how many samples too late it is for sample `number`, which takes it over; it may be off.
+
+        0 for the answer to the sample before. One to a sample that is not yet taken is later than all others.
+        """
+        return (number - 1 - self.setpoint.answered_counter) & _COUNTER_MASK if self.setpoint.enable else 0
+
 
 class CanEnd:
     """Electronics' side of `mount.dbc` on an open bus."""
@@ -37,12 +44,12 @@ class CanEnd:
         self._codec = MountCodec()
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
-        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint)
+        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint, self._codec.setpoint)
 
     @property
-    def corrupt_setpoints(self) -> int:
-        """Setpoint frames that were not used."""
-        return self._receiver.corrupt
+    def failed_setpoints(self) -> int:
+        """Setpoint frames that failed their check and were not used: damaged, repeated, of wrong sequence."""
+        return self._receiver.failed
 
     def measurement_frame(
         self, number: int, microseconds: int, reading: Reading, enabled: bool
@@ -82,7 +89,7 @@ class CanEnd:
                 return None
 
     def newest(self) -> ReceivedSetpoint | None:
-        """Take all frames that have come since the last call and return the last good setpoint in them."""
+        """Take all frames that have come since the last call and return the last sound setpoint in them."""
         newest = None
         while may_have_frames(self._bus) and (frame := self._bus.recv(0.0)) is not None:
             newest = self._setpoint_in(frame) or newest

@@ -55,6 +55,7 @@ class ElectronicsLoop:
         self._answer: ReceivedSetpoint | None = None
         self._asked_at = 0.0
         self._answered_first = math.nan
+        self._failed_told = 0  # setpoint frames that had failed their check by the last status
         self.figures = LoopFigures()
         self.last_latency = math.nan
 
@@ -63,13 +64,17 @@ class ElectronicsLoop:
         period = SAMPLE_TIME / (1.0 + self._electronics.clock_drift)
         begin = time.monotonic()
         while not self._mount.finished and not ending.is_set():
-            self._tick(self._can_end.newest())
+            self.step_in_real_time()
             self.figures.wall_time = time.monotonic() - begin
             remaining = begin + self._mount.sample * period - time.monotonic()
             if remaining > 0.0:
                 time.sleep(remaining)
             else:
                 self.figures.overruns += 1  # the next sample follows at once: none is skipped
+
+    def step_in_real_time(self) -> None:
+        """Take the next sample with the newest setpoint, whether or not one has come."""
+        self._tick(self._can_end.newest())
 
     def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
         """Sample as fast as the answers come; raise `NoAnswerError` after `patience` s without one."""
@@ -102,7 +107,7 @@ class ElectronicsLoop:
 
     def _tick(self, received: ReceivedSetpoint | None) -> None:
         mount, number, now = self._mount, self._mount.sample, self._mount.time
-        setpoint = self._setpoint_of(received, now)
+        taken = self._valid(received, now)
         reading = self._fault.reading(now, mount.measure())
         frame = self._can_end.measurement_frame(
             number, number * round(SAMPLE_TIME * _MICROSECONDS), reading, mount.enabled
@@ -114,14 +119,18 @@ class ElectronicsLoop:
         if number % STATUS_EVERY == 0:
             self._can_end.send_status(self._status())
         self._publish(number)
-        mount.advance(setpoint)
+        mount.advance(*taken)
         self.figures.samples += 1
 
-    def _setpoint_of(self, received: ReceivedSetpoint | None, now: float) -> float | None:
+    def _valid(self, received: ReceivedSetpoint | None, now: float) -> tuple[float | None, int]:
+        """Return the current (A) to take over, None if there is none, and how many samples late it is."""
         if received is None or self._fault.deaf(now):
-            return None
+            return None, 0
+        late = received.late(self._mount.sample)
+        if late >= self._mount.patience:
+            return None, 0  # an answer of the past: whoever sends it must not keep the coil on
         self._note(received)
-        return received.setpoint.current if received.setpoint.enable else 0.0
+        return received.setpoint.current if received.setpoint.enable else 0.0, late
 
     def _note(self, received: ReceivedSetpoint) -> None:
         if not received.setpoint.enable:
@@ -149,8 +158,10 @@ class ElectronicsLoop:
             )
 
     def _status(self) -> Status:
+        told, self._failed_told = self._failed_told, self._can_end.failed_setpoints
         return Status(
             supply_voltage=self._electronics.supply_voltage,
             coil_temperature_celsius=self._electronics.coil_temperature,
             setpoint_timeout=not self._mount.enabled,
+            e2e_error=self._failed_told > told,
         )

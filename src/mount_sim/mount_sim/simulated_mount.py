@@ -38,14 +38,16 @@ class SimulatedMount:
     """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again.
 
     A setpoint takes effect at the sample instant after the one that it answers, as the electronics' own
-    sampled current loop takes it over. Without a setpoint for `setpoint_timeout` the current goes to 0 A.
+    sampled current loop takes it over. Without a setpoint for `setpoint_timeout`, counted from when the last
+    one was due, the current goes to 0 A.
     """
 
     def __init__(self, plant: Plant, excitation: Excitation, seed: int):
         self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
         self._noise = Noise(seed)
         self._steps = round(SAMPLE_TIME / excitation.step_time)
-        self._patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
+        self.patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
+        """Samples without a setpoint after which the current goes to 0 A."""
         start = round(excitation.start / SAMPLE_TIME)
         self._values = _per_sample(excitation.values, start, self._steps)
         self._engine_forces = None
@@ -71,7 +73,7 @@ class SimulatedMount:
     @property
     def enabled(self) -> bool:
         """Whether the coil driver is on: setpoints come in time."""
-        return self._silent < self._patience
+        return self._silent < self.patience
 
     @property
     def truth(self) -> np.void:
@@ -87,12 +89,15 @@ class SimulatedMount:
         """Return what the sensors read now."""
         return Reading(*self._plant.read(self._noise.next()))
 
-    def advance(self, setpoint: float | None) -> None:
-        """Go on to the next sample with a new setpoint (A), or None if none has come since the last one."""
+    def advance(self, setpoint: float | None, late: int = 0) -> None:
+        """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
+
+        `late` is the number of samples since it was due.
+        """
         if setpoint is None:
             self._silent += 1
         else:
-            self._silent, self._current = 0, setpoint
+            self._silent, self._current = late, setpoint
         current = self._current if self.enabled and not self._driver_open else 0.0
         forces = self._no_force if self._engine_forces is None else self._engine_forces[self.sample]
         self._plant.advance(self._values[self.sample], forces, current)

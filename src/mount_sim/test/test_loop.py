@@ -34,12 +34,21 @@ class Host:
     def __init__(self, channel):
         self.bus = _bus(channel)
         self.samples, self.statuses = [], []
+        self.last = 255  # alive counter
         self._alive = AliveCounter()
 
     def send(self, setpoint, damage=0):
-        data = CODEC.encode_setpoint(setpoint, self._alive.next())
+        self.last = self._alive.next()
+        data = CODEC.encode_setpoint(setpoint, self.last)
         data[-1] ^= damage
         self.bus.send(_frame(data))
+
+    def skip(self, count):
+        for _ in range(count):
+            self._alive.next()
+
+    def restart(self):
+        self._alive = AliveCounter()
 
     def receive(self):
         """Take one frame; return the sample if it was one."""
@@ -121,9 +130,22 @@ def test_damaged_and_foreign_frames_are_no_setpoints(ends):
     host.send(Setpoint(0.5, 7), damage=0x10)
     host.bus.send(_frame(b'\0' * 8, identifier=0x123))
     assert end.wait_for_answer(7, 0.05) is None
-    assert end.corrupt_setpoints == 1
+    assert end.failed_setpoints == 1
     host.send(Setpoint(0.5, 7), damage=0x10)
     assert end.newest() is None
+
+
+def test_a_repeated_or_late_frame_is_no_setpoint(ends):
+    end, host = ends
+    frames = [_frame(CODEC.encode_setpoint(Setpoint(0.1 * k, k), k)) for k in range(11)]
+    for frame in frames:
+        host.bus.send(frame)
+    assert end.newest().setpoint.answered_counter == 10
+    host.bus.send(frames[10])
+    assert end.newest() is None  # repeated
+    host.bus.send(frames[9])
+    assert end.newest() is None  # 9 after 10
+    assert end.failed_setpoints == 2
 
 
 def test_of_several_setpoints_the_newest_good_one_counts_and_none_counts_twice(ends):
@@ -231,6 +253,86 @@ def test_step_by_step_the_loop_never_waits(ends, make_mount):
         steps += loop.step_in_lockstep(LIMIT)
     assert (steps, loop.figures.samples, loop.figures.answered) == (300, 300, 300)
     assert not loop.step_in_lockstep(LIMIT)
+
+
+# Doubtful setpoints
+
+
+def _statuses(host, loop, damage):
+    """Ten statuses; `damage(number)` does what it wants to the bus before sample `number` is taken."""
+    for number in range(902):
+        damage(number)
+        host.send(Setpoint(1.0, number - 1 & 0xFFFF))
+        loop.step_in_real_time()
+        while host.receive() is None:
+            pass
+    return [status.e2e_error for status in host.statuses]
+
+
+@pytest.mark.parametrize(
+    'doubt',
+    [
+        lambda host: host.send(Setpoint(1.0, 0), damage=0x10),
+        lambda host: host.bus.send(_frame(CODEC.encode_setpoint(Setpoint(1.0, 0), host.last))),
+        lambda host: host.bus.send(_frame(CODEC.encode_setpoint(Setpoint(1.0, 0), host.last - 1 & 0xFF))),
+        lambda host: host.bus.send(_frame(b'too short')),
+        lambda host: host.restart(),
+    ],
+    ids=['damaged', 'repeated', 'late', 'of wrong length', 'host restarted'],
+)
+def test_the_next_status_tells_of_a_doubtful_setpoint_frame_and_the_one_behind_it_no_more(
+    ends, make_mount, doubt
+):
+    end, host = ends
+    loop = _loop(make_mount(timeline__duration=1.0), end)
+    told = _statuses(host, loop, lambda number: doubt(host) if number == 350 else None)
+    assert told == [False] * 4 + [True] + [False] * 5
+
+
+def test_sound_frames_of_which_a_few_are_lost_are_no_error(ends, make_mount):
+    end, host = ends
+    loop = _loop(make_mount(timeline__duration=1.0), end)
+
+    def lose(number):
+        if number % 50 == 49:
+            host.skip(4)
+
+    assert _statuses(host, loop, lose) == [False] * 10
+
+
+@pytest.mark.parametrize(
+    ('late', 'samples'), [(0, 20), (1, 19), (5, 15), (19, 1), (20, 0), (200, 0), (-1, 0)]
+)
+def test_an_answer_holds_for_20_ms_from_when_it_was_due_and_not_at_all_behind_that(
+    ends, make_mount, late, samples
+):
+    end, host = ends
+    mount, setpoints = make_mount(timeline__duration=1.0), []
+    loop = _loop(mount, end)
+    for number in range(400):
+        if number == 300:
+            host.send(Setpoint(1.0, number - 1 - late))
+        loop.step_in_real_time()
+        setpoints.append(mount.truth['current_setpoint'])
+    # The truth at a sample is that of the step before it.
+    assert [number for number, current in enumerate(setpoints) if current > 0.0] == list(
+        range(301, 301 + samples)
+    )
+
+
+def test_an_answer_of_the_past_changes_nothing_while_a_good_one_holds(ends, make_mount):
+    end, host = ends
+    mount, setpoints = make_mount(timeline__duration=1.0), []
+    loop = _loop(mount, end)
+    for number in range(60):
+        if number == 30:
+            host.send(Setpoint(1.0, 29))
+        if number == 35:
+            host.send(Setpoint(2.0, 5))
+        loop.step_in_real_time()
+        setpoints.append(mount.truth['current_setpoint'])
+    assert setpoints == [0.0] * 31 + [1.0] * 20 + [0.0] * 9
+    assert loop.figures.answered == 1
 
 
 # Faults and real time

@@ -62,6 +62,15 @@ def test_without_setpoints_the_electronics_go_to_0_ampere_on_their_own(make_moun
     assert enabled == [number < last + 1 + samples for number in range(300)]
 
 
+def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
+    mount, currents = make_mount(), []
+    for number in range(60):
+        mount.measure()
+        currents.append(mount.truth['current_setpoint'])
+        mount.advance(1.0 if number == 10 else None, 15)
+    assert [number for number, current in enumerate(currents) if current > 0.0] == list(range(11, 16))
+
+
 def test_a_setpoint_after_a_timeout_switches_on_again(make_mount, drive):
     _, truth = drive(make_mount(), lambda number: 1.0 if number < 10 or number >= 100 else None)
     assert truth['coil_current'][99] == 0.0

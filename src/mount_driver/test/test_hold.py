@@ -1,0 +1,206 @@
+"""How long a current stands on the bus: time is told by the test, so no machine is too slow for it."""
+
+import itertools
+
+import pytest
+from far_end import CODEC, FarEnd, sample
+
+from mount_driver import exchange as exchange_module
+from mount_driver.clock import ElectronicsClock
+from mount_driver.codec import Setpoint
+from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.exchange import Exchange
+from mount_driver.frame import Frame
+from mount_driver.link import Refusal
+from mount_driver.parameters import DriverParameters
+from mount_ros.testing import wait_until
+
+MS = 1_000_000
+HOLD = 20 * MS
+GOOD = 100  # samples that are answered as they should be, before something goes wrong
+_channels = itertools.count()
+
+
+class Car:
+    """Electronics, driver and a node on a virtual bus, sample by sample, by a steady clock of its own."""
+
+    def __init__(self):
+        channel = f'test_hold_{next(_channels)}'
+        self.now = 0
+        self.far = FarEnd('virtual', channel, 0)
+        self.stamps, self.sent = [], []  # of the samples that arrived; (time, setpoint) on the bus
+        self.exchange = Exchange(
+            DriverParameters(interface='virtual', channel=channel),
+            CODEC,
+            ElectronicsClock(10**18),
+            lambda stamp, measurement: self.stamps.append(stamp),
+            lockstep=False,
+            steady=lambda: self.now,
+        )
+        self.exchange.start(threaded=False)
+
+    def drive(self, milliseconds, node, electronics=None):
+        """Each ms `electronics(index)` send, the driver takes it and looks at the clock, `node()` answers."""
+        for _ in range(milliseconds):
+            self.now += MS
+            (electronics or self.send_sample)(self.now // MS)
+            while self.exchange.poll():
+                pass
+            node()
+            self.look()
+            self.now += 1  # what ends behind 20 ms ends here
+            self.exchange.watch()
+            self.look()
+            self.now -= 1
+
+    def send_sample(self, index):
+        self.far.send(sample(index))
+
+    def answer(self):
+        """Answer the newest sample with 3 A."""
+        self.exchange.send_setpoint(self.stamps[-1], 3.0)
+
+    def look(self):
+        """Note what is on the bus."""
+        while (frame := self.far.bus.recv(0.0)) is not None:
+            self.sent.append((self.now, CODEC.decode_setpoint(frame.data)))
+
+    def on_bus(self):
+        """Return the setpoint that stands on the bus."""
+        return self.sent[-1][1]
+
+    def went_off(self):
+        """Return how long after the last good sample the current went to 0 A for good."""
+        current = [index for index, (_, setpoint) in enumerate(self.sent) if setpoint.current > 0.0]
+        assert len(current) == GOOD
+        time, off = self.sent[current[-1] + 1]
+        assert off == Setpoint(0.0, GOOD, False)
+        return time - GOOD * MS
+
+
+@pytest.fixture
+def car():
+    made = Car()
+    made.drive(GOOD, made.answer)
+    assert made.on_bus() == Setpoint(3.0, GOOD, True)
+    yield made
+    made.exchange.stop()
+    made.far.close()
+
+
+def nothing(*_):
+    pass
+
+
+def test_a_node_that_publishes_the_same_message_for_ever_holds_its_current_for_20_ms(car):
+    frozen = car.stamps[-1]
+    car.drive(3000, lambda: car.exchange.send_setpoint(frozen, 3.0))
+    assert car.went_off() == HOLD + 1
+
+
+def test_it_does_so_too_when_the_electronics_fall_silent(car):
+    frozen = car.stamps[-1]
+    car.drive(3000, lambda: car.exchange.send_setpoint(frozen, 3.0), electronics=nothing)
+    assert car.went_off() == HOLD + 1
+
+
+def test_a_frozen_measurement_frame_feeds_nothing(car):
+    frozen = Frame(
+        CODEC.measurement.frame_id, CODEC.encode_measurement(sample(GOOD), (GOOD - 1) & 0xFF)
+    )  # the last one, byte by byte
+    car.drive(3000, car.answer, electronics=lambda _: car.far.bus.send(frozen))
+    assert car.stamps[GOOD:] == []
+    assert car.went_off() == HOLD + 1
+    assert car.exchange.last_received == GOOD * MS
+
+
+def test_a_frozen_sample_in_frames_that_live_feeds_nothing(car):
+    car.drive(15, car.answer, electronics=lambda _: car.far.send(sample(GOOD)))
+    again, car.sent = [setpoint for _, setpoint in car.sent[GOOD:]], car.sent[:GOOD]
+    assert set(again) == {Setpoint(3.0, GOOD, True)}  # the answer once more, for electronics that missed it
+    car.drive(3000, car.answer, electronics=lambda _: car.far.send(sample(GOOD)))
+    later = [(time, setpoint) for time, setpoint in car.sent if setpoint.enable]
+    assert later[-1][0] <= GOOD * MS + HOLD
+    assert not car.on_bus().enable
+
+
+@pytest.mark.parametrize('late', [21, 30, 60])
+def test_answers_that_come_too_late_move_nothing(car, late):
+    car.drive(1000, lambda: car.exchange.send_setpoint(car.stamps[-1 - late], 3.0))
+    assert car.went_off() == HOLD + 1
+
+
+def test_answers_19_ms_late_are_within_the_limit(car):
+    car.drive(1000, lambda: car.exchange.send_setpoint(car.stamps[-1 - 19], 3.0))
+    assert car.on_bus().current == 3.0
+
+
+def test_a_first_answer_60_s_behind_its_sample_moves_nothing(car):
+    car.drive(60_000, nothing, electronics=nothing)
+    car.exchange.send_setpoint(car.stamps[-1], 3.0)
+    car.look()
+    assert car.went_off() == HOLD + 1
+    assert car.exchange.link.last_refusal is Refusal.STALE
+
+
+def test_made_up_stamps_of_the_future_move_nothing(car):
+    car.drive(1000, lambda: car.exchange.send_setpoint(car.stamps[-1] + 50 * MS, 3.0))
+    assert car.went_off() == HOLD + 1
+
+
+def test_a_node_that_comes_to_itself_is_obeyed_again(car):
+    car.drive(100, nothing)
+    assert not car.on_bus().enable
+    car.drive(1, car.answer)
+    assert car.on_bus() == Setpoint(3.0, GOOD + 101, True)
+
+
+class SilentBus:
+    """Has one sample to give; after that the time that the receiver waits passes, and nothing else."""
+
+    def __init__(self, clock):
+        self._clock = clock
+        self._frame = Frame(
+            CODEC.measurement.frame_id, CODEC.encode_measurement(sample(0), AliveCounter().next())
+        )
+        self.sent = []
+
+    def recv(self, timeout):
+        frame, self._frame = self._frame, None
+        if frame is None:
+            self._clock.now += round(1e9 * timeout) + 1000  # the processor takes its time, too
+        return frame
+
+    def send(self, message):
+        self.sent.append((self._clock.now, CODEC.decode_setpoint(message.data)))
+
+    def shutdown(self):
+        pass
+
+
+class Steady:
+    """A steady clock that stands until somebody moves it."""
+
+    now = 10**9
+
+    def __call__(self):
+        return self.now
+
+
+def test_on_a_silent_bus_the_thread_wakes_when_the_hold_ends(monkeypatch):
+    steady = Steady()
+    bus = SilentBus(steady)
+    monkeypatch.setattr(exchange_module, 'open_bus', lambda *_, **__: bus)
+
+    def answer(stamp, _):
+        steady.now += 13 * MS  # an answer after 13 ms holds for 7 ms
+        exchange.send_setpoint(stamp, 3.0)
+
+    exchange = Exchange(DriverParameters(), CODEC, ElectronicsClock(0), answer, lockstep=False, steady=steady)
+    exchange.start()
+    wait_until(lambda: len(bus.sent) >= 2, '0 A')
+    exchange.stop()
+    (answered, first), (off_at, off) = bus.sent[:2]
+    assert (answered, first) == (10**9 + 13 * MS, Setpoint(3.0, 0, True))
+    assert off == Setpoint(0.0, 0, False)
+    assert HOLD < off_at - 10**9 <= HOLD + MS // 100
