@@ -53,7 +53,8 @@ def ending_order(nodes: Sequence[GraphNode]) -> list[GraphNode]:
 
     Real ones do. A driver whose electronics end first would rightly report that they are silent.
     """
-    return sorted(reversed(nodes), key=lambda node: {SIM: 1, RECORDER: 2}.get(node, 0))
+    last = [node for node in (SIM, RECORDER) if node in nodes]
+    return [*(node for node in reversed(nodes) if node not in last), *last]
 
 
 @dataclass(frozen=True)
