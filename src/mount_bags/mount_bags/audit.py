@@ -215,7 +215,8 @@ def _inactive(reports: Sequence[NodeReport], namespace: str, axis: TimeAxis) -> 
     ]
     if not own:
         return None
-    return np.array([axis.stamp_at(each.log_time) for each in own if each.state == 'inactive'], np.int64)
+    logged = np.array([report.log_time for report in own if report.state == 'inactive'], np.int64)
+    return axis.stamps_at(logged)
 
 
 def _stamps_of(times: AllTimes, name: str) -> Times:

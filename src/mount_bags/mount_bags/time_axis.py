@@ -45,20 +45,26 @@ class TimeAxis:
 
     def of_log(self, log_time: int) -> float:
         """Return the time at which a message was logged (ns)."""
-        return self.of_stamp(self.stamp_at(log_time))
+        return float(self.of_logs(np.array([log_time]))[0])
 
-    def stamp_at(self, log_time: int) -> int:
-        """Return the stamp (ns) that a sample would have which came in at a log time (ns)."""
-        return _between(log_time, self._received, self._stamps)
+    def of_logs(self, log_times: Times) -> NDArray[np.float64]:
+        """Return the times at which messages were logged (ns)."""
+        return self.of_stamps(self.stamps_at(log_times))
+
+    def stamps_at(self, log_times: Times) -> Times:
+        """Return the stamps (ns) that samples would have which came in at log times (ns)."""
+        return _between(log_times, self._received, self._stamps)
 
     def of_mark(self, stamp: int, log_time: int) -> float:
-        """Return the time of a mark: of its own stamp, unless that is of another clock."""
+        """Return the time of a mark: of its own stamp, unless it has none or one of another clock."""
         time = self.of_stamp(stamp)
-        return time if abs(time) < _OTHER_CLOCK else self.of_log(log_time)
+        own = stamp != log_time and abs(time) < _OTHER_CLOCK
+        return time if own else self.of_log(log_time)
 
     def log_time(self, seconds: float) -> int:
         """Return the log time (ns) that belongs to a time."""
-        return _between(self.zero + round(1e9 * seconds), self._stamps, self._received)
+        stamp = np.array([self.zero + round(1e9 * seconds)])
+        return int(_between(stamp, self._stamps, self._received)[0])
 
 
 def time_axis(recording: Recording, times: Mapping[str, TopicTimes] | None = None) -> TimeAxis:
@@ -84,8 +90,8 @@ def _arrivals(recording: Recording, name: str, times: Mapping[str, TopicTimes] |
     return (_NONE, _NONE) if stamps is None else (stamps, found.receive_times)
 
 
-def _between(place: int, known: Times, wanted: Times) -> int:
-    """Return what belongs to `place`: linear between known places, at the same pace before and behind."""
-    first, last = int(known[0]), int(known[-1])
-    inside = np.interp(place - first, known - first, wanted - wanted[0])
-    return int(wanted[0]) + round(float(inside)) + min(place - first, 0) + max(place - last, 0)
+def _between(places: Times, known: Times, wanted: Times) -> Times:
+    """Return what belongs to `places`: linear between known places, at the same pace before and behind."""
+    inside = np.rint(np.interp(places - known[0], known - known[0], wanted - wanted[0])).astype(np.int64)
+    before, behind = np.minimum(places - known[0], 0), np.maximum(places - known[-1], 0)
+    return wanted[0] + inside + before + behind

@@ -118,8 +118,6 @@ def differences(comparison: Comparison) -> Section:
     alignment = comparison.alignment
     words = [
         f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment.sentence}.',
-        f'Times here are from the first message of A; its first sample of {alignment.anchor} is at '
-        f'{alignment.anchor_time:.3f} s.',
         *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
     ]
     ordered = by_importance(comparison)
