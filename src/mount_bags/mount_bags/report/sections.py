@@ -62,7 +62,9 @@ def switching(subjects: Sequence[Subject]) -> Section:
     said, tables = Sentences(subjects), []
     for subject in subjects:
         spans = subject.signals.damping()
-        if spans is None:
+        if subject.facts.without_friction:
+            said.say(subject, f'damping is not applicable: {subject.facts.without_friction}')
+        elif spans is None:
             said.say(subject, 'when damping was switched was not recorded')
         elif not spans:
             said.say(subject, 'damping was never switched on')
