@@ -140,12 +140,12 @@ def test_a_bad_drive_ends_with_1_and_names_what_was_bad(bad):
         'late_samples': None,
     }
     sentences = [fault['sentence'] for fault in bad.summary['faults']]
-    assert sentences[2] == 'no setpoint in time for 227 ms (limit 20 ms): the coil was at 0 A'
+    assert sentences[2] == 'no setpoint in time for 227 ms (limit 20 ms): the coil went to 0 A'
     assert sentences[:2] + sentences[3:] == list(FAULTS.values())
     assert [fault['time_s'] for fault in bad.summary['faults']][:4] == pytest.approx(
         [3.05, 3.09, 3.099, 3.13]
     )
-    assert 'note faults: 8, at 3.050 s fault number 0; ' in bad.terminal
+    assert 'note faults: 8, the first at 3.050 s fault number 0' in bad.terminal
 
 
 @pytest.mark.parametrize('kind', ['good', 'bad'])
@@ -157,7 +157,7 @@ def test_all_tell_the_same(kind, request):
         for pattern in (
             r'samples lost: (\d+ of \d+(?: \(\d+ messages of all topics\))?)',
             r'samples unanswered: (\d+ of \d+ while control was active)',
-            r'faults: (none|\d+, at .* more)',
+            r'faults: (none|\d+: .* and \d+ more)',
         )
     )
     for words in (f'samples lost {lost}', f'samples unanswered {unanswered}', f'faults {faults}'):

@@ -37,7 +37,7 @@ class Control(NamedTuple):
 
 @dataclass(frozen=True)
 class Silence:
-    """Control was active, but between two setpoints (stamps in ns) none came in time: the coil was at 0 A."""
+    """Between two setpoints (stamps in ns) none came in time while control was active: 0 A."""
 
     begin: int
     end: int

@@ -67,7 +67,7 @@ def _silences(audits: Mapping[str, TopicAudit], axis: TimeAxis) -> list[Fault]:
             axis.of_stamp(silence.begin),
             CONTROL,
             f'no setpoint in time for {1e3 * silence.duration:.0f} ms (limit {1e3 * LONGEST_SILENCE:g} ms): '
-            'the coil was at 0 A',
+            'the coil went to 0 A',
         )
         for entry in audits.values()
         if entry.answers is not None

@@ -9,7 +9,7 @@ from mount_bags.audit import TopicAudit
 from mount_bags.faults import Fault, faults
 from mount_bags.reading import Recording
 
-SHOWN = 5  # faults named one by one
+_SHOWN = 5  # faults named one by one
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,13 @@ class Losses:
 
     def complaints(self) -> list[str]:
         """Return a sentence for each figure that is not as it should be."""
-        wrong = (self.lost_samples or self.lost_messages, self.unanswered, self.faults)
-        said = [
-            f'{what}: {text}' for (what, text), is_wrong in zip(self.rows(), wrong, strict=True) if is_wrong
-        ]
+        said = []
+        if self.lost_samples or self.lost_messages:
+            said.append(f'samples lost: {self.lost_text()}')
+        if self.unanswered:
+            said.append(f'samples unanswered: {self.answers_text()}')
+        if self.faults:
+            said.append(f'faults: {len(self.faults)}, the first at {self.faults[0]}')
         return said if self.whole else [*said, 'the recording is not whole']
 
     def rows(self) -> list[tuple[str, str]]:
@@ -72,11 +75,12 @@ class Losses:
         return f'{self.unanswered} of {self.asked} while control was active{late}'
 
     def faults_text(self) -> str:
-        """Return how many faults there are, and the first in words."""
+        """Return how many faults there are, and the first in words, each on a line of its own."""
         if not self.faults:
             return 'none'
-        more = f' and {len(self.faults) - SHOWN} more' if len(self.faults) > SHOWN else ''
-        return f'{len(self.faults)}, at ' + '; '.join(map(str, self.faults[:SHOWN])) + more
+        rest = len(self.faults) - _SHOWN
+        more = [f'and {rest} more'] if rest > 0 else []
+        return f'{len(self.faults)}:\n' + ';\n'.join([*map(str, self.faults[:_SHOWN]), *more])
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures as JSON knows them: unknown is null, times are in s."""

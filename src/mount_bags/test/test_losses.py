@@ -141,7 +141,7 @@ def test_an_unanswered_sample_is_no_lost_message(tmp_path):
     assert (found.lost_samples, found.lost_messages, found.unanswered) == (0, 0, 398)
     assert (audits['/current_setpoint'].lost, audits['/control_trace'].lost) == (0, 0)
     assert [str(fault) for fault in found.faults] == [
-        '0.499 s mount_control: no setpoint in time for 399 ms (limit 20 ms): the coil was at 0 A'
+        '0.499 s mount_control: no setpoint in time for 399 ms (limit 20 ms): the coil went to 0 A'
     ]
     assert not found.sound
     assert found.lossless
@@ -211,15 +211,16 @@ def test_words_and_json_tell_the_same_figures(tmp_path):
     told = as_json(audits, found)
     assert (told['lost_samples'], told['unanswered_samples'], told['asked_samples']) == (5, 398, 1995)
     assert [fault['sentence'] for fault in told['faults']] == [each.sentence for each in found.faults]
-    words = '\n'.join(sentences(audits, found))
+    words = ' '.join('\n'.join(sentences(audits, found)).split())
     assert 'samples lost: 5 of 2000 (10 messages of all topics)' in words
     assert 'samples unanswered: 398 of 1995 while control was active' in words
-    assert f'faults: 2, at 0.499 s mount_control: {found.faults[0].sentence}; 0.600 s mount_driver: ' in words
+    assert f'faults: 2: 0.499 s mount_control: {found.faults[0].sentence}; 0.600 s mount_driver: ' in words
 
 
 def test_of_many_faults_the_first_are_named_and_the_others_counted(tmp_path):
     marks = [(100 + 10 * number, f'{{kind: fault, text: number {number}}}') for number in range(8)]
     found, _ = figures(write(tmp_path / 'bag', marks=marks))
     assert len(found.faults) == 8
-    assert found.faults_text().startswith('8, at 0.100 s number 0; 0.110 s number 1; ')
-    assert found.faults_text().endswith('number 4 and 3 more')
+    lines = found.faults_text().splitlines()
+    assert lines[:3] == ['8:', '0.100 s number 0;', '0.110 s number 1;']
+    assert lines[-2:] == ['0.140 s number 4;', 'and 3 more']
