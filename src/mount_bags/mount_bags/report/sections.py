@@ -42,7 +42,8 @@ def traces(subjects: Sequence[Subject]) -> Section:
     words = []
     levels = next((each.facts.levels for each in subjects if each.facts.levels != Levels()), Levels())
     damping: list[tuple[float, float]] = next(
-        (spans for each in subjects if (spans := each.signals.damping())), []
+        (spans for each in subjects if not each.facts.without_friction and (spans := each.signals.damping())),
+        [],
     )
     if len(subjects) > 1 and damping:
         words.append(f'Shaded: damping on in {subjects[0].name}.')
