@@ -134,6 +134,8 @@ def test_a_control_that_stands_still_costs_answers_the_coil_goes_to_0_ampere_and
     finally:
         os.kill(nodes['mount_control'], signal.SIGCONT)
     output, _ = process.communicate(timeout=LIMIT)
+    if 'too late for 1 kHz' in output:  # then what stood still may not have been active yet
+        pytest.skip(f'this machine is too late for a drive in real time: {output}')
     assert process.returncode == 1, output
     figures = json.loads((out / 'summary.json').read_text())
     assert figures['unanswered_samples'] > 300  # of 500; the last 100 wait in the queue and are answered late
