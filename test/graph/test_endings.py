@@ -1,5 +1,6 @@
 """Whatever ends a drive, the coil is at 0 A, the recording is closed and the exit code tells the reason."""
 
+import json
 import os
 import signal
 import subprocess
@@ -8,6 +9,8 @@ import threading
 import pytest
 
 import mount_bags
+from mount_bags.audit import audit
+from mount_bags.losses import losses
 from mount_driver.bus import MULTICAST_GROUP, open_bus
 from mount_driver.codec import MountCodec
 from mount_ros.testing import wait_until
@@ -108,6 +111,40 @@ def test_nodes_end_when_their_supervisor_is_killed(command, bus_listener):
     process.communicate(timeout=LIMIT)
     wait_until(lambda: not any(_alive(pid) for pid in nodes.values()), 'the end of all nodes', LIMIT)
     assert bus_listener[-1].current == 0.0
+
+
+@pytest.mark.real_time
+def test_a_control_that_stands_still_costs_answers_the_coil_goes_to_0_ampere_and_the_drive_says_so(
+    command, bus_listener
+):
+    process, out = command.start_drive(
+        '--scenario', 'bench', '--duration', '3', '--set', 'mount_sim.timeline.start=4', '--no-report',
+        '--priority', '0',
+    )  # fmt: skip
+    wait_until(lambda: _damping(bus_listener) or process.poll() is not None, 'damping', LIMIT)
+    nodes = _node_pids(process.pid)
+    if 'mount_control' not in nodes:
+        pytest.skip(f'this machine is too late for a drive in real time: {process.communicate()[0]}')
+    os.kill(nodes['mount_control'], signal.SIGSTOP)
+    try:
+        wait_until(lambda: bus_listener[-1].current == 0.0, '0 A', LIMIT)
+        seen = len(bus_listener)
+        wait_until(lambda: len(bus_listener) >= seen + 25, '0.5 s of 0 A every 20 ms', LIMIT)
+        assert {setpoint.current for setpoint in bus_listener[seen:]} == {0.0}
+    finally:
+        os.kill(nodes['mount_control'], signal.SIGCONT)
+    output, _ = process.communicate(timeout=LIMIT)
+    if 'too late for 1 kHz' in output:  # then what stood still may not have been active yet
+        pytest.skip(f'this machine is too late for a drive in real time: {output}')
+    assert process.returncode == 1, output
+    figures = json.loads((out / 'summary.json').read_text())
+    assert figures['unanswered_samples'] > 300  # of 500; the last 100 wait in the queue and are answered late
+    assert figures['late_samples'] > 0
+    assert any('the coil went to 0 A' in fault['sentence'] for fault in figures['faults'])
+    recording = mount_bags.open(out / 'recording')
+    found = losses(recording, audit(recording)).as_json()
+    assert found == {name: figures[name] for name in found}
+    assert f'samples unanswered: {figures["unanswered_samples"]} of ' in output
 
 
 def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):

@@ -63,7 +63,7 @@ class Recorded:
             true_time=(self.stamps(topics.SIM_TRUTH) - zero) / 1e9,
             true_velocity=truth['velocity'],
             friction_force=truth['friction_force'],
-            excitation_start=zero,
+            zero=zero,
         )
 
     @property
@@ -171,7 +171,7 @@ def test_damping_goes_on_one_period_after_the_magnitude_exceeds_its_level(matche
     assert times.off == ()
     magnitude = matched[topics.CONTROL_TRACE]['magnitude']
     exceeded = matched.stamps(topics.CONTROL_TRACE)[np.argmax(magnitude > 0.0008)]
-    on = round(1e9 * times.on[0]) + matched.drive.excitation_start
+    on = round(1e9 * times.on[0]) + matched.drive.zero
     assert (on - exceeded) / 1e9 == pytest.approx(0.124)
 
 

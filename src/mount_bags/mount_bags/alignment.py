@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mount_bags.reading import Recording
 from mount_bags.series import Series, SeriesError, Times, registered_topic
+from mount_bags.time_axis import TimeAxis, time_axis
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 Places = NDArray[np.int64]
@@ -26,7 +27,6 @@ class Counter:
     """
 
     def __init__(self, anchor: Series):
-        self.first_place = int(np.argmin(anchor.stamps))
         self.stamps = np.unique(anchor.stamps)
         self.period = _period(anchor, self.stamps)
         self._numbers = _steps(self.stamps, self.period)
@@ -52,16 +52,14 @@ class Alignment:
     """How samples of A and B become one time axis.
 
     With `same_stamps` samples of equal stamp belong together, else samples of equal number, counted from the
-    first sample of the topic `anchor`. Times are in s from the first message of A, which was logged at
-    `begin` (ns).
+    first sample of the topic `anchor`. Times are in s on the time axis of A.
     """
 
     same_stamps: bool
     anchor: str
     a: Counter
     b: Counter
-    begin: int
-    anchor_time: float
+    axis: TimeAxis
 
     @property
     def shift(self) -> int:
@@ -80,11 +78,11 @@ class Alignment:
 
     def time(self, stamps: Times) -> NDArray[np.float64]:
         """Return the times (s) of stamps of A."""
-        return (stamps - self.a.first) / 1e9 + self.anchor_time
+        return self.axis.of_stamps(stamps)
 
     def received(self, log_times: Times) -> NDArray[np.float64]:
         """Return the times (s) of messages of A by when they were received."""
-        return (log_times - self.begin) / 1e9
+        return self.axis.of_logs(log_times)
 
 
 @dataclass(frozen=True)
@@ -114,14 +112,12 @@ def align(a: Recording, b: Recording) -> Alignment:
     """Return how to match the samples of `a` and `b`; raises `ComparisonError`."""
     first, second = _anchor(a, b)
     of_a, of_b = Counter(first), Counter(second)
-    begin = a.time_range[0] if a.time_range else 0
     return Alignment(
         same_stamps=_share(of_a.stamps, of_b.stamps) >= _SAME_CLOCK,
         anchor=first.topic.lstrip('/'),
         a=of_a,
         b=of_b,
-        begin=begin,
-        anchor_time=(int(first.receive_times[of_a.first_place]) - begin) / 1e9,
+        axis=time_axis(a),
     )
 
 

@@ -1,23 +1,37 @@
-"""Was anything lost? Each topic of a recording against its own stamps, each sample against its answer."""
+"""Was anything lost? Each topic of a recording against its own stamps, each sample against its answer.
+
+A sample that control does not answer leaves no setpoint and no trace that could be lost: setpoints and traces
+are held against the samples, not against their own stamps.
+"""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mount_bags.answers import NO_TIMES, Answers, Control, Setpoints, judge_answers
 from mount_bags.latency import Latency, setpoint_latency
+from mount_bags.node_reports import NodeReport, node_reports
 from mount_bags.reading import Recording
 from mount_bags.series import Times, registered_topic
-from mount_bags.stamps import regular_rate, stamp_jitter, stamp_statistics
+from mount_bags.stamps import missing_samples, regular_rate, stamp_jitter, stamp_statistics
 from mount_bags.statement import RECORDER_RECORD, read_statement
+from mount_bags.time_axis import TimeAxis, time_axis
 from mount_bags.topic_times import TopicTimes
-from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Delivery, Topic
+from mount_ros.topics import (
+    AIR_GAP,
+    COIL_RIPPLE,
+    CONTROL_TRACE,
+    CURRENT_SETPOINT,
+    DISPLACEMENT,
+    Delivery,
+    Topic,
+)
 
 AllTimes = Mapping[str, TopicTimes]
 
-_NO_TIMES: Times = np.empty(0, np.int64)
-_PAUSE = 0.5  # s, chosen: a control that says nothing for so long was not active
+CONTROL = 'mount_control'  # the node
 
 
 @dataclass(frozen=True)
@@ -25,8 +39,9 @@ class TopicAudit:
     """What is there of a topic and what is not; None and NaN where it cannot be told, as `remark` says.
 
     `present` counts messages, `duplicated` those of them that repeat a sample, so that
-    expected = present - duplicated + lost. `unanswered` of the `asked` samples of `displacement` have no
-    setpoint although control was active; `latency` is told of `current_setpoint`.
+    expected = present - duplicated + lost. Of `displacement` are told `lost_samples`, counted once
+    whether their displacement, their ripple or both are missing, and how the samples were answered;
+    `latency` of `current_setpoint`.
     """
 
     expected: int | None
@@ -38,24 +53,16 @@ class TopicAudit:
     rate_hz: float = math.nan
     jitter_s: float = math.nan  # rms
     worst_jitter_s: float = math.nan
-    asked: int | None = None
-    unanswered: int | None = None
+    lost_samples: int | None = None
+    answers: Answers | None = None
     latency: Latency | None = None
     remark: str = ''
 
     @property
     def sound(self) -> bool:
         """Whether nothing is known to be lost, repeated, out of order or unanswered."""
-        return not (self.lost or self.duplicated or self.out_of_order or self.unanswered)
-
-
-@dataclass(frozen=True)
-class SetpointCoverage:
-    """Samples of the displacement while control was active, and those that no setpoint answers."""
-
-    asked: int
-    unanswered: int
-    spans: int  # how often control was active
+        unanswered = self.answers is not None and (self.answers.unanswered or self.answers.silences)
+        return not (self.lost or self.duplicated or self.out_of_order or unanswered)
 
 
 def audit(recording: Recording) -> dict[str, TopicAudit]:
@@ -65,33 +72,31 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     and is not there, whichever is more.
     """
     times, told = recording.times(), _told_by_recorder(recording)
-    return {
+    audits = {
         name: _with_told(_audit_topic(times, name), recording.missing.get(name, 0), told.get(name))
         for name in recording
     }
+    mounts = [name for name, found in times.items() if _own_topic(found) is DISPLACEMENT and len(found)]
+    if mounts:
+        reports, axis = node_reports(recording), time_axis(recording, times)
+        for namespace in (name.removesuffix(DISPLACEMENT.name) for name in mounts):
+            answers = _answers(times, namespace, _inactive(reports, namespace, axis))
+            _add_samples(audits, namespace, _lost_samples(times, audits, namespace), answers)
+            _add_lost_steps(audits, namespace, _lost_steps(recording, times, namespace, answers))
+    return audits
 
 
-def setpoint_coverage(
-    displacements: Times, setpoints: Times, handovers: Times = _NO_TIMES
-) -> SetpointCoverage:
-    """Return how the setpoints answer the displacements; all are stamps in ns.
+def _add_samples(
+    audits: dict[str, TopicAudit], namespace: str, lost_samples: int, answers: Answers | None
+) -> None:
+    name = namespace + DISPLACEMENT.name
+    audits[name] = replace(audits[name], lost_samples=lost_samples, answers=answers)
 
-    A setpoint has the stamp of the sample that it answers. Setpoints are taken as wanted from one to the
-    next unless they are more than 0.5 s apart, or the first is the last of an initialisation: `handovers`
-    are the stamps of the air gaps, after which the controller has yet to be activated.
-    """
-    answers = np.unique(setpoints)
-    samples = np.unique(displacements)
-    if answers.size == 0:
-        return SetpointCoverage(0, 0, 0)
-    is_pause = (np.diff(answers) > _PAUSE * 1e9) | np.isin(answers[:-1], handovers)
-    pauses = np.flatnonzero(is_pause)
-    begins = answers[np.concatenate([[0], pauses + 1])]
-    ends = answers[np.concatenate([pauses, [answers.size - 1]])]
-    span = np.searchsorted(begins, samples, side='right') - 1
-    asked = samples[(span >= 0) & (samples <= ends[np.maximum(span, 0)])]
-    unanswered = int(np.count_nonzero(~np.isin(asked, answers)))
-    return SetpointCoverage(int(asked.size), unanswered, int(begins.size))
+
+def _add_lost_steps(audits: dict[str, TopicAudit], namespace: str, lost: int) -> None:
+    name = namespace + CONTROL_TRACE.name
+    if lost:
+        audits[name] = _with_told(audits[name], lost, None)
 
 
 def _told_by_recorder(recording: Recording) -> dict[str, int]:
@@ -127,9 +132,9 @@ def _audit_topic(times: AllTimes, name: str) -> TopicAudit:
     rate = topic.rate if topic is not None else regular_rate(found.stamps)
     if rate is None:
         return TopicAudit(None, present, None, remark='stamps without a regular rate: only counted')
-    entry = _from_stamps(times, found.stamps, topic, name, rate)
-    if topic is DISPLACEMENT:
-        return _with_coverage(entry, times, name)
+    entry = _from_stamps(found.stamps, topic, rate)
+    if topic in (CURRENT_SETPOINT, CONTROL_TRACE) and _has_samples(times, name.removesuffix(topic.name)):
+        entry = replace(entry, expected=entry.present - (entry.duplicated or 0), lost=0)
     if topic is CURRENT_SETPOINT:
         return replace(entry, latency=setpoint_latency(found.stamps, found.receive_times))
     return entry
@@ -143,13 +148,8 @@ def _own_topic(found: TopicTimes) -> Topic | None:
     return topic if not found.names or set(topic.names) <= set(found.names) else None
 
 
-def _from_stamps(times: AllTimes, stamps: Times, topic: Topic | None, name: str, rate: float) -> TopicAudit:
-    remark = '' if topic is not None else f'rate of {rate:.4g} Hz taken from the stamps'
-    closed = stamps
-    if topic is CURRENT_SETPOINT or topic is CONTROL_TRACE:
-        closed, pauses = _without_pauses(stamps, times, name.removesuffix(topic.name), rate)
-        remark = f'no loss: control was not active {pauses} times' if pauses else ''
-    statistics, jitter = stamp_statistics(closed, rate), stamp_jitter(closed, rate)
+def _from_stamps(stamps: Times, topic: Topic | None, rate: float) -> TopicAudit:
+    statistics, jitter = stamp_statistics(stamps, rate), stamp_jitter(stamps, rate)
     return TopicAudit(
         expected=statistics.expected,
         present=statistics.present,
@@ -160,40 +160,66 @@ def _from_stamps(times: AllTimes, stamps: Times, topic: Topic | None, name: str,
         rate_hz=rate,
         jitter_s=jitter.rms,
         worst_jitter_s=jitter.worst,
-        remark=remark,
+        remark='' if topic is not None else f'rate of {rate:.4g} Hz taken from the stamps',
     )
 
 
-def _with_coverage(entry: TopicAudit, times: AllTimes, name: str) -> TopicAudit:
-    namespace = name.removesuffix(DISPLACEMENT.name)
-    answers = _stamps_of(times, f'{namespace}{CURRENT_SETPOINT.name}')
-    if not answers.size:
-        return entry
-    handovers = _stamps_of(times, f'{namespace}{AIR_GAP.name}')
-    coverage = setpoint_coverage(_stamps_of(times, name), answers, handovers)
-    return replace(entry, asked=coverage.asked, unanswered=coverage.unanswered)
+def _has_samples(times: AllTimes, namespace: str) -> bool:
+    return bool(_stamps_of(times, namespace + DISPLACEMENT.name).size)
+
+
+def _lost_samples(times: AllTimes, audits: Mapping[str, TopicAudit], namespace: str) -> int:
+    """Return how many samples of a mount lack displacement or ripple, or more if others say so."""
+    measured = [namespace + topic.name for topic in (DISPLACEMENT, COIL_RIPPLE)]
+    found = missing_samples([_stamps_of(times, name) for name in measured], DISPLACEMENT.rate)
+    return max(found, *(audits[name].lost or 0 for name in measured if name in audits))
+
+
+def _answers(times: AllTimes, namespace: str, inactive: Times | None) -> Answers | None:
+    """Return how the samples of a mount were answered, None where its setpoints were not recorded."""
+    name = namespace + CURRENT_SETPOINT.name
+    stamps = _stamps_of(times, name)
+    if not stamps.size:
+        return None
+    setpoints = Setpoints(stamps, times[name].publish_times)
+    control = Control(
+        steps=_stamps_of(times, namespace + CONTROL_TRACE.name),
+        handovers=_stamps_of(times, namespace + AIR_GAP.name),
+        inactive=inactive,
+    )
+    return judge_answers(_stamps_of(times, namespace + DISPLACEMENT.name), setpoints, control)
+
+
+def _lost_steps(recording: Recording, times: AllTimes, namespace: str, answers: Answers | None) -> int:
+    """Return how many setpoints above 0 A have no trace: 0 A may be the answer to an invalid sample."""
+    traced = _stamps_of(times, namespace + CONTROL_TRACE.name)
+    if answers is None or not traced.size:
+        return 0
+    setpoints = _stamps_of(times, namespace + CURRENT_SETPOINT.name)
+    untraced = ~np.isin(setpoints, traced)
+    controlled = np.zeros(len(setpoints), bool)
+    for begin, end in answers.spans:
+        controlled |= (setpoints >= begin) & (setpoints <= end)
+    if not (untraced & controlled).any():
+        return 0
+    currents = recording[namespace + CURRENT_SETPOINT.name]['coil_current']
+    return len(np.unique(setpoints[untraced & controlled & (currents > 0.0)]))
+
+
+def _inactive(reports: Sequence[NodeReport], namespace: str, axis: TimeAxis) -> Times | None:
+    """Return when the control of a mount said that it is inactive (stamps, ns), None if it said nothing."""
+    own = [
+        report
+        for report in reports
+        if report.node == CONTROL and report.namespace == namespace.strip('/') and report.state
+    ]
+    if not own:
+        return None
+    logged = np.array([report.log_time for report in own if report.state == 'inactive'], np.int64)
+    return axis.stamps_at(logged)
 
 
 def _stamps_of(times: AllTimes, name: str) -> Times:
     """Return the stamps (ns) of a topic by its full name, none if it is missing or has none."""
     stamps = times[name].stamps if name in times else None
-    return _NO_TIMES if stamps is None else stamps
-
-
-def _without_pauses(stamps: Times, times: AllTimes, namespace: str, rate: float) -> tuple[Times, int]:
-    """Return the stamps with the times taken out in which control was not active, and how many there were.
-
-    That is after each handover from the initialisation, and where it is silent for long while the
-    displacement goes on.
-    """
-    handovers = _stamps_of(times, f'{namespace}{AIR_GAP.name}')
-    displacements = np.sort(_stamps_of(times, f'{namespace}{DISPLACEMENT.name}'))
-    ordered = np.unique(stamps)
-    steps = np.diff(ordered)
-    period = round(1e9 / rate)
-    between = np.diff(np.searchsorted(displacements, ordered))
-    silent = (steps > _PAUSE * 1e9) & (between > 0.5 * steps / period)
-    pauses = (silent | np.isin(ordered[:-1], handovers)) & (steps > period)
-    shift = np.concatenate([[0], np.cumsum(np.where(pauses, steps - period, 0))])
-    counted = int(np.count_nonzero(pauses & (np.rint(steps / period) > 1)))
-    return stamps - shift[np.searchsorted(ordered, stamps)], counted
+    return NO_TIMES if stamps is None else stamps

@@ -10,36 +10,32 @@ from rich.text import Text
 
 from mount_bags.audit import TopicAudit
 from mount_bags.latency import EDGES, Latency
-from mount_bags.reading import Recording
+from mount_bags.losses import Losses
 
 _TROUBLES = {'duplicated': 'twice', 'out_of_order': 'late'}
 _BAR = 40  # characters
 
 
-def is_lossless(audits: Mapping[str, TopicAudit], recording: Recording) -> bool:
-    """Return whether nothing of the recording is known to be lost."""
-    return recording.whole and not any(entry.lost for entry in audits.values())
-
-
-def as_json(audits: Mapping[str, TopicAudit]) -> dict[str, dict[str, Any]]:
+def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
     """Return the figures as JSON knows them: unknown is null; times are in s."""
     return {
-        name: {
-            'expected': entry.expected,
-            'present': entry.present,
-            'lost': entry.lost,
-            'duplicated': entry.duplicated,
-            'longest_gap_s': _known(entry.longest_gap_s),
-            'out_of_order': entry.out_of_order,
-            'rate_hz': _known(entry.rate_hz),
-            'jitter_s': _known(entry.jitter_s),
-            'worst_jitter_s': _known(entry.worst_jitter_s),
-            'asked': entry.asked,
-            'unanswered': entry.unanswered,
-            'latency': _latency_json(entry.latency),
-            'remark': entry.remark,
-        }
-        for name, entry in audits.items()
+        **found.as_json(),
+        'topics': {
+            name: {
+                'expected': entry.expected,
+                'present': entry.present,
+                'lost': entry.lost,
+                'duplicated': entry.duplicated,
+                'longest_gap_s': _known(entry.longest_gap_s),
+                'out_of_order': entry.out_of_order,
+                'rate_hz': _known(entry.rate_hz),
+                'jitter_s': _known(entry.jitter_s),
+                'worst_jitter_s': _known(entry.worst_jitter_s),
+                'latency': _latency_json(entry.latency),
+                'remark': entry.remark,
+            }
+            for name, entry in audits.items()
+        },
     }
 
 
@@ -64,19 +60,16 @@ def as_table(audits: Mapping[str, TopicAudit]) -> Table:
     return table
 
 
-def sentences(audits: Mapping[str, TopicAudit], recording: Recording) -> list[str]:
+def sentences(audits: Mapping[str, TopicAudit], found: Losses) -> list[str]:
     """Return what the figures mean, the verdict last."""
     remarks: dict[str, list[str]] = {}
     for name, entry in audits.items():
         if entry.remark:
             remarks.setdefault(entry.remark, []).append(name)
     said = [f'{", ".join(names)}: {remark}' for remark, names in remarks.items()]
-    for name, entry in audits.items():
-        if entry.asked:
-            said.append(_coverage_sentence(name, entry))
-        elif name.endswith('/displacement') and entry.present:
-            said.append(f'{name}: whether its samples were answered cannot be told, there is no setpoint')
-    return [*said, _verdict(audits, recording)]
+    if found.samples is not None:
+        said += [f'{what}: {text}' for what, text in found.rows()]
+    return [*said, _verdict(audits, found)]
 
 
 def latency_lines(audits: Mapping[str, TopicAudit]) -> list[Text]:
@@ -96,11 +89,14 @@ def latency_lines(audits: Mapping[str, TopicAudit]) -> list[Text]:
     return lines
 
 
-def _verdict(audits: Mapping[str, TopicAudit], recording: Recording) -> str:
+def _verdict(audits: Mapping[str, TopicAudit], found: Losses) -> str:
     lost = {name: entry.lost for name, entry in audits.items() if entry.lost}
-    if lost:
-        return 'Lost: ' + ', '.join(f'{count} of {name}' for name, count in lost.items()) + '.'
-    if not recording.whole:
+    said = ['Lost: ' + ', '.join(f'{count} of {name}' for name, count in lost.items())] if lost else []
+    said += [f'Unanswered: {found.unanswered} samples'] if found.unanswered else []
+    said += [f'Faults: {len(found.faults)}'] if found.faults else []
+    if said:
+        return '. '.join(said) + '.'
+    if not found.whole:
         return 'The recording is not whole: what the notes say is missing, its stamps cannot show.'
     told = sum(entry.expected is not None for entry in audits.values())
     untold = sum(entry.expected is None and entry.present > 0 for entry in audits.values())
@@ -108,12 +104,6 @@ def _verdict(audits: Mapping[str, TopicAudit], recording: Recording) -> str:
         return 'Whether anything was lost cannot be told: no topic has stamps with a rate, nobody counted.'
     rest = f'; of {untold} others it cannot be told' if untold else ''
     return f'Nothing is known to be lost: {told} topics are complete{rest}.'
-
-
-def _coverage_sentence(name: str, entry: TopicAudit) -> str:
-    if not entry.unanswered:
-        return f'{name}: each of the {entry.asked} samples while control was active has its setpoint'
-    return f'{name}: {entry.unanswered} of {entry.asked} samples while control was active have no setpoint'
 
 
 def _bars(latency: Latency) -> list[Text]:

@@ -22,6 +22,7 @@ class MarkKind(Enum):
     SWITCH_ON = 'switch_on'
     FAULT = 'fault'
     LOST_SAMPLE = 'lost_sample'
+    UNANSWERED = 'unanswered'
     RECORDING_LOSS = 'recording_loss'
 
 
@@ -91,12 +92,19 @@ class FaultWatch:
 
 
 class LostSampleWatch:
-    """Counts the samples of a topic and marks where some are missing."""
+    """Counts the samples of a topic and marks where some are missing.
 
-    def __init__(self, marks: AutomaticMarks, topic: str, watch: StampWatch):
+    Of the control's own trace (kind `UNANSWERED`) they were never sent: control did not answer.
+    """
+
+    def __init__(
+        self, marks: AutomaticMarks, topic: str, watch: StampWatch, kind: MarkKind = MarkKind.LOST_SAMPLE
+    ):
         self._marks = marks
         self._topic = topic
         self._watch = watch
+        self._kind = kind
+        self._what = 'missing' if kind is MarkKind.LOST_SAMPLE else 'without a control step'
 
     def add(self, stamp: int) -> None:
         """Take the sample of time `stamp` (ns)."""
@@ -106,7 +114,7 @@ class LostSampleWatch:
         if watch.lost > before:
             count = watch.lost - before
             noun = 'sample' if count == 1 else 'samples'
-            self._marks.mark(MarkKind.LOST_SAMPLE, stamp, f'{self._topic}: {count} {noun} missing')
+            self._marks.mark(self._kind, stamp, f'{self._topic}: {count} {noun} {self._what}')
 
 
 def mark_kinds(words: str) -> tuple[MarkKind, ...]:

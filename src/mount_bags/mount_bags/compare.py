@@ -43,7 +43,7 @@ class TopicComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What two recordings have in common and what not; times in s from the first message of A."""
+    """What two recordings have in common and what not; times in s on the time axis of A."""
 
     name_a: str
     name_b: str

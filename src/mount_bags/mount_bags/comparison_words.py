@@ -75,7 +75,7 @@ def as_table(comparison: Comparison) -> Table:
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
-    """Return everything as JSON knows it: unknown is null, times in s from the first message of A."""
+    """Return everything as JSON knows it: unknown is null, times in s on the time axis of A."""
     alignment = comparison.alignment
     return {
         'a': comparison.name_a,

@@ -15,6 +15,7 @@ from mount_bags.metadata import TopicInformation
 from mount_bags.origin import short_name, with_step
 from mount_bags.reading import Recording
 from mount_bags.series import registered_topic
+from mount_bags.time_axis import ZERO_KEY, TimeAxis, time_axis
 from mount_ros.topics import EVENT, Delivery
 
 _ALL = slice(None)
@@ -28,7 +29,7 @@ class CutError(ValueError):
 
 @dataclass(frozen=True)
 class Cut:
-    """What was cut; `begin` and `end` in s from the first message of the original."""
+    """What was cut; `begin` and `end` in s on the time axis of the original."""
 
     folder: Path
     begin: float
@@ -47,11 +48,12 @@ def cut(
 ) -> Cut:
     """Write what was logged from `begin` on and before `end` to the new recording `out`.
 
-    Times are in s from the first message of `recording`; None is its beginning, or its end with the last
-    message. Messages keep their bytes, log and publish times. Of latched topics and of `event` the last
-    message before `begin` comes with it; `reason` goes into the note of origin. Raises `CutError`.
+    Times are in s on the time axis of `recording` (`mount_bags.time_axis`), which the piece keeps; None is
+    its beginning, or its end with the last message. Messages keep their bytes, log and publish times. Of
+    latched topics and of `event` the last message before `begin` comes with it; `reason` goes into the note
+    of origin. Raises `CutError`.
     """
-    span = _checked_span(recording, begin, end)
+    span = _checked_span(recording, time_axis(recording), begin, end)
     parts, losses, carried = [], [], 0
     for name in recording:
         messages, damages = read_messages(recording, name)
@@ -61,50 +63,62 @@ def cut(
         losses += damages
     count = sum(len(part) for part in parts) - carried
     if not count:
-        raise CutError(f'{recording.path} has no message {span}; it lasts {span.whole / 1e9:.3f} s')
+        raise CutError(f'{recording.path} has no message {span}; it ends at {span.whole:.3f} s')
     distro = recording.information.ros_distro if recording.information else ''
     write_messages(out, parts, with_step([recording], _step(recording, span, reason)), distro)
-    return Cut(Path(out), span.begin / 1e9, span.end / 1e9, count, carried, tuple(losses))
+    return Cut(Path(out), span.begin, span.end, count, carried, tuple(losses))
 
 
 @dataclass(frozen=True)
 class _Span:
-    """From `begin` on and before `end`, in ns from the log time `zero`; `closed`: with the last message."""
+    """From the log time `first` on and before `last` (ns); `closed`: with the last message.
 
-    zero: int
-    begin: int
-    end: int
+    `begin` and `end`, and `whole` at which the recording ends, are the same in s on its time axis.
+    """
+
+    first: int
+    last: int
     closed: bool
-    whole: int
+    begin: float
+    end: float
+    whole: float
+    zero: int  # stamp, ns
 
     def __str__(self) -> str:
-        return f'from {self.begin / 1e9:.3f} s to {self.end / 1e9:.3f} s'
+        return f'from {self.begin:.3f} s to {self.end:.3f} s'
 
 
-def _checked_span(recording: Recording, begin: float | None, end: float | None) -> _Span:
+def _checked_span(recording: Recording, axis: TimeAxis, begin: float | None, end: float | None) -> _Span:
     found = recording.time_range
     if found is None:
         raise CutError(f'{recording.path} has no message; there is nothing to cut')
-    zero, whole = found[0], found[1] - found[0]
     for name, value in (('begin', begin), ('end', end)):
         if value is not None and not math.isfinite(value):
             raise CutError(f'the {name} of a cut must be a number of seconds; instead received {value}')
-    first = max(0, round(1e9 * begin)) if begin is not None else 0
-    last = round(1e9 * end) if end is not None else whole
-    if first > whole:
-        raise CutError(
-            f'the cut begins at {first / 1e9:g} s, but {recording.path} lasts only {whole / 1e9:.3f} s'
-        )
+    whole = axis.of_log(found[1])
+    first = found[0] if begin is None else max(found[0], axis.log_time(begin))
+    last = found[1] if end is None else axis.log_time(end)
+    if first > found[1]:
+        raise CutError(f'the cut begins at {begin:g} s, but {recording.path} ends at {whole:.3f} s')
     if end is not None and last <= first:
-        raise CutError(f'the end of a cut ({last / 1e9:g} s) must lie behind its begin ({first / 1e9:g} s)')
-    return _Span(zero, first, min(last, whole), end is None or last > whole, whole)
+        from_where = axis.of_log(first) if begin is None else begin
+        raise CutError(f'the end of a cut ({end:g} s) must lie behind its begin ({from_where:g} s)')
+    closed = end is None or last > found[1]
+    return _Span(
+        first,
+        min(last, found[1]),
+        closed,
+        axis.of_log(first) if begin is None else begin,
+        whole if closed or end is None else end,
+        whole,
+        axis.zero,
+    )
 
 
 def _places(messages: Messages, span: _Span) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return where the carried messages from before the span stand, and those of the span."""
-    times = messages.log_times - span.zero
-    first = int(np.searchsorted(times, span.begin, side='left'))
-    behind = int(np.searchsorted(times, span.end, side='right' if span.closed else 'left'))
+    first = int(np.searchsorted(messages.log_times, span.first, side='left'))
+    behind = int(np.searchsorted(messages.log_times, span.last, side='right' if span.closed else 'left'))
     return np.arange(first)[_carried(messages.topic)], np.arange(first, behind)
 
 
@@ -123,8 +137,9 @@ def _step(recording: Recording, span: _Span, reason: str) -> dict[str, Any]:
     return {
         'did': 'cut',
         'recording': short_name(recording),
-        'from_s': span.begin / 1e9,
-        'to_s': span.end / 1e9,
+        'from_s': span.begin,
+        'to_s': span.end,
+        ZERO_KEY: span.zero,
         'made': datetime.now().astimezone().isoformat(timespec='seconds'),
         **({'reason': reason} if reason else {}),
     }

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mount_bags.event_marks import read_marks
-from mount_bags.reading import ReadingError, Recording
+from mount_bags.reading import Recording
 from mount_bags.series import Series, SeriesError
+from mount_bags.time_axis import TimeAxis, time_axis
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
 SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
@@ -20,9 +21,10 @@ class EventError(ValueError):
 
 @dataclass(frozen=True)
 class RecordedEvent:
-    """Something worth finding again; `log_time` in ns."""
+    """Something worth finding again: when it was logged, and its time on the clock of the stamps, in ns."""
 
     log_time: int
+    stamp: int
     kind: str
     text: str = ''
 
@@ -46,7 +48,7 @@ def marked_events(recording: Recording) -> list[RecordedEvent]:
     series = recording[EVENT.name]
     times = series.receive_times.tolist()
     return [
-        RecordedEvent(time, mark.kind, mark.text)
+        RecordedEvent(time, mark.time, mark.kind, mark.text)
         for time, mark in zip(times, read_marks(series), strict=True)
     ]
 
@@ -68,12 +70,9 @@ def find_event(recording: Recording, wanted: str) -> RecordedEvent:
     return fitting[number - 1]
 
 
-def seconds_into(recording: Recording, log_time: int) -> float:
-    """Return `log_time` (ns) in s from the first message of `recording`."""
-    found = recording.time_range
-    if found is None:
-        raise ReadingError(f'{recording.path} has no message')
-    return (log_time - found[0]) / 1e9
+def event_time(event: RecordedEvent, axis: TimeAxis) -> float:
+    """Return when an event happened, in s on the time axis of its recording."""
+    return axis.of_mark(event.stamp, event.log_time)
 
 
 def _plain(kind: str) -> str:
@@ -94,7 +93,11 @@ def _changes(trace: Series) -> list[RecordedEvent]:
     order = np.argsort(trace.receive_times, kind='stable')
     change = np.diff((trace['damping_active'][order] > 0.5).astype(int), prepend=0)
     return [
-        RecordedEvent(int(trace.receive_times[order[place]]), SWITCH_ON if change[place] > 0 else SWITCH_OFF)
+        RecordedEvent(
+            int(trace.receive_times[order[place]]),
+            int(trace.stamps[order[place]]),
+            SWITCH_ON if change[place] > 0 else SWITCH_OFF,
+        )
         for place in np.flatnonzero(change).tolist()
     ]
 
@@ -102,8 +105,9 @@ def _changes(trace: Series) -> list[RecordedEvent]:
 def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
     if not events:
         return 'it has none, and damping was never switched; cut by --from and --to'
+    axis = time_axis(recording)
     shown = [
-        f'{number} {event.kind} at {seconds_into(recording, event.log_time):.3f} s'
+        f'{number} {event.kind} at {event_time(event, axis):.3f} s'
         for number, event in enumerate(events[:12], 1)
     ]
     more = f' and {len(events) - 12} more' if len(events) > 12 else ''

@@ -11,6 +11,7 @@ empty one near it. Only equal stamps, or more samples than places, are samples t
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +59,24 @@ def stamp_statistics(stamps: NDArray[np.int64], rate: float) -> StampStatistics:
         out_of_order=int(np.count_nonzero(stamps[1:] < latest[:-1])),
         longest_gap=float(differences.max()) / _NANOSECONDS if differences.size else math.nan,
     )
+
+
+def missing_samples(streams: Sequence[NDArray[np.int64]], rate: float) -> int:
+    """Return how many samples are missing in at least one of `streams` that carry their parts.
+
+    `streams` are stamps (ns) on one clock, of samples at `rate` in Hz. A stream is whole before its first and
+    behind its last stamp; a sample that is missing in several counts once.
+    """
+    known = [np.unique(stamps) for stamps in streams if stamps.size]
+    if not known:
+        return 0
+    grid = np.unique(np.concatenate(known))
+    numbers = np.cumsum(np.rint(np.diff(grid, prepend=grid[0]) * (rate / _NANOSECONDS)).astype(np.int64))
+    holes = []
+    for stamps in known:
+        own = numbers[np.searchsorted(grid, stamps)]
+        holes.append(np.setdiff1d(np.arange(own[0], own[-1] + 1), own))
+    return len(np.unique(np.concatenate(holes)))
 
 
 def _places(stamps: NDArray[np.int64], rate: float) -> tuple[int, int]:

@@ -20,6 +20,7 @@ class TopicTimes:
     type: str
     stamps: Times | None
     receive_times: Times
+    publish_times: Times
     names: tuple[str, ...] = ()  # of the scalars in the first message of a JointState
     obstacle: str = ''
 
@@ -37,6 +38,7 @@ class TimesCollector:
             self._obstacle = f'{type_name} has no header with a stamp'
         self._stamps: list[Times] = []
         self._received: list[Times] = []
+        self._sent: list[Times] = []
         self._first: bytes | None = None
 
     def add(self, block: Contents) -> None:
@@ -44,6 +46,7 @@ class TimesCollector:
         if self._first is None:
             self._first = block.message(0)[0]
         self._received.append(block.heads['log_time'].astype(np.int64))
+        self._sent.append(block.heads['publish_time'].astype(np.int64))
         if not self._obstacle:
             stamps = _stamps_in(block)
             if stamps is None:
@@ -55,8 +58,8 @@ class TimesCollector:
         """Return what was collected."""
         empty = np.empty(0, np.int64)
         stamps = np.concatenate([empty, *self._stamps]) if not self._obstacle else None
-        received = np.concatenate([empty, *self._received])
-        return TopicTimes(self._topic, self._type, stamps, received, self._names(), self._obstacle)
+        received, sent = np.concatenate([empty, *self._received]), np.concatenate([empty, *self._sent])
+        return TopicTimes(self._topic, self._type, stamps, received, sent, self._names(), self._obstacle)
 
     def _names(self) -> tuple[str, ...]:
         if self._first is None or self._obstacle:

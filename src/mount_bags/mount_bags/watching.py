@@ -6,7 +6,13 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from mount_bags.automatic_marks import AutomaticMarks, FaultWatch, LostSampleWatch, SwitchOnWatch
+from mount_bags.automatic_marks import (
+    AutomaticMarks,
+    FaultWatch,
+    LostSampleWatch,
+    MarkKind,
+    SwitchOnWatch,
+)
 from mount_bags.recording import Observe, Recorder
 from mount_ros.scalars import ScalarsLayout, stamp_of
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DIAGNOSTICS, Delivery, Topic
@@ -23,7 +29,8 @@ def watch_topic(
         recorder.observe(name, _fault_observer(FaultWatch(marks, namespace), now))
     # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
     elif topic.delivery is Delivery.STREAM and topic is not CURRENT_SETPOINT:
-        samples = LostSampleWatch(marks, name, recorder.watch(name, topic.rate, stamp_of))
+        kind = MarkKind.UNANSWERED if topic is CONTROL_TRACE else MarkKind.LOST_SAMPLE
+        samples = LostSampleWatch(marks, name, recorder.watch(name, topic.rate, stamp_of), kind)
         switching = SwitchOnWatch(marks) if topic is CONTROL_TRACE else None
         recorder.observe(name, _stream_observer(samples, switching))
 

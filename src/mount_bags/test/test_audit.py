@@ -2,14 +2,14 @@
 
 import json
 
-import numpy as np
 import pytest
-from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
+from recorded_drive import RECORDED, START, sample, write_drive
 from rich.console import Console
 
 import mount_bags
-from mount_bags.audit import audit, setpoint_coverage
+from mount_bags.audit import audit
 from mount_bags.audit_report import as_json, as_table
+from mount_bags.losses import losses
 from mount_bags.writer import BagWriter
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
@@ -21,7 +21,7 @@ def test_sound_recording_has_nothing_to_tell(drive):
     displacement = audits['/displacement']
     assert (displacement.expected, displacement.present, displacement.lost) == (500, 500, 0)
     assert displacement.longest_gap_s == pytest.approx(1e-3)
-    assert displacement.unanswered == 0
+    assert displacement.answers.unanswered == 0
 
 
 def test_lost_samples_are_counted_with_the_longest_gap(tmp_path):
@@ -40,24 +40,7 @@ def test_displacement_without_its_setpoint_is_counted(tmp_path):
         if 20 <= index < 80 and index not in (30, 31):
             writer.write('/current_setpoint', sample(CURRENT_SETPOINT, index), START + index)
     writer.close()
-    assert audit(mount_bags.open(tmp_path / 'bag'))['/displacement'].unanswered == 2
-
-
-def test_setpoints_are_only_asked_for_while_control_was_active():
-    samples = START + np.arange(3000) * PERIOD
-    setpoints = np.concatenate([samples[100:200], samples[2000:2500]])
-    coverage = setpoint_coverage(samples, setpoints)
-    assert (coverage.asked, coverage.unanswered, coverage.spans) == (600, 0, 2)
-    assert setpoint_coverage(samples, np.empty(0, np.int64)).asked == 0
-
-
-def test_the_pause_between_initialisation_and_control_is_no_loss():
-    samples = START + PERIOD * np.arange(1000)
-    handover = samples[299]
-    setpoints = np.concatenate([samples[:300], samples[400:]])
-    handed_over = setpoint_coverage(samples, setpoints, np.array([handover]))
-    assert (handed_over.asked, handed_over.unanswered, handed_over.spans) == (900, 0, 2)
-    assert setpoint_coverage(samples, setpoints).unanswered == 100
+    assert audit(mount_bags.open(tmp_path / 'bag'))['/displacement'].answers.unanswered == 2
 
 
 def test_topics_without_a_rate_have_no_expectation(tmp_path):
@@ -87,9 +70,10 @@ def test_late_stamps_of_a_phone_are_neither_losses_nor_repetitions(tmp_path):
 
 
 def test_json_holds_the_figures_and_no_nan(tmp_path):
-    figures = as_json(audit(mount_bags.open(write_drive(tmp_path / 'bag', 1))))
-    text = json.dumps(figures, allow_nan=False)
-    entry = json.loads(text)['/displacement']
+    recording = mount_bags.open(write_drive(tmp_path / 'bag', 1))
+    audits = audit(recording)
+    text = json.dumps(as_json(audits, losses(recording, audits)), allow_nan=False)
+    entry = json.loads(text)['topics']['/displacement']
     assert entry['longest_gap_s'] is None
     assert {'expected', 'present', 'lost', 'duplicated', 'longest_gap_s'} <= entry.keys()
     assert (entry['expected'], entry['present'], entry['lost'], entry['duplicated']) == (1, 1, 0, 0)

@@ -15,6 +15,7 @@ from mount_bags.cut import CutError, cut
 from mount_bags.merge import MergeError, merge
 from mount_bags.origin import origin
 from mount_bags.recorded_events import EventError, find_event, recorded_events
+from mount_bags.report.signals import Signals
 from mount_bags.writer import BagWriter
 
 COUNT = 400
@@ -94,8 +95,9 @@ def test_seconds_mean_the_same_in_a_cut_of_a_cut(whole, place):
     ('begin', 'end', 'why'),
     [
         (0.2, 0.1, 'must lie behind its begin'),
+        (None, -1.0, 'must lie behind its begin'),
         (0.2, 0.2, 'must lie behind its begin'),
-        (9.0, None, 'lasts only 0.399 s'),
+        (9.0, None, 'ends at 0.399 s'),
         (float('nan'), None, 'must be a number'),
         (0.10030, 0.10031, 'has no message from'),
     ],
@@ -244,3 +246,31 @@ def test_types_that_nobody_installed_are_cut_with_their_definition(place):
     assert _messages(piece) == {'/thing': original[2:5]}
     (schema,) = piece.files[0].schemas.values()
     assert (schema.name, schema.data) == ('strange_msgs/msg/Thing', b'int32 number')
+
+
+# Time.
+
+
+def test_the_same_moment_has_the_same_time_in_report_cut_and_comparison(whole, place):
+    """However long before the first sample the session came, and whenever the moment was received."""
+    drive = mount_bags.open(write_answers(place(), answers(COUNT), marks=MARKS))
+    writer = BagWriter(folder := place())
+    for name, rows in _messages(drive).items():
+        writer.add_topic(name, drive.topics[name].type)
+        for log, _, payload in rows:
+            writer.write(name, payload, log - 3_000_000_000 if name == '/session' else log + 5_000_000)
+    writer.close()
+    late = mount_bags.open(folder)
+    assert Signals(late).damping() == Signals(drive).damping() == [(pytest.approx(0.1), pytest.approx(0.3))]
+    assert [round(time, 6) for time, _ in Signals(late).marks()] == [0.05, 0.25, 0.32]
+    with pytest.raises(EventError, match=r'1 fault at 0.050 s, 2 switch_on at 0.100 s'):
+        find_event(late, 'rough')
+    later = answers(COUNT, on=112)
+    changes = compare(late, mount_bags.open(write_answers(place(), later))).switching_changes
+    assert [(change.time_a, change.time_b) for change in changes] == [
+        (pytest.approx(0.1), pytest.approx(0.112))
+    ]
+    piece = _cut(late, place(), 0.1, 0.3)
+    assert Signals(piece).damping()[0][0] == pytest.approx(0.1)
+    assert piece['displacement'].stamps[0] == START + 100_000_000
+    assert len(piece['displacement']) == 200

@@ -15,6 +15,7 @@ import mount_bags
 from mount_bags import BagWriter, ReadingError
 from mount_bags.audit import audit
 from mount_bags.audit_report import as_json, as_table, sentences
+from mount_bags.losses import losses
 from mount_bags.recover import RecoveryError, recover
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
 
@@ -100,9 +101,10 @@ def test_what_is_read_is_what_was_written_and_a_sentence_says_the_rest(intact, t
         assert recording.whole == (found == original) or (alone and change is cut), place
         assert recording.whole <= (found == original), place
         entries = audit(recording)
-        as_json(entries)
+        told = losses(recording, entries)
+        as_json(entries, told)
         as_table(entries)
-        assert sentences(entries, recording), place
+        assert sentences(entries, told), place
 
 
 @pytest.mark.parametrize('change', [cut, flip])

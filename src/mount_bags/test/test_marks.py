@@ -161,6 +161,6 @@ def test_recorder_marks_from_the_messages_that_it_writes(tmp_path, marks, sent):
     recorder.end()
     assert [(mark.kind, mark.time) for mark in sent] == [
         ('switch_on', START + PERIOD),
-        ('lost_sample', START + 4 * PERIOD),
+        ('unanswered', START + 4 * PERIOD),
         ('fault', 77),
     ]

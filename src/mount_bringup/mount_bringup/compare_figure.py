@@ -44,7 +44,7 @@ def draw_comparison(comparison: Comparison, a: Recording, b: Recording, file: Pa
     for place, (signal, column) in enumerate(columns):
         _draw(rows[2 * place : 2 * place + 2], signal, column)
     for axes in rows[-1]:
-        axes.set_xlabel('time from the first message of A (s)')
+        axes.set_xlabel('time from the first sample of A (s)')
     handles, labels = rows[0, 0].get_legend_handles_labels()
     picture.legend(handles, labels, loc='outside lower center', ncols=3, fontsize='small')
     state = 'equal' if comparison.equal else 'different'

@@ -14,14 +14,16 @@ from rich.console import Console
 
 from mount_bags.audit import audit
 from mount_bags.audit_report import as_table, sentences
+from mount_bags.losses import losses
 from mount_bags.reading import Recording, open_recording
 from mount_bags.recorder_parameters import RecorderParameters, split_of
 from mount_bags.snapshot import saved_snapshots
+from mount_bags.time_axis import time_axis
 from mount_bringup.core.chain import Parameters, control_parameters
 from mount_bringup.core.recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.ending_signals import ending_signals
-from mount_bringup.evaluation import Drive, load_drive
+from mount_bringup.evaluation import Drive, load_drive, samples_at_the_ends
 from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor, session_text
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
@@ -76,7 +78,7 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
         return _tell_snapshots(order, folder, run, complaints, console)
     recording = open_recording(folder.recording)
     complaints += recording.warnings
-    figures = _evaluate(order, folder, recording, run, console)
+    figures = _evaluate(order, folder, recording, run, console, complaints)
     if order.report:
         complaints += _write_report(folder, recording, console)
     return DriveOutcome(figures, folder, [folder.recording], complaints)
@@ -105,9 +107,11 @@ def _tell_snapshots(
     saved = saved_snapshots(folder.recording)
     for place in saved:
         recording = open_recording(place)
-        verdict = sentences(audit(recording), recording)[-1]
+        audits = audit(recording)
+        found = losses(recording, audits)
+        verdict = sentences(audits, found)[-1]
         console.print(f'{place.name}: {verdict}', soft_wrap=True, highlight=False)
-        complaints += recording.warnings
+        complaints += [*recording.warnings, *(f'{place.name}: {words}' for words in found.complaints())]
     parameters = _recorder_parameters(order)
     console.print(snapshots_sentence(len(saved), parameters), soft_wrap=True, highlight=False)
     figures = summarise_snapshots(saved, run)
@@ -120,25 +124,32 @@ def _recorder_parameters(order: DriveOrder) -> RecorderParameters:
 
 
 def _evaluate(
-    order: DriveOrder, folder: RunFolder, recording: Recording, run: dict[str, Any], console: Console
+    order: DriveOrder,
+    folder: RunFolder,
+    recording: Recording,
+    run: dict[str, Any],
+    console: Console,
+    complaints: list[str],
 ) -> dict[str, Any]:
-    drive_data = load_drive(recording, run['excitation_start'])
+    drive_data = load_drive(recording, time_axis(recording).zero)
     audits = audit(recording)
-    figures = summarise(recording, audits, drive_data, order.parameters, run)
+    found = losses(recording, audits)
+    complaints += [*found.complaints(), *samples_at_the_ends(recording, audits, run['samples'])]
+    figures = summarise(recording, audits, found, drive_data, order.parameters, run)
     if order.report:
-        _draw(order, folder, drive_data)
+        _draw(order, folder, drive_data, figures['excitation_start_s'])
     write_json(figures, folder.summary)
-    print_summary(figures, console)
+    print_summary(figures, found, console)
     console.print(as_table(audits))
     return figures
 
 
-def _draw(order: DriveOrder, folder: RunFolder, drive_data: Drive) -> None:
+def _draw(order: DriveOrder, folder: RunFolder, drive_data: Drive, begin: float) -> None:
     from mount_bringup.figure import draw_drive  # after the drive: what draws takes a second to load
 
     control = control_parameters(order.parameters)
     title = f'{order.scenario}, {order.mode}: mount displacement and actuator current'
-    draw_drive(drive_data, control.switch_on_level, control.switch_off_level, title, folder.figure)
+    draw_drive(drive_data, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)
 
 
 def _write_report(folder: RunFolder, recording: Recording, console: Console) -> list[str]:

@@ -1,4 +1,4 @@
-"""Figures of a drive from its recording: gaps, switching, peaks, tracking, losses."""
+"""The signals of a drive from its recording, and how well friction followed what was wanted."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ _MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_accelerati
 
 @dataclass(frozen=True)
 class Switching:
-    """When damping went on and off, s from the start of the excitation."""
+    """When damping went on and off, s."""
 
     on: tuple[float, ...]
     off: tuple[float, ...]
@@ -29,7 +29,7 @@ class Switching:
 
 @dataclass(frozen=True)
 class Drive:
-    """The signals of one drive on their common samples, time in s from the start of the excitation."""
+    """The signals of one drive on their common samples, time in s from the stamp `zero` (ns)."""
 
     time: NDArray[np.float64]
     displacement: NDArray[np.float64]
@@ -38,15 +38,14 @@ class Drive:
     true_time: NDArray[np.float64]
     true_velocity: NDArray[np.float64]
     friction_force: NDArray[np.float64]
-    excitation_start: int  # ns
+    zero: int
 
 
-def load_drive(recording: Recording, excitation_start: float) -> Drive:
-    """Read the signals of a drive whose excitation began `excitation_start` s after its first sample."""
+def load_drive(recording: Recording, zero: int) -> Drive:
+    """Read the signals of a drive, with time from the stamp `zero` (ns) on."""
     names = ('displacement', 'control_trace', 'sim/truth')
     recording.load(names)
     displacement, trace, truth = (recording[name] for name in names)
-    zero = int(truth.stamps.min()) + round(excitation_start * _SECOND)
     shown, traced, seen = (np.argsort(series.stamps) for series in (displacement, trace, truth))
     stamps = displacement.stamps[shown]
     active = np.zeros(len(stamps), dtype=bool)
@@ -62,8 +61,29 @@ def load_drive(recording: Recording, excitation_start: float) -> Drive:
         true_time=(truth.stamps[seen] - zero) / _SECOND,
         true_velocity=truth['velocity'][seen],
         friction_force=truth['friction_force'][seen],
-        excitation_start=zero,
+        zero=zero,
     )
+
+
+def excitation_stamp(recording: Recording, start: float) -> int:
+    """Return the stamp (ns) at which the excitation began, `start` s after the plant's first sample."""
+    return int(recording['sim/truth'].stamps.min()) + round(start * _SECOND)
+
+
+def samples_at_the_ends(recording: Recording, topics: Mapping[str, TopicAudit], taken: int) -> list[str]:
+    """Return a sentence per topic with measurements that begins too late or ends too early.
+
+    Of these the stamps show nothing (`topics`: the audit); `taken` is the electronics' own count.
+    """
+    found = []
+    for name in _MEASURED:
+        missing = taken - (topics[recording.resolve(name)].expected or 0)
+        if missing > 0:
+            found.append(
+                f'{name}: {missing} of {taken} samples that the electronics took are missing before the '
+                'first or behind the last recorded one'
+            )
+    return found
 
 
 def _common(stamps: NDArray[np.int64], others: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -103,18 +123,3 @@ def wanted_force(
     wanted = damper.force(band_pass.filtered(band, drive.true_velocity))
     places = np.clip(np.searchsorted(drive.true_time, drive.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1)
     return wanted, places
-
-
-def lost_samples(recording: Recording, topics: Mapping[str, TopicAudit], samples_sent: int) -> int:
-    """Return how many messages with measurements are missing between the electronics and the recording.
-
-    Gaps are seen in the stamps (`topics`: the audit), what is missing at the ends against `samples_sent`, the
-    electronics' own count.
-    """
-    measured = [topics[recording.resolve(name)] for name in _MEASURED]
-    return sum(samples_sent - topic.present + (topic.duplicated or 0) for topic in measured)
-
-
-def unanswered_samples(recording: Recording, topics: Mapping[str, TopicAudit]) -> int:
-    """Return how many displacement samples got no setpoint while the controller was active, by the audit."""
-    return topics[recording.resolve('displacement')].unanswered or 0

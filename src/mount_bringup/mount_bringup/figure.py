@@ -17,17 +17,18 @@ _SHORTEST = 1.0  # s, chosen: a drive that never reached its excitation is shown
 _BLUE, _RED, _GREY = '#1f5fa8', '#b03030', '#666666'
 
 
-def draw_drive(drive: Drive, on_level: float, off_level: float, title: str, file: Path) -> None:
+def draw_drive(drive: Drive, on_level: float, off_level: float, begin: float, title: str, file: Path) -> None:
     """Write the picture of `drive` to `file` (PNG); levels in m.
 
-    Left the whole drive; right, where damping was switched on, the first time in detail as in Fig. 15.
+    Left the drive from `begin` (s) on; right, where damping was switched on, the first time in detail as in
+    Fig. 15.
     """
     times = switching(drive)
     first = next(iter(times.on), None)
     picture = Figure(figsize=(12.0 if first is not None else 9.0, 6.0), layout='constrained')
     columns = 1 if first is None else 2
     axes = picture.subplots(2, columns, sharex='col', height_ratios=(3, 2), squeeze=False)
-    whole = (min(0.0, float(drive.time[-1]) - _SHORTEST), float(drive.time[-1]))
+    whole = (min(begin, float(drive.time[-1]) - _SHORTEST), float(drive.time[-1]))
     _draw_column(axes[:, 0], drive, on_level, off_level, whole)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     picture.legend(handles, labels, loc='outside lower center', ncols=3, fontsize='small')
@@ -58,7 +59,7 @@ def _draw_column(
         each.grid(alpha=0.25)
         each.set_xlim(*limits)
     lower.set_ylim(bottom=0.0)
-    lower.set_xlabel('time from the start of the excitation (s)')
+    lower.set_xlabel('time from the first sample (s)')
 
 
 def _shade_damping(axes: Axes, drive: Drive) -> None:

@@ -4,8 +4,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from mount_models.quantity import ParameterError
+from mount_sim.parameters import SimParameters
 
 ALWAYS_ON = 'friction_always_on'
+
+
+def seat_of(settings: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the name of the mount in the seat; a real one is a friction mount."""
+    return str(settings.get('mount_sim', {}).get('mount', SimParameters().mount))
 
 
 def with_control_of_mount(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

@@ -10,10 +10,12 @@ from mount_bags.report.signals import Signals
 from mount_bags.report.subject import RunFacts, Tracking
 from mount_bringup.core.chain import Parameters, chosen_damper, control_parameters
 from mount_bringup.evaluation import load_drive, tracking_error, wanted_force
+from mount_bringup.mount_choice import seat_of
 from mount_bringup.settings import DEFAULT_DAMPER
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
+from mount_sim.mounts import without_friction
 
 _NEEDED = (DISPLACEMENT, CONTROL_TRACE, SIM_TRUTH)
 _NO_SESSION = 'the recording has no session message that tells them'
@@ -33,18 +35,22 @@ def run_facts(signals: Signals) -> RunFacts:
     try:
         control = control_parameters(parameters)
         coil = with_flattened(RippleCoil(), parameters.get('mount_sim', {}), 'coil')
+        no_friction = without_friction(seat_of(parameters))
     except (ValueError, TypeError, AttributeError) as error:
         return RunFacts(
             levels_remark=f'the parameters of the session cannot be used: {error}',
             tracking_remark=f'the parameters of the session cannot be used: {error}',
         )
-    tracking, remark = _tracking(signals, parameters)
+    tracking, remark = (None, f'not applicable: {no_friction}')
+    if not no_friction:
+        tracking, remark = _tracking(signals, parameters)
     return RunFacts(
         levels=Levels(control.switch_on_level, control.switch_off_level, control.highest_current),
         resistance=coil.resistance,
         resistance_remark=f'R = {coil.resistance:g} ohm, limit {control.highest_current:g} A',
         tracking=tracking,
         tracking_remark=remark,
+        without_friction=no_friction,
     )
 
 
@@ -67,15 +73,14 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
         return None, f'what was not recorded is needed: {", ".join(lacking)}'
     try:
         control, damper = control_parameters(parameters), chosen_damper(parameters)
-        drive = load_drive(recording, 0.0)
+        drive = load_drive(recording, signals.zero)
         wanted, _ = wanted_force(drive, control, damper)
         error = tracking_error(drive, control, damper)
     except (ValueError, KeyError) as reason:
         return None, f'it cannot be computed: {reason}'
-    shift = (drive.excitation_start - signals.zero) / 1e9
     # What the controller wants while damping is off is no force.
     active = np.interp(drive.true_time, drive.time, drive.damping_active.astype(float)) > 0.5
     shown = np.where(active, wanted, 0.0)
-    tracking = Tracking(drive.true_time + shift, shown, drive.friction_force, error)
+    tracking = Tracking(drive.true_time, shown, drive.friction_force, error)
     chosen = parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER)
     return tracking, f'wanted is the force of damper {chosen} at the true velocity in the band, without delay'

@@ -1,9 +1,9 @@
-"""How often a node that refuses to be activated is asked again."""
+"""How often a node that refuses to be activated is asked again, and in which order nodes end."""
 
 import pytest
 
 from mount_bringup.graph import supervisor
-from mount_bringup.graph.nodes import DRIVER, INIT, SIM, GraphSettings
+from mount_bringup.graph.nodes import DRIVER, INIT, SIM, SIMULATED, VEHICLE, GraphSettings, ending_order
 from mount_bringup.graph.supervisor import GraphError, Supervisor
 
 
@@ -62,3 +62,9 @@ def test_a_machine_that_stays_late_is_given_up(tmp_path, monkeypatch):
     with pytest.raises(GraphError):
         graph.activate()
     assert graph.asked == 1
+
+
+def test_electronics_outlive_whoever_watches_them_and_the_recorder_outlives_all():
+    ended = [node.name for node in ending_order(SIMULATED)]
+    assert ended == ['mount_control', 'mount_init', 'mount_driver', 'mount_sim', 'mount_recorder']
+    assert [node.name for node in ending_order(VEHICLE)] == [name for name in ended if name != 'mount_sim']

@@ -112,7 +112,7 @@ def tracking(seed, file):
         true_time=(stamps[topics.SIM_TRUTH.name] - zero) / 1e9,
         true_velocity=truth['velocity'],
         friction_force=truth['friction_force'],
-        excitation_start=zero,
+        zero=zero,
     )
     assert active.mean() > 0.3
     return tracking_error(drive, control_parameters(settings), chosen_damper(settings))

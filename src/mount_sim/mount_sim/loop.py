@@ -60,10 +60,13 @@ class ElectronicsLoop:
         self.last_latency = math.nan
 
     def run_in_real_time(self, ending: threading.Event) -> None:
-        """Sample at 1 kHz of the electronics' clock until the run is over or `ending` is set."""
+        """Sample at 1 kHz of the electronics' clock until `ending` is set, behind the end of the run too.
+
+        Electronics do not fall silent when a drive is over; if they did, the control would rightly report it.
+        """
         period = SAMPLE_TIME / (1.0 + self._electronics.clock_drift)
         begin = time.monotonic()
-        while not self._mount.finished and not ending.is_set():
+        while not ending.is_set():
             self.step_in_real_time()
             self.figures.wall_time = time.monotonic() - begin
             remaining = begin + self._mount.sample * period - time.monotonic()

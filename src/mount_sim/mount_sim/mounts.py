@@ -40,3 +40,11 @@ def seated_mount(name: str) -> SeatedMount:
     if name == 'elastomer':
         return SeatedMount(int(Contents.NOTHING))
     return SeatedMount(driver_opens=name == 'friction_off')
+
+
+def without_friction(name: str) -> str:
+    """Return why a control can make no friction in a mount of `MOUNTS`, empty where it can."""
+    seated = seated_mount(name)
+    if seated.contents != Contents.PADS:
+        return f'mount {name} has no friction contact'
+    return f'in mount {name} the coil driver is open' if seated.driver_opens else ''

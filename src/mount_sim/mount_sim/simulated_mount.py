@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics import Noise, Reading
-from mount_sim.excitation import Excitation
+from mount_sim.excitation import Excitation, Seat
 from mount_sim.plant import Memory, Plant, PlantSimulation
 
 
@@ -54,6 +54,7 @@ class SimulatedMount:
         if excitation.engine_forces is not None:
             self._engine_forces = _per_sample(excitation.engine_forces, start, self._steps)
         self._no_force = np.zeros(self._steps)
+        self._afterwards = np.full(self._steps, _afterwards(excitation))
         self._driver_opens = plant.mount.driver_opens
         self.run = Run(len(self._values), start)
         self.sample = 0
@@ -92,15 +93,19 @@ class SimulatedMount:
     def advance(self, setpoint: float | None, late: int = 0) -> None:
         """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
 
-        `late` is the number of samples since it was due.
+        `late` is the number of samples since it was due. Behind the end of the run nothing shakes the mount
+        any more.
         """
         if setpoint is None:
             self._silent += 1
         else:
             self._silent, self._current = late, setpoint
         current = self._current if self.enabled and not self._driver_open else 0.0
-        forces = self._no_force if self._engine_forces is None else self._engine_forces[self.sample]
-        self._plant.advance(self._values[self.sample], forces, current)
+        values, forces = self._afterwards, self._no_force
+        if not self.finished:
+            values = self._values[self.sample]
+            forces = forces if self._engine_forces is None else self._engine_forces[self.sample]
+        self._plant.advance(values, forces, current)
         self.sample += 1
 
     def ahead(self, count: int) -> Ahead:
@@ -125,6 +130,12 @@ class SimulatedMount:
     @property
     def _driver_open(self) -> bool:
         return self._driver_opens and self.sample >= self.run.excitation_start
+
+
+def _afterwards(excitation: Excitation) -> float:
+    """Return what the excitation is behind its end: rack and road stay where they are."""
+    still = excitation.seat is Seat.ACCELERATED_CHASSIS or not len(excitation.values)
+    return 0.0 if still else float(excitation.values[-1])
 
 
 def _per_sample(series: NDArray[np.float64], start: int, steps: int) -> NDArray[np.float64]:

@@ -32,6 +32,21 @@ def test_a_run_is_the_rest_and_then_the_excitation(make_mount, drive):
     assert (truth['displacement'][102:] != 0.0).all()
 
 
+@pytest.mark.parametrize('scenario', ['bench', 'motorway'])
+def test_behind_the_end_of_the_run_nothing_shakes_the_mount(make_mount, drive, scenario):
+    mount = make_mount(
+        scenario=scenario, timeline__duration=0.33, motorway__gap_depth=0.0, idle__amplitude=0.0
+    )
+    _, truth = drive(mount)
+    road = truth['road_height'][-1]
+    for _ in range(3000):
+        mount.advance(None)
+        mount.measure()
+    assert mount.sample == 3330
+    assert mount.truth['road_height'] == pytest.approx(road, abs=1e-4)
+    assert abs(mount.truth['velocity']) < 1e-5
+
+
 def test_a_setpoint_takes_effect_at_the_sample_after_the_one_it_answers(make_mount):
     """As on the bus: the answer to sample k is there when sample k+1 is taken, and acts from then on."""
     mount, answer, currents = make_mount(), None, []

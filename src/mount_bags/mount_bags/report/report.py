@@ -7,6 +7,7 @@ from pathlib import Path
 from mount_bags.alignment import ComparisonError, align
 from mount_bags.audit import audit
 from mount_bags.compare import Comparison
+from mount_bags.losses import losses
 from mount_bags.reading import Recording
 from mount_bags.report import run_sections, sections
 from mount_bags.report.interactive import POINTS
@@ -56,7 +57,7 @@ def subjects_of(
 ) -> list[Subject]:
     """Return the recordings as subjects of one report, on one time axis.
 
-    Time begins with the first sample of each; a recording whose stamps are those of the first one, such as a
+    Each has its own time axis; a recording whose stamps are those of the first one, such as a
     cut or a replay, keeps its place on the first one's axis. Raises `ReportError` for too many.
     """
     if len(recordings) > _TOGETHER:
@@ -77,10 +78,11 @@ def make_report(
     on_step: OnStep = lambda what, share: None,
 ) -> Report:
     """Return the report of `subjects`; a `comparison` adds the differences that it found."""
-    audits = []
+    audits, found = [], []
     for place, subject in enumerate(subjects):
         on_step(f'auditing {subject.name}', 0.3 * place / len(subjects))
         audits.append(audit(subject.signals.recording))
+        found.append(losses(subject.signals.recording, audits[-1]))
     makers: list[tuple[str, Callable[[], Section | None]]] = [
         ('traces', lambda: sections.traces(subjects)),
         ('signals', lambda: sections.plain(subjects)),
@@ -91,7 +93,7 @@ def make_report(
         ('sweep', lambda: sections.sweep_view(subjects)),
         ('coil', lambda: run_sections.coil(subjects)),
         ('tracking', lambda: run_sections.tracking(subjects)),
-        ('losses', lambda: run_sections.losses(subjects, audits)),
+        ('losses', lambda: run_sections.losses(subjects, audits, found)),
         ('differences', lambda: None if comparison is None else run_sections.differences(comparison)),
         ('parameters', lambda: run_sections.parameters(subjects)),
     ]
@@ -102,7 +104,7 @@ def make_report(
         if section is not None:
             made.append(section)
     # Last, for it also says what the others looked for in vain.
-    overview = run_sections.overview(subjects, audits)
+    overview = run_sections.overview(subjects, audits, found)
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
     return Report(title, [overview, *made], POINTS // len(subjects))
 

@@ -10,6 +10,8 @@ from mount_bags.audit_report import sentences as audit_sentences
 from mount_bags.compare import Comparison
 from mount_bags.comparison_words import by_importance
 from mount_bags.comparison_words import sentences as comparison_sentences
+from mount_bags.losses import Losses
+from mount_bags.peak_current import peak_current
 from mount_bags.quantity_text import quantity_text, time_text
 from mount_bags.report import figures
 from mount_bags.report.coil_load import CoilLoad, coil_load
@@ -26,9 +28,12 @@ _ROWS = 25  # of the table of differences
 _HEAD_OF_SESSION = ('scenario', 'mode', 'started')
 
 
-def overview(subjects: Sequence[Subject], audits: Sequence[dict[str, TopicAudit]]) -> Section:
+Audits = Sequence[dict[str, TopicAudit]]
+
+
+def overview(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses]) -> Section:
     """Return the figures that one wants to see first, and what the recordings lack, in words."""
-    columns = [_figures(subject, topics) for subject, topics in zip(subjects, audits, strict=True)]
+    columns = [_figures(*each) for each in zip(subjects, audits, found, strict=True)]
     rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
     words, said = [], Sentences(subjects)
     for subject in subjects:
@@ -47,6 +52,9 @@ def coil(subjects: Sequence[Subject]) -> Section:
     said, rows = Sentences(subjects), []
     for subject in subjects:
         prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
+        if subject.facts.without_friction:
+            said.say(subject, f'not applicable: {subject.facts.without_friction}')
+            continue
         current, what = _current(subject)
         if current is None:
             said.say(subject, 'no current was recorded')
@@ -88,13 +96,16 @@ def tracking(subjects: Sequence[Subject]) -> Section:
     return Section('tracking', 'Tracking error against the truth', said.told(), chart)
 
 
-def losses(subjects: Sequence[Subject], audits: Sequence[dict[str, TopicAudit]]) -> Section:
-    """Return what is missing of each topic."""
+def losses(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses]) -> Section:
+    """Return what is missing of each topic, and the faults."""
     words, tables = [], []
-    for subject, topics in zip(subjects, audits, strict=True):
+    for subject, topics, figure in zip(subjects, audits, found, strict=True):
         prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
-        told = audit_sentences(topics, subject.signals.recording)
+        told = audit_sentences(topics, figure)
         words.append(f'{prefix}{told[-1]}')
+        if figure.faults:
+            faults = [(time_text(fault.time), fault.node, fault.sentence) for fault in figure.faults]
+            tables.append(Table(('time', 'node', 'fault'), faults, f'{prefix}faults'))
         rows = [
             (
                 name,
@@ -110,7 +121,7 @@ def losses(subjects: Sequence[Subject], audits: Sequence[dict[str, TopicAudit]])
             'topic', 'expected', 'present', 'lost', 'twice', 'longest gap (ms)', 'jitter (µs)', 'remark',
         )  # fmt: skip
         tables.append(Table(head, rows, prefix.removesuffix(': '), marked))
-    return Section('losses', 'Samples lost', words, None, tables)
+    return Section('losses', 'Losses and faults', words, None, tables)
 
 
 def differences(comparison: Comparison) -> Section:
@@ -118,8 +129,6 @@ def differences(comparison: Comparison) -> Section:
     alignment = comparison.alignment
     words = [
         f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment.sentence}.',
-        f'Times here are from the first message of A; its first sample of {alignment.anchor} is at '
-        f'{alignment.anchor_time:.3f} s.',
         *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
     ]
     ordered = by_importance(comparison)
@@ -185,30 +194,37 @@ def _value(values: dict, name: str) -> str:
     )
 
 
-def _figures(subject: Subject, topics: dict[str, TopicAudit]) -> dict[str, str]:
+def _figures(subject: Subject, topics: dict[str, TopicAudit], found: Losses) -> dict[str, str]:
     recording, session = subject.signals.recording, session_values(subject.signals.session)
     moved = subject.displacement()
-    current = subject.signals.signal(CURRENT_SETPOINT.name, 'coil_current')
-    spans = subject.signals.damping()
-    lost = sum(entry.lost or 0 for entry in topics.values())
-    told = any(entry.lost is not None for entry in topics.values())
-    tracking_error = subject.facts.tracking.error if subject.facts.tracking else math.nan
     return {
         'recording': str(recording.path),
         **{name: str(session.get(name, 'not known')) for name in _HEAD_OF_SESSION},
         'messages': str(recording.message_count),
         'length': 'not known' if moved is None else quantity_text(float(np.ptp(moved.time)), 's', 5),
-        'highest displacement': _highest(moved, 'm'),
-        'highest current setpoint': _highest(current, 'A'),
+        'peak displacement': _highest(moved, 'm'),
+        **_friction_figures(subject, topics),
+        **dict(found.rows()),
+    }
+
+
+def _friction_figures(subject: Subject, topics: dict[str, TopicAudit]) -> dict[str, str]:
+    if subject.facts.without_friction:
+        names = ('peak current', 'damping switched on', 'friction force error')
+        return dict.fromkeys(names, f'not applicable: {subject.facts.without_friction}')
+    spans = subject.signals.damping()
+    peak = peak_current(subject.signals.recording, topics)
+    error = subject.facts.tracking.error if subject.facts.tracking else math.nan
+    return {
+        'peak current': 'not recorded' if math.isnan(peak) else quantity_text(peak, 'A'),
         'damping switched on': 'not recorded'
         if spans is None
         else f'{len(spans)} times'
         if len(spans) != 1
         else 'once',
         'friction force error': 'not known'
-        if math.isnan(tracking_error)
-        else f'{100.0 * tracking_error:.1f} % rms of the peak wanted force',
-        'messages lost': str(lost) if told else 'cannot be told',
+        if math.isnan(error)
+        else f'{100.0 * error:.1f} % rms of the peak wanted force',
     }
 
 

@@ -42,7 +42,8 @@ def traces(subjects: Sequence[Subject]) -> Section:
     words = []
     levels = next((each.facts.levels for each in subjects if each.facts.levels != Levels()), Levels())
     damping: list[tuple[float, float]] = next(
-        (spans for each in subjects if (spans := each.signals.damping())), []
+        (spans for each in subjects if not each.facts.without_friction and (spans := each.signals.damping())),
+        [],
     )
     if len(subjects) > 1 and damping:
         words.append(f'Shaded: damping on in {subjects[0].name}.')
@@ -51,8 +52,9 @@ def traces(subjects: Sequence[Subject]) -> Section:
     words += _absent(subjects, (Subject.displacement, 'no displacement'), (_setpoint, 'no current setpoint'))
     chart = None
     if moved or currents:
-        longest = max(float(series.x[-1]) for series in (*moved, *currents))
-        chart = figures.time_traces(moved, currents, levels, damping, limits=(0.0, longest))
+        first = min(float(series.x[0]) for series in (*moved, *currents))
+        last = max(float(series.x[-1]) for series in (*moved, *currents))
+        chart = figures.time_traces(moved, currents, levels, damping, limits=(first, last))
     return Section('traces', 'Displacement and current', words, chart)
 
 
@@ -61,16 +63,16 @@ def switching(subjects: Sequence[Subject]) -> Section:
     said, tables = Sentences(subjects), []
     for subject in subjects:
         spans = subject.signals.damping()
-        if spans is None:
+        if subject.facts.without_friction:
+            said.say(subject, f'damping is not applicable: {subject.facts.without_friction}')
+        elif spans is None:
             said.say(subject, 'when damping was switched was not recorded')
         elif not spans:
             said.say(subject, 'damping was never switched on')
         else:
             tables.append(_switching_table(subjects, subject, spans))
         if marks := subject.signals.marks():
-            rows = [
-                (_time_cell(subject.signals.seconds(mark)), mark.kind, mark.text) for mark in marks[:_TOLD]
-            ]
+            rows = [(_time_cell(time), mark.kind, mark.text) for time, mark in marks[:_TOLD]]
             tables.append(Table(('time (s)', 'kind', 'text'), rows, f'{_of(subjects, subject)}marks'))
     return Section('switching', 'Switching and marks', said.told(), None, tables)
 
@@ -355,4 +357,4 @@ def _band_cell(series: Named, edge: float) -> str:
 
 
 def _time_cell(seconds: float) -> str:
-    return 'of another clock' if np.isnan(seconds) else f'{seconds:.3f}'
+    return f'{seconds:.3f}'

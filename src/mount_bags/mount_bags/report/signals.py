@@ -11,22 +11,13 @@ from mount_bags.report.chart import Array
 from mount_bags.series import Series, SeriesError
 from mount_bags.session_differences import session_text
 from mount_bags.switching_changes import switching_times
-from mount_ros.topics import (
-    COIL_RIPPLE,
-    CONTROL_TRACE,
-    CURRENT_SETPOINT,
-    DISPLACEMENT,
-    EVENT,
-    SIM_TRUTH,
-)
-
-_ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)
-_OTHER_CLOCK = 86_400_000_000_000  # ns, chosen: marks so far off are of another clock
+from mount_bags.time_axis import time_axis
+from mount_ros.topics import CONTROL_TRACE, EVENT
 
 
 @dataclass(frozen=True)
 class Signal:
-    """One signal: times in s from the first sample of the recording, rising, and values in SI units."""
+    """One signal: times in s on the recording's time axis, rising, and values in SI units."""
 
     time: Array
     values: Array
@@ -36,12 +27,13 @@ class Signals:
     """The signals of one recording. What is asked for and not there is noted in `missing`, in words."""
 
     def __init__(self, recording: Recording, name: str = '', zero: int | None = None):
-        """Take a recording and what to call it; `zero` (ns) is where its time begins, if not at its start."""
+        """Take a recording and what to call it; `zero` (ns): where time begins, if not as its axis says."""
         self.recording = recording
         self.name = name or short_name(recording)
         self.missing: list[str] = []
         self._found: dict[tuple[str, str], Signal | None] = {}
-        self.zero = self._first_stamp() if zero is None else zero
+        self.axis = time_axis(recording)
+        self.zero = self.axis.zero if zero is None else zero
 
     @property
     def session(self) -> str:
@@ -77,31 +69,21 @@ class Signals:
         ends = np.append(off, active.time[-1])
         return [(float(begin), float(ends[np.searchsorted(ends, begin)])) for begin in on]
 
-    def marks(self) -> list[Mark]:
-        """Return its marks, none where there is no readable topic of them."""
+    def marks(self) -> list[tuple[float, Mark]]:
+        """Return its marks with their times (s), none where there is no readable topic of them."""
+        shift = (self.axis.zero - self.zero) / 1e9
         try:
-            return read_marks(self.recording[EVENT.name]) if EVENT.name in self.recording else []
+            if EVENT.name not in self.recording:
+                return []
+            series = self.recording[EVENT.name]
+            logged = zip(read_marks(series), series.receive_times.tolist(), strict=True)
+            return [(self.axis.of_mark(mark.time, time) + shift, mark) for mark, time in logged]
         except (ReadingError, SeriesError, AttributeError):
             return []
-
-    def seconds(self, mark: Mark) -> float:
-        """Return the time of a mark in s from the first sample, NaN where it is of another clock."""
-        passed = mark.time - self.zero
-        return passed / 1e9 if abs(passed) < _OTHER_CLOCK else float('nan')
 
     def _ordered(self, series: Series, values: Array) -> Signal:
         stamps, places = np.unique(series.stamps, return_index=True)
         return Signal((stamps - self.zero) / 1e9, np.asarray(values, np.float64)[places])
-
-    def _first_stamp(self) -> int:
-        for topic in _ANCHORS:
-            try:
-                if topic.name in self.recording and len(self.recording[topic.name]):
-                    return int(self.recording[topic.name].stamps.min())
-            except SeriesError:
-                continue
-        found = self.recording.time_range
-        return found[0] if found else 0
 
     def _absence(self, topic: str) -> str:
         alike = [name for name in self.recording if name.endswith(f'/{topic}')]

@@ -38,6 +38,7 @@ class RunFacts:
     resistance_remark: str = 'the resistance of the coil is not known'
     tracking: Tracking | None = None
     tracking_remark: str = 'what the controller wanted is not known'
+    without_friction: str = ''  # why figures of friction are not applicable
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,8 @@ class Subject:
         return measured or self.signals.signal(SIM_TRUTH.name, 'mount_force')
 
     def friction_force(self) -> Signal | None:
-        """Return the true friction force (N)."""
-        return self.signals.signal(SIM_TRUTH.name, 'friction_force')
+        """Return the true friction force (N), None where the mount has none."""
+        return None if self.facts.without_friction else self.signals.signal(SIM_TRUTH.name, 'friction_force')
 
     def active_from(self) -> float:
         """Return when control began to answer (s), the beginning of the recording if it does not tell."""

@@ -8,7 +8,8 @@ from rich.console import Console
 
 from mount_bringup.commands.options import JsonFile
 
-EPILOG = """Exit code: 0 when nothing is known to be lost, 1 on loss, on damage, or when nothing can be read.
+EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
+control left samples without a setpoint, on faults, or when nothing can be read.
 
 Examples:
 
@@ -18,7 +19,8 @@ Examples:
 
 A topic with a rate is judged by its stamps, every topic by what the recorder, the file or its
 metadata counted. Expected = present - duplicated + lost. Jitter is the rms deviation of the steps between
-neighbouring stamps. The JSON holds for each topic `expected`, `present`, `lost`, `duplicated`,
+neighbouring stamps. Samples lost, samples unanswered and faults are the figures of `drive` and `report`.
+The JSON holds them, and below `topics` for each topic `expected`, `present`, `lost`, `duplicated`,
 `longest_gap_s` and more; unknown is null.
 """
 
@@ -27,26 +29,28 @@ def audit(
     recording: Annotated[Path, typer.Argument(help='folder of a recording, or one of its files')],
     json_file: JsonFile = None,
 ) -> None:
-    """Tell whether anything was lost in a recording; exit code 1 if so."""
+    """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
     import json
 
     from mount_bags.audit import audit as audited
-    from mount_bags.audit_report import as_json, as_table, is_lossless, latency_lines, sentences
+    from mount_bags.audit_report import as_json, as_table, latency_lines, sentences
+    from mount_bags.losses import losses
     from mount_bags.reading import open_recording
 
     console = Console()
     with console.status('reading'):
         opened = open_recording(recording)
         audits = audited(opened)
+        found = losses(opened, audits)
     console.print(as_table(audits))
     for line in latency_lines(audits):
         console.print(line, soft_wrap=True, highlight=False)
-    for sentence in sentences(audits, opened):
+    for sentence in sentences(audits, found):
         console.print(sentence, soft_wrap=True, highlight=False, markup=False)
     for warning in opened.warnings:
         console.print('[yellow]note[/yellow]', end=' ')
         console.print(warning, soft_wrap=True, highlight=False, markup=False)
     if json_file is not None:
-        json_file.write_text(json.dumps(as_json(audits), indent=2) + '\n', encoding='utf-8')
-    if not is_lossless(audits, opened):
+        json_file.write_text(json.dumps(as_json(audits, found), indent=2) + '\n', encoding='utf-8')
+    if not found.sound:
         raise typer.Exit(1)

@@ -60,7 +60,7 @@ def compare(
     if comparison.differing:
         console.print(as_table(comparison))
     console.print(
-        f'Times are from the first message of A; {comparison.alignment.sentence}.',
+        f'Times are from the first displacement sample of A; {comparison.alignment.sentence}.',
         soft_wrap=True,
         highlight=False,
     )

@@ -19,10 +19,10 @@ EPILOG = """Examples:
 def cut(
     recording: Annotated[Path, typer.Argument(help='folder of a recording or run, or an MCAP file')],
     begin: Annotated[
-        str, typer.Option('--from', metavar='TIME', help='from the first message, such as 12s')
+        str, typer.Option('--from', metavar='TIME', help='from the first displacement sample, such as 12s')
     ] = '',
     end: Annotated[
-        str, typer.Option('--to', metavar='TIME', help='from the first message, such as 20s')
+        str, typer.Option('--to', metavar='TIME', help='from the first displacement sample, such as 20s')
     ] = '',
     event: Annotated[
         str, typer.Option(help='around an event: its number, its kind, or kind:number, as in switch-on:2')
@@ -38,7 +38,8 @@ def cut(
     The times of the messages stay as they were, so the first message may be a session from long before.
     """
     from mount_bags.cut import cut as cut_recording
-    from mount_bags.recorded_events import find_event, seconds_into
+    from mount_bags.recorded_events import event_time, find_event
+    from mount_bags.time_axis import time_axis
     from mount_bringup.recording_path import open_run
 
     if bool(event) == bool(begin or end):
@@ -48,7 +49,7 @@ def cut(
     reason = ''
     if event:
         found = find_event(opened, event)
-        time = seconds_into(opened, found.log_time)
+        time = event_time(found, time_axis(opened))
         first, last = max(0.0, time - _seconds(before)), time + _seconds(after)
         reason = f'{found.kind} at {time:.3f} s' + (f': {found.text}' if found.text else '')
     target = out or _beside(opened.path, first, last)

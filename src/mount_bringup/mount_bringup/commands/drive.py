@@ -8,7 +8,13 @@ from rich.console import Console
 
 from mount_bringup.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
+control was active, no fault, and the recording whole; 1 when one of these did not hold, or nothing was
+driven, with the reason; 2 for a wrong use of the command; 130 when interrupted.
+
+Times are in s from the first displacement sample, as in `report`, `cut` and `compare`.
+
+Examples:
 
 `engine-mount drive` - a gap in the motorway, in real time
 

@@ -74,18 +74,20 @@ def record(
 def _told(folder: Path, console: Console) -> bool:
     """Print what is there of a recording, and return whether nothing is known to be lost."""
     from mount_bags.audit import audit
-    from mount_bags.audit_report import is_lossless, sentences
+    from mount_bags.audit_report import sentences
+    from mount_bags.losses import losses
     from mount_bags.reading import open_recording
 
     recording = open_recording(folder)
     audits = audit(recording)
+    found = losses(recording, audits)
     for warning in recording.warnings:
         _print('note', warning, console)
     if not any(entry.present for name, entry in audits.items() if name != '/diagnostics'):
         _print('note', 'only /diagnostics had messages; does a graph run in this domain, namespace?', console)
-    _print('audit', sentences(audits, recording)[-1], console)
+    _print('audit', sentences(audits, found)[-1], console)
     _print('recording', folder, console)
-    return is_lossless(audits, recording)
+    return found.lossless
 
 
 def _print(word: str, what: Any, console: Console) -> None:

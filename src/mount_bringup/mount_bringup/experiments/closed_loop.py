@@ -13,7 +13,7 @@ from rich.console import Console
 from mount_bags.reading import open_recording
 from mount_bringup.domain import chosen_domain
 from mount_bringup.drive import DriveOrder, record_drive
-from mount_bringup.evaluation import Drive, load_drive
+from mount_bringup.evaluation import Drive, excitation_stamp, load_drive
 from mount_bringup.experiments.contract import ExperimentError, Order
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.settings import defaults_of_nodes
@@ -88,17 +88,17 @@ def ride(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], experim
 
 
 def _read(recording: Any, place: Path, excitation_start: float) -> Ride:
-    seen = load_drive(recording, excitation_start)
+    seen = load_drive(recording, excitation_stamp(recording, excitation_start))
     truth, trace = recording['sim/truth'], recording['control_trace']
     order = np.argsort(truth.stamps)
-    order = order[truth.stamps[order] >= seen.excitation_start]
+    order = order[truth.stamps[order] >= seen.zero]
 
     def column(name: str) -> FloatArray:
         return np.asarray(truth[name][order], np.float64)
 
     return Ride(
         recording=place,
-        time=(truth.stamps[order] - seen.excitation_start) * 1e-9,
+        time=(truth.stamps[order] - seen.zero) * 1e-9,
         displacement=column('displacement'),
         velocity=column('velocity'),
         mount_force=column('mount_force'),
@@ -106,6 +106,6 @@ def _read(recording: Any, place: Path, excitation_start: float) -> Ride:
         chassis_acceleration=column('chassis_acceleration'),
         coil_current=column('coil_current'),
         seen=seen,
-        band_time=(trace.stamps - seen.excitation_start) * 1e-9,
+        band_time=(trace.stamps - seen.zero) * 1e-9,
         band_displacement=np.asarray(trace['band_displacement'], np.float64),
     )

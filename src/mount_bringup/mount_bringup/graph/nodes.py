@@ -1,6 +1,6 @@
-"""Which nodes make up the graph, and in which order they come to life."""
+"""Which nodes make up the graph, and in which order they come to life and end."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 
@@ -46,6 +46,15 @@ SIMULATED: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
 
 VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""
+
+
+def ending_order(nodes: Sequence[GraphNode]) -> list[GraphNode]:
+    """Return `nodes` as they end: last started first, but the electronics outlive the driver.
+
+    Real ones do. A driver whose electronics end first would rightly report that they are silent.
+    """
+    last = [node for node in (SIM, RECORDER) if node in nodes]
+    return [*(node for node in reversed(nodes) if node not in last), *last]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,15 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph.nodes import CONTROL, DRIVER, RECORDER, SIM, GraphNode, GraphSettings
+from mount_bringup.graph.nodes import (
+    CONTROL,
+    DRIVER,
+    RECORDER,
+    SIM,
+    GraphNode,
+    GraphSettings,
+    ending_order,
+)
 from mount_bringup.graph.processes import NodeProcess, end_all, start_processes
 from mount_ros.diagnostics import Level
 from mount_ros.leaving import leave_middleware
@@ -177,8 +185,8 @@ class Supervisor:
             raise GraphError(f'{node.name} refused to {label}: {self._reason(node)}')
 
     def stop(self) -> list[str]:
-        """End all nodes in reverse order and the supervisor's own; return a sentence per unclean end."""
-        for node in reversed(self._nodes):
+        """End all nodes and the supervisor's own; return a sentence per unclean end."""
+        for node in ending_order(self._nodes):
             self._try_to_deactivate(node)
         complaints = end_all(self._processes)
         if self._context.ok() and not leave_middleware(self._take_down):

@@ -19,7 +19,7 @@ _MICROAMPERE = 1e6
 
 @dataclass(frozen=True)
 class Moment:
-    """One setpoint in both: time in s from the recording's first message, currents in A."""
+    """One setpoint in both: time in s on the recording's time axis, currents in A."""
 
     time: float
     recorded: float
@@ -28,7 +28,7 @@ class Moment:
 
 @dataclass
 class Switching:
-    """When damping went on and off, s from the recording's first message."""
+    """When damping went on and off, s on the recording's time axis."""
 
     on: list[float] = field(default_factory=list)
     off: list[float] = field(default_factory=list)

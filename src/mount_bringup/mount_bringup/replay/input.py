@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from mount_bags.origin import short_name
 from mount_bags.reading import Recording
 from mount_bags.series import Payloads
+from mount_bags.time_axis import time_axis
 from mount_bringup.replay.ramps import MeasuredGap, Ramp, measured_gaps, ramps_of
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
@@ -95,7 +96,7 @@ class Messages:
 class ReplayInput:
     """Everything that goes into a replay; `notes` says in sentences what is not as one would expect.
 
-    `zero` is the stamp (ns) from which times are told, that of the recording's first message; `log_shift`
+    `zero` is the stamp (ns) from which times are told, the zero of the recording's time axis; `log_shift`
     (ns) leads from stamps to log times. `messages` are those of displacement, coil ripple and coil
     temperature by their relative names.
     """
@@ -128,7 +129,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     """
     recording.load(topic.name for topic in _READ if topic.name in recording)
     displacement = _displacement(recording)
-    notes = Notes(_zero(recording))
+    notes = Notes(time_axis(recording).zero)
     session = recorded_session(recording, notes)
     parameters = _parameters_of(session, notes)
     gaps = measured_gaps(recording)
@@ -157,13 +158,6 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     log_shift = int(series.receive_times[0] - series.stamps[0])
     name = short_name(recording)
     return ReplayInput(name, parts, parameters, answers, messages, notes.zero, log_shift, session, notes)
-
-
-def _zero(recording: Recording) -> int:
-    """Return the stamp (ns) that a sample would have which was received first of all."""
-    series, first = recording[topics.DISPLACEMENT.name], recording.time_range
-    assert first is not None
-    return int(series.stamps[0] - series.receive_times[0]) + first[0]
 
 
 def dated(gap: MeasuredGap, stamp: int) -> MeasuredGap:

@@ -27,7 +27,7 @@ _SHOWN = 8  # switchings in the printed summary
 
 
 def replay_figures(outcome: ReplayOutcome) -> dict[str, Any]:
-    """Return the figures of a replay; times in s from the recording's first message, unknown is null."""
+    """Return the figures of a replay; times in s on the recording's time axis, unknown is null."""
     given, replayed, found = outcome.given, outcome.replayed, outcome.difference
     now, before = replayed_switching(given, replayed), recorded_switching(given)
     changes = switching_changes(before, now) if before is not None else []

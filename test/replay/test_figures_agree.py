@@ -1,0 +1,189 @@
+"""Terminal, JSON, audit and report tell the same figures of a drive, of a good one and of a bad one."""
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import mount_bags
+from mount_bags.writer import BagWriter
+from mount_bringup import drive as driving
+from mount_bringup.command import app
+from mount_ros.cdr import serialised
+
+BENCH = (
+    '--core', '--scenario', 'bench', '--duration', '0.8', '--set', 'mount_sim.timeline.start=2.8',
+)  # fmt: skip
+SHARED = (
+    'samples', 'lost_samples', 'lost_messages', 'asked_samples', 'unanswered_samples', 'late_samples',
+    'faults',
+)  # fmt: skip
+STALLED = range(3100, 3326)  # samples without an answer of control
+LOST = range(3400, 3405)
+FAULTS = {3050 + 40 * number: f'fault number {number}' for number in range(7)}
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the commands say of one drive."""
+
+    codes: tuple[int, int]  # of drive and audit
+    terminal: str
+    summary: dict[str, Any]
+    audit: dict[str, Any]
+    audited: str
+    report: str
+
+
+def command(*arguments: str | Path):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], env={'COLUMNS': '1000'})
+
+
+def spoiled(folder: Path) -> None:
+    """Take samples and answers out of a recording, and add marks of faults."""
+    whole = mount_bags.open(folder)
+    series = {name: whole[name] for name in whole}
+    first = int(whole['displacement'].receive_times[0])
+    whole_messages = {
+        name: list(zip(each.receive_times.tolist(), each.payloads, strict=True))
+        for name, each in series.items()
+    }
+    for file in folder.iterdir():
+        file.unlink()
+    folder.rmdir()
+    writer = BagWriter(folder)
+    for name, messages in whole_messages.items():
+        writer.add_topic(name, series[name].type)
+        for time, payload in messages:
+            number = (time - first) // 1_000_000
+            answers, measures = name in ('/current_setpoint', '/control_trace'), name in (
+                '/displacement', '/coil_ripple',
+            )  # fmt: skip
+            stalled = number in STALLED and answers and time > first
+            if not (stalled or (number in LOST and (answers or measures))):
+                writer.write(name, bytes(payload), time)
+        if name == '/event':
+            for number, words in FAULTS.items():
+                writer.write(name, mark(words), first + number * 1_000_000)
+    writer.close()
+
+
+def mark(words: str) -> bytes:
+    from std_msgs.msg import String
+
+    return serialised(String(data=f'{{kind: fault, text: {words}}}'))
+
+
+def told(folder: Path, *options: str) -> Told:
+    drove = command('drive', *BENCH, '--out', folder, '--json', folder.with_suffix('.json'), *options)
+    audit_file = folder.with_suffix('.audit')
+    audited = command('audit', folder / 'recording', '--json', audit_file)
+    page = (folder / 'report.html').read_text(encoding='utf-8')
+    page = re.sub(r'<script.*?</script>', ' ', page, flags=re.DOTALL)
+    summary = json.loads((folder / 'summary.json').read_text())
+    assert json.loads(folder.with_suffix('.json').read_text()) == summary
+    return Told(
+        (drove.exit_code, audited.exit_code),
+        ' '.join(drove.output.replace('│', ' ').split()),
+        summary,
+        json.loads(audit_file.read_text()),
+        ' '.join(audited.output.split()),
+        ' '.join(re.sub(r'<[^>]+>', ' ', page).split()),
+    )
+
+
+@pytest.fixture(scope='module')
+def good(tmp_path_factory) -> Told:
+    return told(tmp_path_factory.mktemp('good') / 'run')
+
+
+@pytest.fixture(scope='module')
+def bad(tmp_path_factory) -> Told:
+    """The same drive, of which the recording was spoiled before anybody looked at it."""
+    record = driving.record_drive
+
+    def record_and_spoil(order, console):
+        folder, run, complaints = record(order, console)
+        spoiled(folder.recording)
+        return folder, run, complaints
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(driving, 'record_drive', record_and_spoil)
+        return told(tmp_path_factory.mktemp('bad') / 'run')
+
+
+def test_a_good_drive_ends_with_0_and_nothing_to_name(good):
+    assert good.codes == (0, 0)
+    assert {name: good.summary[name] for name in SHARED} == {
+        'samples': 3600,
+        'lost_samples': 0,
+        'lost_messages': 0,
+        'asked_samples': 850,
+        'unanswered_samples': 0,
+        'late_samples': None,
+        'faults': [],
+    }
+
+
+def test_a_bad_drive_ends_with_1_and_names_what_was_bad(bad):
+    assert bad.codes == (1, 1)
+    assert {name: bad.summary[name] for name in SHARED if name != 'faults'} == {
+        'samples': 3600,
+        'lost_samples': len(LOST),
+        'lost_messages': 2 * len(LOST),
+        'asked_samples': 850 - len(LOST),
+        'unanswered_samples': len(STALLED),
+        'late_samples': None,
+    }
+    sentences = [fault['sentence'] for fault in bad.summary['faults']]
+    assert sentences[2] == 'no setpoint in time for 227 ms (limit 20 ms): the coil went to 0 A'
+    assert sentences[:2] + sentences[3:] == list(FAULTS.values())
+    assert [fault['time_s'] for fault in bad.summary['faults']][:4] == pytest.approx(
+        [3.05, 3.09, 3.099, 3.13]
+    )
+    assert 'note faults: 8, the first at 3.050 s fault number 0' in bad.terminal
+
+
+@pytest.mark.parametrize('kind', ['good', 'bad'])
+def test_all_tell_the_same(kind, request):
+    found: Told = request.getfixturevalue(kind)
+    assert {name: found.audit[name] for name in SHARED} == {name: found.summary[name] for name in SHARED}
+    lost, unanswered, faults = (
+        re.search(pattern, found.audited)[1]
+        for pattern in (
+            r'samples lost: (\d+ of \d+(?: \(\d+ messages of all topics\))?)',
+            r'samples unanswered: (\d+ of \d+ while control was active)',
+            r'faults: (none|\d+: .* and \d+ more)',
+        )
+    )
+    for words in (f'samples lost {lost}', f'samples unanswered {unanswered}', f'faults {faults}'):
+        assert words in found.terminal
+        assert words in found.report
+    peak = found.summary['peak_current_a']
+    assert f'peak current {peak:.2f} A' in found.terminal
+    assert f'peak current {peak:.3g} A' in found.report
+
+
+def test_switching_is_told_on_the_same_axis(good):
+    on = good.summary['switch_on_s'][0]
+    assert on > good.summary['excitation_start_s'] == 2.8
+    assert f'damping switched on from {on:.2f} s to the end' in good.terminal
+    assert f'damping on on (s) off (s) lasted highest displacement highest current {on:.3f}' in good.report
+
+
+@pytest.mark.parametrize('mount', ['hydro', 'elastomer', 'friction_off'])
+def test_a_mount_in_which_control_can_do_nothing_has_no_figures_of_friction(tmp_path, mount):
+    found = told(tmp_path / 'run', '--mount', mount)
+    assert found.codes == (0, 0)
+    figures = ('switch_on_s', 'switch_off_s', 'peak_current_a', 'tracking_error_rms')
+    assert [found.summary[name] for name in figures] == [None] * 4
+    assert 'friction not applicable: ' in found.terminal
+    for words in ('damping switched', 'peak current', 'friction force error'):
+        assert words not in found.terminal
+    for words in ('damping switched on', 'peak current', 'friction force error'):
+        assert f'{words} not applicable: ' in found.report
+    assert 'rms error while damping is on' not in found.report
