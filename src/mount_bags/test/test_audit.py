@@ -2,8 +2,9 @@
 
 import json
 
+import numpy as np
 import pytest
-from recorded_drive import RECORDED, START, sample, write_drive
+from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
 from rich.console import Console
 
 import mount_bags
