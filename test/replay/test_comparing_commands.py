@@ -78,6 +78,18 @@ def test_recordings_without_common_topics_end_with_code_2(run, tmp_path):
     assert 'no topic is in both recordings' in result.output
 
 
+def test_what_cannot_be_compared_is_not_called_different(run, tmp_path):
+    for arguments in (
+        (run(), tmp_path / 'nope'),
+        (tmp_path / 'nope', run()),
+        (run(), run(), '--tolerance', 'curent=1%'),
+        (run(), run(), '--json', tmp_path / 'nope' / 'figures.json'),
+        (run(),),
+    ):
+        assert command('compare', *arguments).exit_code == 2
+    assert 'nope' in command('compare', run(), tmp_path / 'nope').output
+
+
 def test_cut_in_two_and_merged_a_drive_is_the_same(run, tmp_path):
     parts, whole = [tmp_path / 'begin', tmp_path / 'rest'], tmp_path / 'whole'
     assert command('cut', run(), '--to', '1500ms', '--out', parts[0]).exit_code == 0

@@ -4,6 +4,7 @@ import contextlib
 import math
 import platform
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
 from importlib import metadata
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.text import Text
 
 from mount_bags.audit import audit
 from mount_bags.audit_report import as_table, sentences
@@ -35,6 +37,7 @@ from mount_bringup.summary import (
     summarise_snapshots,
     write_json,
 )
+from mount_bringup.terminal import note
 from mount_models.quantity import with_flattened
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
@@ -76,9 +79,11 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
         return _tell_snapshots(order, folder, run, complaints, console)
     recording = open_recording(folder.recording)
     complaints += recording.warnings
-    figures = _evaluate(order, folder, recording, run, console)
+    drive_data = load_drive(recording, run['excitation_start'])
+    figures = _evaluate(order, folder, recording, drive_data, run, console)
     if order.report:
-        complaints += _write_report(folder, recording, console)
+        complaints += _complaint(lambda: _draw(order, folder, drive_data))
+        complaints += _complaint(lambda: _write_report(folder, recording, console))
     return DriveOutcome(figures, folder, [folder.recording], complaints)
 
 
@@ -103,10 +108,10 @@ def _tell_snapshots(
     for place in saved:
         recording = open_recording(place)
         verdict = sentences(audit(recording), recording)[-1]
-        console.print(f'{place.name}: {verdict}', soft_wrap=True, highlight=False)
+        console.print(f'{place.name}: {verdict}', soft_wrap=True)
         complaints += recording.warnings
     parameters = _recorder_parameters(order)
-    console.print(snapshots_sentence(len(saved), parameters), soft_wrap=True, highlight=False)
+    console.print(snapshots_sentence(len(saved), parameters), soft_wrap=True)
     figures = summarise_snapshots(saved, run)
     write_json(figures, folder.summary)
     return DriveOutcome(figures, folder, saved, complaints)
@@ -117,13 +122,15 @@ def _recorder_parameters(order: DriveOrder) -> RecorderParameters:
 
 
 def _evaluate(
-    order: DriveOrder, folder: RunFolder, recording: Recording, run: dict[str, Any], console: Console
+    order: DriveOrder,
+    folder: RunFolder,
+    recording: Recording,
+    drive_data: Drive,
+    run: dict[str, Any],
+    console: Console,
 ) -> dict[str, Any]:
-    drive_data = load_drive(recording, run['excitation_start'])
     audits = audit(recording)
     figures = summarise(recording, audits, drive_data, order.parameters, run)
-    if order.report:
-        _draw(order, folder, drive_data)
     write_json(figures, folder.summary)
     print_summary(figures, console)
     console.print(as_table(audits))
@@ -138,16 +145,18 @@ def _draw(order: DriveOrder, folder: RunFolder, drive_data: Drive) -> None:
     draw_drive(drive_data, control.switch_on_level, control.switch_off_level, title, folder.figure)
 
 
-def _write_report(folder: RunFolder, recording: Recording, console: Console) -> list[str]:
-    """Write the page about the run; what prevents it is a complaint, for the recording is there."""
-    from mount_bags.report.chart import ChartError  # after the drive, as above
-    from mount_bags.report.report import ReportError
-    from mount_bringup.report_pages import write_report
+def _write_report(folder: RunFolder, recording: Recording, console: Console) -> None:
+    from mount_bringup.report_pages import write_report  # after the drive, as above
 
+    write_report([recording], None, folder.report, None, console)
+
+
+def _complaint(make: Callable[[], None]) -> list[str]:
+    """Make a picture or page of a drive; what prevents it is a complaint, for the recording is there."""
     try:
-        write_report([recording], None, folder.report, None, console)
-    except (ReportError, ChartError) as error:
-        return [str(error)]
+        make()
+    except Exception as error:  # whatever it stumbles over
+        return [str(error) or type(error).__name__]
     return []
 
 
@@ -166,7 +175,10 @@ def _drive_graph(
     with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
         try:
             with console.status('starting') as status:
-                supervisor.start(lambda all_parameters: _session(order, all_parameters), status.update)
+                supervisor.start(
+                    lambda all_parameters: _session(order, all_parameters),
+                    lambda what: status.update(Text(what)),
+                )
             duration = excitation.start + excitation.duration
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
             _watch_drive(order, supervisor, limit, console)
@@ -175,8 +187,8 @@ def _drive_graph(
                 supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
         finally:
             complaints += supervisor.stop()
-            for note in supervisor.notes:
-                console.print(f'[yellow]note[/yellow] {note}')
+            for sentence in supervisor.notes:
+                note(console, sentence)
     return {
         'scenario': order.scenario,
         'mode': order.mode,
@@ -192,7 +204,7 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
     # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
     keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
     with keyboard as keys, progress_bar(console) as progress:
-        set_mark = supervisor.mark_setter(lambda answer: console.print(answer, highlight=False))
+        set_mark = supervisor.mark_setter(lambda answer: console.print(answer, soft_wrap=True))
         hint = '; m or space: mark' if keys is not None and keys.present else ''
         task = progress.add_task(f'driving ({order.scenario}{hint})', total=1.0)
 

@@ -48,7 +48,7 @@ def print_bench(console: Console) -> None:
             table.add_row(row.what, _duration(row.ours), row.other_name, _duration(row.other), faster)
     console.print(table)
     for figure in storage:
-        console.print(f'{figure.what}: {figure.per_second:,.0f} messages/s', highlight=False)
+        console.print(f'{figure.what}: {figure.per_second:,.0f} messages/s', soft_wrap=True)
 
 
 def _packing() -> Comparison:

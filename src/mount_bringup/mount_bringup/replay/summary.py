@@ -21,6 +21,7 @@ from mount_bringup.replay.difference import (
 )
 from mount_bringup.replay.input import ReplayInput
 from mount_bringup.replay.replay import LOCKSTEP, ReplayOutcome
+from mount_bringup.terminal import note
 from mount_models.sampling import SAMPLE_TIME
 
 _SHOWN = 8  # switchings in the printed summary
@@ -88,8 +89,8 @@ def print_replay(outcome: ReplayOutcome, figures: dict[str, Any], console: Conso
     for place, sentence in enumerate(_speed_text(outcome, figures)):
         table.add_row('' if place else 'speed', sentence)
     console.print(table)
-    for note in figures['notes']:
-        console.print(f'[yellow]note[/yellow] {note}', highlight=False)
+    for sentence in figures['notes']:
+        note(console, sentence)
 
 
 def _replayed_text(figures: dict[str, Any]) -> str:
