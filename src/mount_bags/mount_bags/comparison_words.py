@@ -27,6 +27,7 @@ def sentences(comparison: Comparison) -> list[str]:
         *_signals(comparison),
         *_reasons(comparison),
         *_samples(comparison),
+        *(f'{topic.name}: {topic.remark}' for topic in comparison.topics if topic.remark),
         *_lonely(comparison),
         _rest(comparison),
     ]
@@ -45,7 +46,7 @@ def by_importance(comparison: Comparison) -> list[SignalDifference]:
     ranks = {name: rank for rank, name in enumerate((*_OUTPUTS, f'{DISPLACEMENT.name}.mount'))}
 
     def importance(signal: SignalDifference) -> tuple[int, bool, float, str]:
-        rank = ranks.get(signal.name, len(ranks))
+        rank = ranks.get(signal.quantity, len(ranks))
         return rank, signal.topic.startswith('sim/'), -signal.share, signal.name
 
     return sorted(comparison.differing, key=importance)
@@ -63,7 +64,7 @@ def as_table(comparison: Comparison) -> Table:
     for signal in ordered[:_ROWS]:
         largest = signal.largest
         table.add_row(
-            f'{signal.topic}\n{signal.signal}',
+            f'{signal.mount}{signal.topic}\n{signal.signal}',
             str(signal.differing),
             '' if signal.first is None else f'{signal.first.time:.3f}',
             'unknown' if largest is None else quantity_text(abs(largest.difference), signal.unit),
@@ -85,7 +86,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         'alignment': {
             'same_stamps': alignment.same_stamps,
             'shift_s': alignment.shift / 1e9,
-            'sentence': alignment.sentence,
+            'sentence': comparison.alignments.sentence,
         },
         'session': list(comparison.sessions),
         'only_in_a': list(comparison.only_a),
@@ -95,7 +96,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         'switching': None
         if comparison.switching is None
         else [_switching_figures(change) for change in comparison.switching],
-        'topics': {topic.topic: _topic_figures(topic) for topic in comparison.topics},
+        'topics': {topic.name: _topic_figures(topic) for topic in comparison.topics},
     }
 
 
@@ -111,13 +112,14 @@ def _switching(comparison: Comparison) -> list[str]:
 
 def _switching_sentence(change: SwitchingChange) -> str:
     word = 'on' if change.on else 'off'
+    mount = change.mount.replace('/', ': ')
     if change.time_b is None:
-        return f'damping is not switched {word} in B, in A it is at {time_text(change.time)}'
+        return f'{mount}damping is not switched {word} in B, in A it is at {time_text(change.time)}'
     if change.time_a is None:
-        return f'damping is switched {word} at {time_text(change.time_b)} in B, in A it is not'
+        return f'{mount}damping is switched {word} at {time_text(change.time_b)} in B, in A it is not'
     direction = 'later' if change.moved > 0.0 else 'earlier'
     by = quantity_text(abs(change.moved), 's')
-    return f'switched {word} {by} {direction} in B, at {time_text(change.time_b)}'
+    return f'{mount}switched {word} {by} {direction} in B, at {time_text(change.time_b)}'
 
 
 def _signals(comparison: Comparison) -> list[str]:
@@ -179,11 +181,11 @@ def _samples(comparison: Comparison) -> list[str]:
     topics = comparison.incomplete
     outside = () if comparison.common_only else topics
     kinds = (
-        ('samples missing in B', [(t.topic, t.only_a) for t in topics]),
-        ('samples missing in A', [(t.topic, t.only_b) for t in topics]),
-        ('samples of A before or behind those of B', [(t.topic, t.outside_a) for t in outside]),
-        ('samples of B before or behind those of A', [(t.topic, t.outside_b) for t in outside]),
-        ('messages that differ', [(t.topic, t.differing_messages) for t in topics]),
+        ('samples missing in B', [(t.name, t.only_a) for t in topics]),
+        ('samples missing in A', [(t.name, t.only_b) for t in topics]),
+        ('samples of A before or behind those of B', [(t.name, t.outside_a) for t in outside]),
+        ('samples of B before or behind those of A', [(t.name, t.outside_b) for t in outside]),
+        ('messages that differ', [(t.name, t.differing_messages) for t in topics]),
     )
     return [
         f'{what}: {_few([f"{count} of {topic}" for topic, count in counts if count], ", ")}'
@@ -212,7 +214,7 @@ def _rest(comparison: Comparison) -> str:
     switching = '' if comparison.switching is None or comparison.switching_changes else ' and the switching'
     if not comparison.differing and not comparison.switching_changes:
         where = 'everything that both have' if comparison.incomplete else 'everything'
-        count = f'{len(alike)} signals of {len({signal.topic for signal in alike})} topics'
+        count = f'{len(alike)} signals of {len({(signal.mount, signal.topic) for signal in alike})} topics'
         return f'{where} is {how} ({count})'
     if not alike:
         return 'no signal is equal'
@@ -233,6 +235,7 @@ def _few(names: Sequence[str], separator: str) -> str:
 
 def _switching_figures(change: SwitchingChange) -> dict[str, Any]:
     return {
+        'mount': change.mount.rstrip('/'),
         'kind': 'on' if change.on else 'off',
         'time_a_s': change.time_a,
         'time_b_s': change.time_b,

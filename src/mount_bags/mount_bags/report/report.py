@@ -132,6 +132,6 @@ def _names(recordings: Sequence[Recording]) -> list[str]:
 
 def _shares_stamps(first: Recording, other: Recording) -> bool:
     try:
-        return align(first, other).same_stamps
+        return align(first, other).first.same_stamps
     except ComparisonError:
         return False

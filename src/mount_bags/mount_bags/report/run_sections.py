@@ -117,7 +117,7 @@ def differences(comparison: Comparison) -> Section:
     """Return in words and figures how B differs from A."""
     alignment = comparison.alignment
     words = [
-        f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment.sentence}.',
+        f'A is {comparison.name_a}, B is {comparison.name_b}; {comparison.alignments.sentence}.',
         f'Times here are from the first message of A; its first sample of {alignment.anchor} is at '
         f'{alignment.anchor_time:.3f} s.',
         *(f'- {sentence}' for sentence in comparison_sentences(comparison)),

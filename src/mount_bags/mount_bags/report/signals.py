@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.event_marks import Mark, read_marks
+from mount_bags.event_marks import Mark
 from mount_bags.origin import short_name
 from mount_bags.reading import ReadingError, Recording
+from mount_bags.recorded_events import recorded_marks
 from mount_bags.report.chart import Array
 from mount_bags.series import Series, SeriesError
 from mount_bags.session_differences import session_text
@@ -16,7 +17,6 @@ from mount_ros.topics import (
     CONTROL_TRACE,
     CURRENT_SETPOINT,
     DISPLACEMENT,
-    EVENT,
     SIM_TRUTH,
 )
 
@@ -80,8 +80,8 @@ class Signals:
     def marks(self) -> list[Mark]:
         """Return its marks, none where there is no readable topic of them."""
         try:
-            return read_marks(self.recording[EVENT.name]) if EVENT.name in self.recording else []
-        except (ReadingError, SeriesError, AttributeError):
+            return [mark for marks in recorded_marks(self.recording).values() for _, mark in marks]
+        except SeriesError:
             return []
 
     def seconds(self, mark: Mark) -> float:

@@ -68,7 +68,7 @@ def _told(
         console.print(f'- {sentence}', soft_wrap=True)
     if comparison.differing:
         console.print(as_table(comparison))
-    console.print(f'Times are from the first message of A; {comparison.alignment.sentence}.', soft_wrap=True)
+    console.print(f'Times are from the first message of A; {comparison.alignments.sentence}.', soft_wrap=True)
     for recording in recordings:
         for warning in recording.warnings:
             note(console, f'{recording.path}: {warning}')
