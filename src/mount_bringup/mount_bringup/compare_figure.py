@@ -53,7 +53,7 @@ def draw_comparison(comparison: Comparison, a: Recording, b: Recording, file: Pa
 
 
 def _chosen(comparison: Comparison) -> list[SignalDifference]:
-    drawable = [signal for signal in by_importance(comparison) if signal.samples >= _LEAST_SAMPLES]
+    drawable = [signal for signal in by_importance(comparison.signals) if signal.samples >= _LEAST_SAMPLES]
     if drawable:
         return _without_twins(drawable)[:_SIGNALS]
     known = [signal for signal in comparison.signals if signal.samples >= _LEAST_SAMPLES]

@@ -122,7 +122,7 @@ def differences(comparison: Comparison) -> Section:
         f'{alignment.anchor_time:.3f} s.',
         *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
     ]
-    ordered = by_importance(comparison)
+    ordered = by_importance(comparison.signals)
     rows = [
         (
             signal.name,

@@ -117,8 +117,8 @@ def _replay() -> Comparison:
         times = []
         for _ in range(_ROUNDS):
             outcome = replay_without_output(ReplayOrder(recording))
-            assert outcome.difference is not None
-            assert outcome.difference.equal
+            assert outcome.agreement is not None
+            assert outcome.agreement.equal
             times.append(outcome.computing_time / sum(len(run.stamps) for run in outcome.replayed.runs))
     return Comparison('replay one sample', statistics.median(times), 'real time', SAMPLE_TIME)
 
