@@ -118,10 +118,14 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 
 
 @pytest.mark.parametrize(
-    'broken', ['mount_bringup.figure.draw_drive', 'mount_bringup.report_pages.make_report']
+    ('broken', 'file'),
+    [
+        ('mount_bringup.figure.draw_drive', 'drive.png'),
+        ('mount_bringup.report_pages.make_report', 'report.html'),
+    ],
 )
 def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figures(
-    broken, tmp_path, monkeypatch
+    broken, file, tmp_path, monkeypatch
 ):
     def fail(*_):
         raise ZeroDivisionError('nothing to draw')
@@ -129,7 +133,7 @@ def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figu
     monkeypatch.setattr(broken, fail)
     short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
     result = command('drive', '--core', *short, '--out', tmp_path / 'run')
-    assert 'note nothing to draw' in result.output
+    assert f'note {file} could not be made: nothing to draw' in result.output
     assert f'recording  {tmp_path / "run" / "recording"}' in result.output
     assert (tmp_path / 'run' / 'summary.json').exists()
     assert result.exit_code == 1  # what was promised is not there

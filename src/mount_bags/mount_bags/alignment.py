@@ -145,13 +145,17 @@ def paired_topics(a: Recording, b: Recording) -> dict[str, str]:
 
 
 def _mounts(recording: Recording, paired: Collection[str]) -> dict[str, dict[str, str]]:
-    """Return {mount: {registered topic: full name}} of the topics that are not paired."""
+    """Return {mount: {registered topic: full name}} of the topics that are not paired.
+
+    A mount is where there is a control loop; only where there is none, any other topic makes one.
+    """
     mounts: dict[str, dict[str, str]] = {}
     for name in recording:
         registered = registered_in(recording, name)
         if name not in paired and registered is not None:
             mounts.setdefault(mount_of(name, registered), {})[registered.name] = name
-    return mounts
+    anchors = {topic.name for topic in _ANCHORS}
+    return {mount: topics for mount, topics in mounts.items() if anchors & topics.keys()} or mounts
 
 
 def align(a: Recording, b: Recording) -> Alignments:

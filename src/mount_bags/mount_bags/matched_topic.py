@@ -125,13 +125,18 @@ class MatchedTopic:
         if self.a.type != JOINT_STATE:
             return {*STAMP, *((name, 0) for name in (*self.signals, *self.lonely_signals))}
         places = range(max(len(self.a.names), len(self.b.names)))
-        with_rate = [place for place, name in enumerate(self.a.names) if self.a.derivative_unit(name)]
-        return {
-            *STAMP,
-            *((f'name[{place}]', 0) for place in places),
-            *(('position', place) for place in places),
-            *(('velocity', place) for place in with_rate),
-        }
+        shown = {*STAMP, *((f'name[{place}]', 0) for place in places)}
+        if self._has_columns('position'):
+            shown |= {('position', place) for place in places}
+        if self._has_columns('velocity'):
+            rates = enumerate(self.a.names)
+            shown |= {('velocity', place) for place, name in rates if self.a.derivative_unit(name)}
+        return shown
+
+    def _has_columns(self, part: str) -> bool:
+        """Return whether a `JointState` holds a number for each of its names."""
+        layouts = (self.a, self.a.layout), (self.b, self.b.layout)
+        return all(layout and layout.numbers[part].count == len(series.names) for series, layout in layouts)
 
     def lonely_samples(self) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return how many samples A and B have alone: (within the time that both cover, outside of it)."""

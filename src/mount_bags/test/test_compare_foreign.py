@@ -116,6 +116,23 @@ def test_unknown_in_both_is_equal_and_the_sign_of_zero_counts_in_arrays_too(tmp_
     assert not compared(tmp_path, HIDDEN, values(0.0), values(-0.0)).equal
 
 
+@pytest.mark.parametrize('part', ['position', 'velocity', 'effort'])
+def test_numbers_of_a_joint_state_that_no_column_shows_are_compared(part, tmp_path):
+    """Two names with three positions, velocities whose unit nobody knows, efforts."""
+    fields = 'std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort'
+    joint_state = 'sensor_msgs/msg/JointState'
+
+    def values(last):
+        empty = np.empty(0)
+        numbers = {'position': empty, 'velocity': empty, 'effort': empty, part: np.array([1.0, 2.0, last])}
+        return lambda index: {'name': ['one', 'two'], **numbers}
+
+    a = write_things(tmp_path / 'a.mcap', fields, values(3.0), name=joint_state)
+    b = write_things(tmp_path / 'b.mcap', fields, values(4.0), name=joint_state)
+    assert compare(mount_bags.open(a), mount_bags.open(a)).equal
+    assert not compare(mount_bags.open(a), mount_bags.open(b)).equal
+
+
 def test_a_topic_of_another_type_is_never_equal(tmp_path):
     def values(index):
         return {'value': index}

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from compared_drives import START, answers, write_answers
+from compared_drives import START, answers, text, write_answers
 
 import mount_bags
 from mount_bags.alignment import ComparisonError
@@ -13,6 +13,7 @@ from mount_bags.comparison_words import as_json, as_table, sentences
 from mount_bags.merge import merge
 from mount_bags.recorded_events import recorded_events
 from mount_bags.tolerances import ToleranceError, Tolerances
+from mount_bags.writer import BagWriter
 
 COUNT = 400
 SIGNALS = answers(COUNT)
@@ -112,6 +113,22 @@ def test_a_tolerance_may_be_that_of_one_mount(car):
     assert compare(a, b, Tolerances(both)).equal
     with pytest.raises(ToleranceError, match='did you mean mount_right/current_setpoint'):
         compare(a, b, Tolerances(('mount_rigt/current_setpoint=0.3',)))
+
+
+def test_a_mark_without_a_mount_does_not_make_one(tmp_path):
+    one, other = (
+        mount_bags.open(write_answers(tmp_path / side, SIGNALS, namespace=f'/mount_{side}'))
+        for side in ('left', 'right')
+    )
+    writer = BagWriter(tmp_path / 'marks')
+    writer.add_topic('/event', 'std_msgs/msg/String')
+    writer.write('/event', text('by hand'), START)
+    writer.close()
+    merge([other, mount_bags.open(tmp_path / 'marks')], tmp_path / 'both', different_sessions=True)
+    comparison = compare(one, mount_bags.open(tmp_path / 'both'))
+    assert comparison.equal
+    assert comparison.only_b == ('/event',)
+    assert comparison.marks_b == ('mark by hand',)
 
 
 def test_a_mount_of_another_name_is_the_only_one_that_is_left(car, tmp_path):

@@ -82,8 +82,8 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
     drive_data = load_drive(recording, run['excitation_start'])
     figures = _evaluate(order, folder, recording, drive_data, run, console)
     if order.report:
-        complaints += _complaint(lambda: _draw(order, folder, drive_data))
-        complaints += _complaint(lambda: _write_report(folder, recording, console))
+        complaints += _complaint(folder.figure, lambda: _draw(order, folder, drive_data))
+        complaints += _complaint(folder.report, lambda: _write_report(folder, recording, console))
     return DriveOutcome(figures, folder, [folder.recording], complaints)
 
 
@@ -151,12 +151,12 @@ def _write_report(folder: RunFolder, recording: Recording, console: Console) -> 
     write_report([recording], None, folder.report, None, console)
 
 
-def _complaint(make: Callable[[], None]) -> list[str]:
-    """Make a picture or page of a drive; what prevents it is a complaint, for the recording is there."""
+def _complaint(file: Path, make: Callable[[], None]) -> list[str]:
+    """Make the picture or page of a drive; what prevents it is a complaint, for the recording is there."""
     try:
         make()
     except Exception as error:  # whatever it stumbles over
-        return [str(error) or type(error).__name__]
+        return [f'{file.name} could not be made: {str(error) or type(error).__name__}']
     return []
 
 

@@ -16,12 +16,11 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, flattened
 from mount_sim.parameters import SimParameters
 
+DEFAULT_DAMPER = 'viscous_2000'
+
 
 class SettingError(ParameterError):
     """An option `--set` is not written as it must be; the text says how."""
-
-
-DEFAULT_DAMPER = 'viscous_2000'
 
 
 def defaults_of_nodes() -> dict[str, dict[str, Any]]:

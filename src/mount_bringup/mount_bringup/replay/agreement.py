@@ -125,11 +125,12 @@ def _intermediates(
 ) -> tuple[SignalDifference, ...]:
     assert given.answers is not None
     steps = [
-        (answers.stamps[answers.traced & old], answers.traces[answers.traced & old])
-        for (_, answers), old in zip(answered, settled, strict=True)
+        (answers, answers.traced & judged)
+        for (_, answers), judged in zip(answered, settled, strict=True)
         if isinstance(answers, ControlAnswers)
     ]
-    stamps, traces = (np.concatenate(each) for each in zip(*steps, strict=True))
+    stamps = np.concatenate([answers.stamps[judged] for answers, judged in steps])
+    traces = np.concatenate([answers.traces[judged] for answers, judged in steps])
     places, known = _matched(given.answers.trace_stamps, stamps)
     time = _seconds(given, stamps[known])
     return tuple(
@@ -139,8 +140,9 @@ def _intermediates(
 
 
 def _judged(topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray) -> SignalDifference:
-    unit = next(scalar.unit for scalar in topic.scalars if scalar.name == signal).removesuffix('1')
-    return signal_difference(Column('', topic.name, signal, unit, time, a, b), EXACT, None, SAMPLE_TIME)
+    unit = next(scalar.unit for scalar in topic.scalars if scalar.name == signal)
+    column = Column('', topic.name, signal, '' if unit == '1' else unit, time, a, b)
+    return signal_difference(column, EXACT, None, SAMPLE_TIME)
 
 
 def _settled(part: object, answers: RampAnswers | ControlAnswers) -> NDArray[np.bool_]:
