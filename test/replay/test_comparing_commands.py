@@ -4,9 +4,12 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
+import mount_bags
 from mount_bags.reference import differences_from_reference
 from mount_bringup.command import app
 
@@ -76,6 +79,55 @@ def test_recordings_without_common_topics_end_with_code_2(run, tmp_path):
     result = command('compare', run(), tmp_path / 'other')
     assert result.exit_code == 2
     assert 'no topic is in both recordings' in result.output
+
+
+def test_what_cannot_be_compared_is_not_called_different(run, tmp_path):
+    for arguments in (
+        (run(), tmp_path / 'nope'),
+        (tmp_path / 'nope', run()),
+        (run(), run(), '--tolerance', 'curent=1%'),
+        (run(), run(), '--json', tmp_path / 'nope' / 'figures.json'),
+        (run(),),
+    ):
+        assert command('compare', *arguments).exit_code == 2
+    assert 'nope' in command('compare', run(), tmp_path / 'nope').output
+
+
+def test_of_two_mounts_in_one_recording_both_are_compared_and_drawn_by_their_names(
+    run, tmp_path, monkeypatch
+):
+    left, right = ('--namespace', 'mount_left'), ('--namespace', 'mount_right')
+    for name, changes in (('a', ()), ('b', EARLIER)):
+        parts = run(*left), run(*right, *changes)
+        assert command('merge', *parts, '--different-sessions', '--out', tmp_path / name).exit_code == 0
+    drawn = []
+    monkeypatch.setattr(Figure, 'savefig', lambda picture, *_, **__: drawn.append(picture))
+    files = tmp_path / 'difference.json', tmp_path / 'difference.png'
+    both = (tmp_path / 'a', tmp_path / 'b')
+    result = command('compare', *both, '--json', files[0], '--figure', files[1])
+    assert result.exit_code == 1
+    assert '- mount_right: switched on 8 ms earlier in B' in result.output
+    assert 'mount_left: switched' not in result.output
+    topics = json.loads(files[0].read_text())['topics']
+    currents = {
+        side: topics[f'mount_{side}/current_setpoint']['signals']['coil_current']['differing']
+        for side in ('left', 'right')
+    }
+    assert currents['left'] == 0
+    assert currents['right'] > 100
+    upper = drawn[0].axes[0]
+    assert upper.get_ylabel() == 'mount_right/current_setpoint\ncoil_current (A)'
+    shown = {line.get_label(): line.get_ydata() for line in upper.lines}
+    for name, recording in zip('AB', both, strict=True):
+        recorded = mount_bags.open(recording)['mount_right/current_setpoint']['coil_current']
+        assert np.array_equal(shown[name], recorded)
+    assert command('compare', both[0], both[0], '--figure', files[1]).exit_code == 0
+    labels = {axes.get_ylabel().split('\n')[0] for axes in drawn[1].axes} - {'B - A', ''}
+    assert labels == {
+        f'mount_{side}/{topic}'
+        for side in ('left', 'right')
+        for topic in ('current_setpoint', 'displacement')
+    }
 
 
 def test_cut_in_two_and_merged_a_drive_is_the_same(run, tmp_path):

@@ -11,8 +11,10 @@ import pytest
 from std_msgs.msg import String
 from typer.testing import CliRunner, Result
 
+from mount_bags.report import run_sections, sections
 from mount_bags.writer import BagWriter
 from mount_bringup.command import app
+from mount_bringup.report_pages import default_pictures
 from mount_ros.cdr import serialised
 
 REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
@@ -83,6 +85,75 @@ def test_the_page_of_a_drive_shows_all_that_was_recorded(page, bench):
     assert 'mount_sim.scenario bench' in page.text
     error = json.loads((bench / 'summary.json').read_text())['tracking_error_rms']
     assert f'friction force error {100 * error:.1f} % rms' in page.text
+
+
+def test_a_slow_excitation_is_a_good_drive_whose_page_says_what_it_was_too_short_for(tmp_path):
+    slow = ('--scenario', 'bench', '--duration', '6', '--set', 'mount_sim.bench.frequency=0.2')
+    result = command('drive', '--core', *slow, '--out', tmp_path / 'slow')
+    assert result.exit_code == 0, result.output
+    assert 'could not be made' not in result.output
+    text = Page(tmp_path / 'slow' / 'report.html').text
+    assert 'The displacement is not one sine for long enough: no harmonics.' in text
+    assert 'could not be made' not in text
+
+
+def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_end_of_a_drive(
+    tmp_path, monkeypatch
+):
+    def fail(subjects):
+        raise ZeroDivisionError('a section with [brackets] fails')
+
+    monkeypatch.setattr(sections, 'harmonic_content', fail)
+    monkeypatch.setattr(run_sections, 'overview', lambda *_: fail(()))
+    short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
+    result = command('drive', '--core', *short, '--out', tmp_path / 'run')
+    assert result.exit_code == 0, result.output
+    page = Page(tmp_path / 'run' / 'report.html')
+    for name in ('overview', 'harmonics'):
+        told = f'section {name} could not be made: a section with [brackets] fails'
+        assert f'note {told}' in result.output
+        assert told.capitalize() in page.text
+    assert page.sections[0] == 'overview'
+    assert {'harmonics', 'traces', 'losses', 'parameters'} <= set(page.sections)
+
+
+@pytest.mark.parametrize(
+    ('broken', 'file'),
+    [
+        ('mount_bringup.figure.draw_drive', 'drive.png'),
+        ('mount_bringup.report_pages.make_report', 'report.html'),
+    ],
+)
+def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figures(
+    broken, file, tmp_path, monkeypatch
+):
+    def fail(*_):
+        raise ZeroDivisionError('nothing to draw')
+
+    monkeypatch.setattr(broken, fail)
+    short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
+    result = command('drive', '--core', *short, '--out', tmp_path / 'run')
+    assert f'note {file} could not be made: nothing to draw' in result.output
+    assert f'recording  {tmp_path / "run" / "recording"}' in result.output
+    assert (tmp_path / 'run' / 'summary.json').exists()
+    assert result.exit_code == 1  # what was promised is not there
+
+
+def test_reports_of_folders_whose_names_hold_dots_do_not_overwrite_each_other(bench, tmp_path):
+    for name in ('drive.1', 'drive.2'):
+        shutil.copytree(bench / 'recording', tmp_path / name)
+        result = command('report', tmp_path / name)
+        assert result.exit_code == 0, result.output
+    made = {path.name for path in tmp_path.iterdir()}
+    assert made == {f'drive.{number}{what}' for number in (1, 2) for what in ('', '_report.html', '_report')}
+
+
+@pytest.mark.parametrize(
+    ('page', 'folder'),
+    [('page.html', 'page'), ('v1.2', 'v1.2_pictures'), ('v1.2.html', 'v1.2'), ('page', 'page_pictures')],
+)
+def test_pictures_lie_in_a_folder_of_the_page_s_whole_name(page, folder, tmp_path):
+    assert default_pictures(tmp_path / page) == tmp_path / folder
 
 
 def test_a_page_needs_nothing_else_and_is_small(page, bench):

@@ -1,5 +1,6 @@
 """Which sample of one recording belongs to which of another, and what time it is said to have."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from mount_bags.reading import Recording
 from mount_bags.series import Series, SeriesError, Times, registered_topic
 from mount_bags.time_axis import TimeAxis, time_axis
-from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
 Places = NDArray[np.int64]
 
@@ -86,6 +87,32 @@ class Alignment:
 
 
 @dataclass(frozen=True)
+class Alignments:
+    """The alignment of each mount of A: its electronics have a clock of their own.
+
+    What belongs to no mount is aligned as the first one.
+    """
+
+    by_mount: Mapping[str, Alignment]
+
+    @property
+    def first(self) -> Alignment:
+        """That of the only mount, or of the first."""
+        return next(iter(self.by_mount.values()))
+
+    @property
+    def sentence(self) -> str:
+        """What was chosen, for people."""
+        if all(each.same_stamps for each in self.by_mount.values()):
+            return self.first.sentence
+        return '; '.join(each.sentence for each in self.by_mount.values())
+
+    def of(self, a: Series) -> Alignment:
+        """Return the alignment of a topic of A."""
+        return self.by_mount.get(mount_of(a.topic, a.registered), self.first)
+
+
+@dataclass(frozen=True)
 class Samples:
     """Samples of one topic in the order of their keys; equal keys belong together."""
 
@@ -95,29 +122,54 @@ class Samples:
     step: int
 
 
+def mount_of(name: str, registered: Topic | None) -> str:
+    """Return what stands before a registered topic in its full name: `mount_left/`, or nothing."""
+    return '' if registered is None else name.removesuffix(registered.name).lstrip('/')
+
+
+def registered_in(recording: Recording, name: str) -> Topic | None:
+    """Return the registered topic that `name` is in `recording`, by name and type."""
+    return registered_topic(name, recording.topics[name].type)
+
+
 def paired_topics(a: Recording, b: Recording) -> dict[str, str]:
-    """Return {topic of A: topic of B}: of one name, or the same registered topic below two namespaces."""
+    """Return {topic of A: topic of B}: of one name, and those of the only mount that is in A and B alone."""
     pairs = {name: name for name in a if name in b.topics}
-    for name in a:
-        registered = registered_topic(name)
-        if name in pairs or registered is None:
-            continue
-        fitting = [other for other in b if registered_topic(other) is registered and other not in a.topics]
-        if len(fitting) == 1 and fitting[0] not in pairs.values():
-            pairs[name] = fitting[0]
+    alone = _mounts(a, pairs), _mounts(b, pairs)
+    if all(len(mounts) == 1 for mounts in alone):
+        (of_a,), (of_b,) = (mounts.values() for mounts in alone)
+        pairs |= {name: of_b[topic] for topic, name in of_a.items() if topic in of_b}
     return pairs
 
 
-def align(a: Recording, b: Recording) -> Alignment:
+def _mounts(recording: Recording, paired: Collection[str]) -> dict[str, dict[str, str]]:
+    """Return {mount: {registered topic: full name}} of the topics that are not paired.
+
+    A mount is where there is a control loop; only where there is none, any other topic makes one.
+    """
+    mounts: dict[str, dict[str, str]] = {}
+    for name in recording:
+        registered = registered_in(recording, name)
+        if name not in paired and registered is not None:
+            mounts.setdefault(mount_of(name, registered), {})[registered.name] = name
+    anchors = {topic.name for topic in _ANCHORS}
+    return {mount: topics for mount, topics in mounts.items() if anchors & topics.keys()} or mounts
+
+
+def align(a: Recording, b: Recording) -> Alignments:
     """Return how to match the samples of `a` and `b`; raises `ComparisonError`."""
-    first, second = _anchor(a, b)
+    axis = time_axis(a)
+    return Alignments({mount: _aligned(*pair, axis) for mount, pair in _anchors(a, b).items()})
+
+
+def _aligned(first: Series, second: Series, axis: TimeAxis) -> Alignment:
     of_a, of_b = Counter(first), Counter(second)
     return Alignment(
         same_stamps=_share(of_a.stamps, of_b.stamps) >= _SAME_CLOCK,
         anchor=first.topic.lstrip('/'),
         a=of_a,
         b=of_b,
-        axis=time_axis(a),
+        axis=axis,
     )
 
 
@@ -140,19 +192,32 @@ def common_samples(a: Samples, b: Samples) -> tuple[Places, Places]:
     return places_a, places_b
 
 
-def _anchor(a: Recording, b: Recording) -> tuple[Series, Series]:
+def _anchors(a: Recording, b: Recording) -> dict[str, tuple[Series, Series]]:
+    """Return for each mount the first topic with stamps in both; where there is none, of a foreign topic."""
     pairs = paired_topics(a, b)
     if not pairs:
         raise ComparisonError(
             f'no topic is in both recordings: A has {", ".join(a) or "none"}; B has {", ".join(b) or "none"}'
         )
     ranks = {topic: rank for rank, topic in enumerate(_ANCHORS)}
-    by_rank = sorted(pairs, key=lambda name: ranks.get(registered_topic(name), len(ranks)))
-    for name in by_rank:
+    known = {name: registered_in(a, name) for name in pairs}
+    anchors: dict[str, tuple[Series, Series]] = {}
+    for name in sorted(
+        pairs, key=lambda name: (not _of_a_mount(known[name]), ranks.get(known[name], len(ranks)))
+    ):
+        mount = mount_of(name, known[name])
+        if mount in anchors or (anchors and not _of_a_mount(known[name])):
+            continue
         first, second = a[name], b[pairs[name]]
         if len(first) and len(second) and is_stamped(first) and is_stamped(second):
-            return first, second
-    raise ComparisonError('no topic with stamps has messages in both recordings; nothing can be matched')
+            anchors[mount] = first, second
+    if not anchors:
+        raise ComparisonError('no topic with stamps has messages in both recordings; nothing can be matched')
+    return anchors
+
+
+def _of_a_mount(registered: Topic | None) -> bool:
+    return registered is not None and not registered.name.startswith('/')
 
 
 def is_stamped(series: Series) -> bool:

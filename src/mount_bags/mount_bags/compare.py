@@ -1,17 +1,25 @@
 """Two recordings against each other: every signal of every topic that both have, sample by sample."""
 
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.alignment import Alignment, ComparisonError, align, paired_topics
+from mount_bags.alignment import (
+    Alignment,
+    Alignments,
+    ComparisonError,
+    align,
+    mount_of,
+    paired_topics,
+    registered_in,
+)
 from mount_bags.matched_topic import MatchedTopic
 from mount_bags.origin import short_name
 from mount_bags.reading import Recording
-from mount_bags.recorded_events import marked_events
-from mount_bags.series import registered_topic
-from mount_bags.session_differences import session_differences, session_text
+from mount_bags.recorded_events import recorded_marks
+from mount_bags.session_differences import session_differences, session_texts
 from mount_bags.signal_difference import SignalDifference, signal_difference
 from mount_bags.switching_changes import SwitchingChange, paired_switchings, switching_times
 from mount_bags.tolerances import Tolerances
@@ -30,6 +38,7 @@ class TopicComparison:
     `outside_a` and `outside_b` those before and behind it.
     """
 
+    mount: str  # what stands before the topic where it is of a namespace: `mount_left/`
     topic: str
     samples: int
     signals: tuple[SignalDifference, ...]
@@ -37,8 +46,13 @@ class TopicComparison:
     only_b: int
     outside_a: int
     outside_b: int
-    differing_messages: int  # of a topic without signals
+    differing_messages: int  # in what no signal shows
     remark: str
+
+    @property
+    def name(self) -> str:
+        """Mount and topic."""
+        return f'{self.mount}{self.topic}'
 
 
 @dataclass(frozen=True)
@@ -47,7 +61,7 @@ class Comparison:
 
     name_a: str
     name_b: str
-    alignment: Alignment
+    alignments: Alignments
     topics: tuple[TopicComparison, ...]
     only_a: tuple[str, ...]  # topics
     only_b: tuple[str, ...]
@@ -58,6 +72,11 @@ class Comparison:
     switching: tuple[SwitchingChange, ...] | None  # None: not told by both
     switching_tolerance: float
     common_only: bool
+
+    @property
+    def alignment(self) -> Alignment:
+        """That of the only mount, or of the first."""
+        return self.alignments.first
 
     @property
     def signals(self) -> list[SignalDifference]:
@@ -107,60 +126,73 @@ def compare(
     the only ones to compare.
     """
     tolerances = tolerances or Tolerances()
-    alignment = align(a, b)
+    alignments = align(a, b)
     pairs = paired_topics(a, b)
-    matched = matched_topics(a, b, alignment, topics)
-    tolerances.check({(topic.topic, signal) for topic in matched for signal in topic.signals})
+    matched = matched_topics(a, b, alignments, topics)
+    tolerances.check({(topic.mount, topic.topic, signal) for topic in matched for signal in topic.signals})
     if not any(topic.samples for topic in matched):
-        raise ComparisonError(f'no sample is in both {a.path} and {b.path}; {alignment.sentence}')
+        raise ComparisonError(f'no sample is in both {a.path} and {b.path}; {alignments.sentence}')
     switching = _switching(matched)
-    text_a, text_b = session_text(a), session_text(b)
+    marks_a, marks_b = _marks(a, {}), _marks(b, {other: name for name, other in pairs.items()})
+    sessions = _sessions(a, b, pairs)
     return Comparison(
         name_a=short_name(a),
         name_b=short_name(b),
-        alignment=alignment,
-        topics=tuple(_compared(topic, tolerances, switching is not None) for topic in matched),
+        alignments=alignments,
+        topics=tuple(_compared(topic, tolerances, switching) for topic in matched),
         only_a=_lonely_topics(a, pairs, topics),
         only_b=_lonely_topics(b, pairs.values(), topics),
-        sessions=tuple(session_differences(text_a, text_b)) if text_a and text_b else (),
-        both_have_session=bool(text_a and text_b),
-        marks_a=_lonely_marks(a, b),
-        marks_b=_lonely_marks(b, a),
-        switching=None if switching is None else tuple(switching),
+        sessions=tuple(sessions or ()),
+        both_have_session=sessions is not None,
+        marks_a=tuple((marks_a - marks_b).elements()),
+        marks_b=tuple((marks_b - marks_a).elements()),
+        switching=_in_time(switching.values()) if switching else None,
         switching_tolerance=tolerances.switching,
         common_only=common_only,
     )
 
 
 def matched_topics(
-    a: Recording, b: Recording, alignment: Alignment, topics: Collection[Topic] | None = None
+    a: Recording, b: Recording, alignments: Alignments, topics: Collection[Topic] | None = None
 ) -> list[MatchedTopic]:
     """Return the topics of both that are compared sample by sample; all, or those in `topics`."""
     return [
-        MatchedTopic(a[name], b[other], alignment)
+        MatchedTopic(a[name], b[other], alignments.of(a[name]))
         for name, other in paired_topics(a, b).items()
-        if registered_topic(name) not in (*_TOLD_OTHERWISE, *_OF_THE_MOMENT)
-        and (topics is None or registered_topic(name) in topics)
+        if _wanted(registered_in(a, name), topics)
     ]
 
 
-def _compared(topic: MatchedTopic, tolerances: Tolerances, switching_told: bool) -> TopicComparison:
+def _wanted(registered: Topic | None, topics: Collection[Topic] | None) -> bool:
+    return registered not in (*_TOLD_OTHERWISE, *_OF_THE_MOMENT) and (topics is None or registered in topics)
+
+
+def _compared(
+    topic: MatchedTopic, tolerances: Tolerances, switching: Mapping[str, list[SwitchingChange]]
+) -> TopicComparison:
     (only_a, outside_a), (only_b, outside_b) = topic.lonely_samples()
     signals = {
-        name: unit for name, unit in topic.signals.items() if not (switching_told and _is_switch(topic, name))
+        name: unit
+        for name, unit in topic.signals.items()
+        if not (topic.mount in switching and _is_switch(topic, name))
     }
-    different = topic.different_messages()
-    if different:
+    hidden = 0
+    if topic.different_messages().any():
+        hidden = int(np.count_nonzero(topic.hidden_differences()))
         grid = topic.grid()
         found = tuple(
-            signal_difference(topic.column(name), tolerances.of(topic.topic, name), grid, topic.period)
+            signal_difference(
+                topic.column(name), tolerances.of(topic.mount, topic.topic, name), grid, topic.period
+            )
             for name in signals
         )
     else:
         found = tuple(
-            SignalDifference(topic.topic, name, unit, topic.samples) for name, unit in signals.items()
+            SignalDifference(topic.mount, topic.topic, name, unit, topic.samples)
+            for name, unit in signals.items()
         )
     return TopicComparison(
+        mount=topic.mount,
         topic=topic.topic,
         samples=topic.samples,
         signals=found,
@@ -168,12 +200,14 @@ def _compared(topic: MatchedTopic, tolerances: Tolerances, switching_told: bool)
         only_b=only_b,
         outside_a=outside_a,
         outside_b=outside_b,
-        differing_messages=0 if topic.signals else different,
+        differing_messages=hidden,
         remark=_remark(topic),
     )
 
 
 def _remark(topic: MatchedTopic) -> str:
+    if topic.a.type != topic.b.type:
+        return f'in A it is {topic.a.type}, in B {topic.b.type}'
     lonely = topic.lonely_signals
     return f'only one of both has {", ".join(lonely)}' if lonely else ''
 
@@ -182,15 +216,20 @@ def _is_switch(topic: MatchedTopic, signal: str) -> bool:
     return topic.topic == CONTROL_TRACE.name and signal == _ACTIVE
 
 
-def _switching(matched: Collection[MatchedTopic]) -> list[SwitchingChange] | None:
+def _switching(matched: Collection[MatchedTopic]) -> dict[str, list[SwitchingChange]]:
+    """Return the switchings of each mount that tells of them in both recordings."""
+    found = {}
     for topic in matched:
         if topic.samples and any(_is_switch(topic, signal) for signal in topic.signals):
             column = topic.column(_ACTIVE)
-            if not np.isin(np.concatenate([column.a, column.b]), (0.0, 1.0)).all():
-                return None  # no switch; compared as any other signal
-            times = (switching_times(column.time, active) for active in (column.a, column.b))
-            return paired_switchings(*times, topic.period)
-    return None
+            if np.isin(np.concatenate([column.a, column.b]), (0.0, 1.0)).all():
+                times = (switching_times(column.time, active) for active in (column.a, column.b))
+                found[topic.mount] = paired_switchings(*times, topic.period, topic.mount)
+    return found  # what is no switch is compared as any other signal
+
+
+def _in_time(switchings: Iterable[list[SwitchingChange]]) -> tuple[SwitchingChange, ...]:
+    return tuple(sorted((change for each in switchings for change in each), key=lambda change: change.time))
 
 
 def _lonely_topics(
@@ -199,14 +238,30 @@ def _lonely_topics(
     return tuple(
         name
         for name, topic in recording.topics.items()
-        if name not in paired and topic.message_count and (topics is None or registered_topic(name) in topics)
+        if name not in paired
+        and topic.message_count
+        and (topics is None or registered_in(recording, name) in topics)
     )
 
 
-def _lonely_marks(recording: Recording, other: Recording) -> tuple[str, ...]:
-    known = {(event.kind, event.text) for event in marked_events(other)}
-    return tuple(
-        ' '.join(filter(None, (event.kind, event.text)))
-        for event in marked_events(recording)
-        if (event.kind, event.text) not in known
+def _sessions(a: Recording, b: Recording, pairs: Mapping[str, str]) -> list[str] | None:
+    """Return how the sessions differ, mount by mount; None where no mount has one in both."""
+    texts_a, texts_b = session_texts(a), session_texts(b)
+    both = [(name, other) for name, other in pairs.items() if texts_a.get(name) and texts_b.get(other)]
+    if not both:
+        return None
+    return [
+        mount_of(name, SESSION).replace('/', ': ') + difference
+        for name, other in both
+        for difference in session_differences(texts_a[name], texts_b[other])
+    ]
+
+
+def _marks(recording: Recording, renamed: Mapping[str, str]) -> Counter[str]:
+    """Return the marks as text, each with its mount, of a topic in `renamed` with that of the other name."""
+    return Counter(
+        mount_of(renamed.get(name, name), EVENT).replace('/', ': ')
+        + ' '.join(filter(None, (mark.kind, mark.text)))
+        for name, marks in recorded_marks(recording).items()
+        for _, mark in marks
     )

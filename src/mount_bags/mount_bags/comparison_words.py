@@ -1,7 +1,7 @@
 """A comparison in words, the most important first, as a table, and as JSON."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rich.box import SIMPLE
@@ -23,10 +23,10 @@ _OUTPUTS = (f'{CURRENT_SETPOINT.name}.coil_current', f'{CONTROL_TRACE.name}.curr
 def sentences(comparison: Comparison) -> list[str]:
     """Return what differs, most important first; the last sentence says what is equal."""
     return [
-        *_switching(comparison),
-        *_signals(comparison),
+        *differences(comparison),
         *_reasons(comparison),
         *_samples(comparison),
+        *(f'{topic.name}: {topic.remark}' for topic in comparison.topics if topic.remark),
         *_lonely(comparison),
         _rest(comparison),
     ]
@@ -34,21 +34,21 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def differences(comparison: Comparison) -> list[str]:
     """Return the sentences about switching and signals that differ beyond the tolerances."""
-    return [*_switching(comparison), *_signals(comparison)]
+    return [*_switching(comparison), *signal_sentences(comparison.differing)]
 
 
-def by_importance(comparison: Comparison) -> list[SignalDifference]:
-    """Return the differing signals: the output, the input, then by their share of the signal.
+def by_importance(signals: Iterable[SignalDifference]) -> list[SignalDifference]:
+    """Return the differing ones among `signals`: the output, the input, then by their share of the signal.
 
     What only a simulator knows comes last.
     """
     ranks = {name: rank for rank, name in enumerate((*_OUTPUTS, f'{DISPLACEMENT.name}.mount'))}
 
     def importance(signal: SignalDifference) -> tuple[int, bool, float, str]:
-        rank = ranks.get(signal.name, len(ranks))
+        rank = ranks.get(signal.quantity, len(ranks))
         return rank, signal.topic.startswith('sim/'), -signal.share, signal.name
 
-    return sorted(comparison.differing, key=importance)
+    return sorted((signal for signal in signals if signal.differing), key=importance)
 
 
 def as_table(comparison: Comparison) -> Table:
@@ -57,13 +57,13 @@ def as_table(comparison: Comparison) -> Table:
     table.add_column('signal', overflow='fold')  # of two lines, so that all fits into 80 characters
     for title in ('samples', 'first (s)', 'largest', 'at (s)', 'rms', 'B later'):
         table.add_column(title, justify='right', no_wrap=True)
-    ordered = by_importance(comparison)
+    ordered = by_importance(comparison.signals)
     if len(ordered) > _ROWS:
         table.caption, table.caption_justify = f'{len(ordered) - _ROWS} more differ; see --json', 'left'
     for signal in ordered[:_ROWS]:
         largest = signal.largest
         table.add_row(
-            f'{signal.topic}\n{signal.signal}',
+            f'{signal.mount}{signal.topic}\n{signal.signal}',
             str(signal.differing),
             '' if signal.first is None else f'{signal.first.time:.3f}',
             'unknown' if largest is None else quantity_text(abs(largest.difference), signal.unit),
@@ -85,7 +85,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         'alignment': {
             'same_stamps': alignment.same_stamps,
             'shift_s': alignment.shift / 1e9,
-            'sentence': alignment.sentence,
+            'sentence': comparison.alignments.sentence,
         },
         'session': list(comparison.sessions),
         'only_in_a': list(comparison.only_a),
@@ -95,7 +95,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
         'switching': None
         if comparison.switching is None
         else [_switching_figures(change) for change in comparison.switching],
-        'topics': {topic.topic: _topic_figures(topic) for topic in comparison.topics},
+        'topics': {topic.name: _topic_figures(topic) for topic in comparison.topics},
     }
 
 
@@ -104,32 +104,35 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
 
 def _switching(comparison: Comparison) -> list[str]:
     changes = comparison.switching_changes
-    told = [_switching_sentence(change) for change in changes[:_TOLD]]
+    told = [switching_sentence(change) for change in changes[:_TOLD]]
     more = len(changes) - _TOLD
     return [*told, f'{more} more switchings differ'] if more > 0 else told
 
 
-def _switching_sentence(change: SwitchingChange) -> str:
+def switching_sentence(change: SwitchingChange, a: str = 'A', b: str = 'B') -> str:
+    """Return the sentence about a switching; `a` and `b` is what the recordings are called."""
     word = 'on' if change.on else 'off'
+    mount = change.mount.replace('/', ': ')
     if change.time_b is None:
-        return f'damping is not switched {word} in B, in A it is at {time_text(change.time)}'
+        return f'{mount}damping is not switched {word} in {b}, in {a} it is at {time_text(change.time)}'
     if change.time_a is None:
-        return f'damping is switched {word} at {time_text(change.time_b)} in B, in A it is not'
+        return f'{mount}damping is switched {word} at {time_text(change.time_b)} in {b}, in {a} it is not'
     direction = 'later' if change.moved > 0.0 else 'earlier'
     by = quantity_text(abs(change.moved), 's')
-    return f'switched {word} {by} {direction} in B, at {time_text(change.time_b)}'
+    return f'{mount}switched {word} {by} {direction} in {b}, at {time_text(change.time_b)}'
 
 
-def _signals(comparison: Comparison) -> list[str]:
-    signals = by_importance(comparison)
-    told = [_signal_sentence(signal) for signal in signals[:_TOLD]]
-    others = [signal.name for signal in signals[_TOLD:]]
+def signal_sentences(signals: Iterable[SignalDifference], b: str = 'B') -> list[str]:
+    """Return the sentences about the most important of the differing `signals`; `b` is what B is called."""
+    ordered = by_importance(signals)
+    told = [_signal_sentence(signal, b) for signal in ordered[:_TOLD]]
+    others = [signal.name for signal in ordered[_TOLD:]]
     if others:
         told.append(f'{len(others)} more signals differ: {_few(others, ", ")}')
     return told
 
 
-def _signal_sentence(signal: SignalDifference) -> str:
+def _signal_sentence(signal: SignalDifference, b: str) -> str:
     first = signal.first
     since = '' if first is None else f', first at {time_text(first.time)}'
     unknown = (
@@ -142,16 +145,16 @@ def _signal_sentence(signal: SignalDifference) -> str:
     most = quantity_text(abs(signal.largest.difference), signal.unit)
     return (
         f'{signal.name} differs by at most {most} at {time_text(signal.largest.time)}{since}'
-        f'{_lag_words(signal)}{unknown}'
+        f'{_lag_words(signal, b)}{unknown}'
     )
 
 
-def _lag_words(signal: SignalDifference) -> str:
+def _lag_words(signal: SignalDifference, b: str) -> str:
     if not signal.lag.known or abs(signal.lag.seconds) < _LEAST_LAG:
         return ''
     word = 'later' if signal.lag.seconds > 0.0 else 'earlier'
     remark = f' ({signal.lag.remark})' if signal.lag.remark else ''
-    return f'; B is {1e3 * abs(signal.lag.seconds):.2f} ms {word}{remark}'
+    return f'; {b} is {1e3 * abs(signal.lag.seconds):.2f} ms {word}{remark}'
 
 
 def _lag_text(lag: Lag) -> str:
@@ -179,11 +182,11 @@ def _samples(comparison: Comparison) -> list[str]:
     topics = comparison.incomplete
     outside = () if comparison.common_only else topics
     kinds = (
-        ('samples missing in B', [(t.topic, t.only_a) for t in topics]),
-        ('samples missing in A', [(t.topic, t.only_b) for t in topics]),
-        ('samples of A before or behind those of B', [(t.topic, t.outside_a) for t in outside]),
-        ('samples of B before or behind those of A', [(t.topic, t.outside_b) for t in outside]),
-        ('messages that differ', [(t.topic, t.differing_messages) for t in topics]),
+        ('samples missing in B', [(t.name, t.only_a) for t in topics]),
+        ('samples missing in A', [(t.name, t.only_b) for t in topics]),
+        ('samples of A before or behind those of B', [(t.name, t.outside_a) for t in outside]),
+        ('samples of B before or behind those of A', [(t.name, t.outside_b) for t in outside]),
+        ('messages that differ', [(t.name, t.differing_messages) for t in topics]),
     )
     return [
         f'{what}: {_few([f"{count} of {topic}" for topic, count in counts if count], ", ")}'
@@ -212,7 +215,7 @@ def _rest(comparison: Comparison) -> str:
     switching = '' if comparison.switching is None or comparison.switching_changes else ' and the switching'
     if not comparison.differing and not comparison.switching_changes:
         where = 'everything that both have' if comparison.incomplete else 'everything'
-        count = f'{len(alike)} signals of {len({signal.topic for signal in alike})} topics'
+        count = f'{len(alike)} signals of {len({(signal.mount, signal.topic) for signal in alike})} topics'
         return f'{where} is {how} ({count})'
     if not alike:
         return 'no signal is equal'
@@ -233,6 +236,7 @@ def _few(names: Sequence[str], separator: str) -> str:
 
 def _switching_figures(change: SwitchingChange) -> dict[str, Any]:
     return {
+        'mount': change.mount.rstrip('/'),
         'kind': 'on' if change.on else 'off',
         'time_a_s': change.time_a,
         'time_b_s': change.time_b,

@@ -14,6 +14,7 @@ import numpy as np
 from mount_bags.definitions import Definition, element_of
 
 HEAD = 4  # bytes: kind of encoding and options
+OPTIONS = slice(2, HEAD)  # bytes of the head that say nothing of the content
 NUMBERS = {
     'boolean': '<u1',
     'octet': '<u1',

@@ -5,15 +5,17 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.alignment import Alignment, Samples, common_samples, is_stamped, samples_of
-from mount_bags.series import Series, SeriesError
+from mount_bags.alignment import Alignment, Samples, common_samples, is_stamped, mount_of, samples_of
+from mount_bags.hidden_differences import Place, hidden_differences
+from mount_bags.layout import OPTIONS
+from mount_bags.series import STAMP, STAMP_BYTES, Series, SeriesError
 from mount_bags.signal_difference import Column
 from mount_ros.force_table_message import ForceTable, ForceTableMessageError, from_bytes
-from mount_ros.topics import CURRENT_FORCE_TABLE
+from mount_ros.topics import CURRENT_FORCE_TABLE, JOINT_STATE
 
 Places = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
-_STAMP_END = 12  # bytes: the head of the encoding and the stamp
 _LARGEST_GRID = 8  # times the samples, chosen: with more holes it is no signal of a fixed rate
 _TABLE = {'current': 'A', 'normal_force': 'N'}
 
@@ -27,6 +29,7 @@ class MatchedTopic:
     def __init__(self, a: Series, b: Series, alignment: Alignment):
         self.a, self.b = a, b
         self.topic = a.registered.name if a.registered else a.topic.lstrip('/')
+        self.mount = mount_of(a.topic, a.registered)
         rated = a.registered is None or a.registered.rate > 0.0
         self.streamed = rated and is_stamped(a) and is_stamped(b)
         self.of_a, self.of_b = (
@@ -83,23 +86,57 @@ class MatchedTopic:
         unit = self.signals[signal]
         if self._tables:
             a, b = (getattr(table, signal) for table in self._tables)
-            return Column(self.topic, signal, unit, np.full(len(a), self.time[-1]), a, b)
+            return Column(self.mount, self.topic, signal, unit, np.full(len(a), self.time[-1]), a, b)
         if signal.startswith('d(') and signal not in self.a.names:
             name = signal.removeprefix('d(').removesuffix(')/dt')
             a, b = self.a.derivative(name), self.b.derivative(name)
         else:
             a, b = self.a[signal], self.b[signal]
-        return Column(self.topic, signal, unit, self.time, a[self._places_a], b[self._places_b])
+        return Column(self.mount, self.topic, signal, unit, self.time, a[self._places_a], b[self._places_b])
 
-    def different_messages(self) -> int:
-        """Return how many of the matched messages differ in any byte but those of their stamps."""
-        begin = _STAMP_END if is_stamped(self.a) else 0
-        rows_a, rows_b = self.a.payloads.rows, self.b.payloads.rows
-        if rows_a is not None and rows_b is not None and rows_a.shape[1] == rows_b.shape[1]:
-            same = (rows_a[self._places_a, begin:] == rows_b[self._places_b, begin:]).all(axis=1)
-            return int(np.count_nonzero(~same))
+    def different_messages(self) -> Mask:
+        """Return which of the matched messages differ in any byte but those of their stamps."""
+        if self.a.type != self.b.type:
+            return np.ones(self.samples, bool)  # the same bytes mean something else
+        rows_a, rows_b, place = self.a.payloads.rows, self.b.payloads.rows, self.a.stamp_place
+        if rows_a is not None and rows_b is not None and place == self.b.stamp_place:
+            if rows_a.shape[1] != rows_b.shape[1]:
+                return np.ones(self.samples, bool)
+            different = rows_a[self._places_a] != rows_b[self._places_b]
+            different[:, OPTIONS] = False
+            if place is not None:
+                different[:, place : place + STAMP_BYTES] = False
+            return different.any(axis=1)
         pairs = zip(self._places_a.tolist(), self._places_b.tolist(), strict=True)
-        return sum(self.a.payloads[i][begin:] != self.b.payloads[k][begin:] for i, k in pairs)
+        return np.array([self.a.content(i) != self.b.content(k) for i, k in pairs], bool)
+
+    def hidden_differences(self) -> Mask:
+        """Return which of the matched messages differ where no signal shows it."""
+        if self._tables:
+            return np.zeros(self.samples, bool)  # the labels name the activation, which is another one
+        rows_a, rows_b = self.a.payloads.rows, self.b.payloads.rows
+        a, b = self.a.layout, self.b.layout
+        if self.a.type != self.b.type or a is None or b is None or rows_a is None or rows_b is None:
+            return self.different_messages()
+        return hidden_differences(a, rows_a[self._places_a], b, rows_b[self._places_b], self._shown())
+
+    def _shown(self) -> set[Place]:
+        """Return the places of what signals show, of one recording alone too, and of stamps and names."""
+        if self.a.type != JOINT_STATE:
+            return {*STAMP, *((name, 0) for name in (*self.signals, *self.lonely_signals))}
+        places = range(max(len(self.a.names), len(self.b.names)))
+        shown = {*STAMP, *((f'name[{place}]', 0) for place in places)}
+        if self._has_columns('position'):
+            shown |= {('position', place) for place in places}
+        if self._has_columns('velocity'):
+            rates = enumerate(self.a.names)
+            shown |= {('velocity', place) for place, name in rates if self.a.derivative_unit(name)}
+        return shown
+
+    def _has_columns(self, part: str) -> bool:
+        """Return whether a `JointState` holds a number for each of its names."""
+        layouts = (self.a, self.a.layout), (self.b, self.b.layout)
+        return all(layout and layout.numbers[part].count == len(series.names) for series, layout in layouts)
 
     def lonely_samples(self) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return how many samples A and B have alone: (within the time that both cover, outside of it)."""

@@ -108,7 +108,7 @@ def _refuse_different_sessions(recordings: Sequence[Recording]) -> None:
 
 def _sessions(recording: Recording) -> dict[bytes, str]:
     """Return {message: text} of all session messages in a recording."""
-    names = [name for name in recording if registered_topic(name) is SESSION]
+    names = [name for name in recording if registered_topic(name, recording.topics[name].type) is SESSION]
     return {
         recording[name].payloads[place]: recording[name].message(place).data
         for name in names

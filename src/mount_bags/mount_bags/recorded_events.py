@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.event_marks import read_marks
+from mount_bags.event_marks import Mark, read_marks
 from mount_bags.reading import Recording
-from mount_bags.series import Series, SeriesError
+from mount_bags.series import Series, SeriesError, registered_topic
 from mount_bags.time_axis import TimeAxis, time_axis
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
@@ -32,25 +32,26 @@ class RecordedEvent:
 def recorded_events(recording: Recording) -> list[RecordedEvent]:
     """Return the events in `recording` in the order of their log times.
 
-    They are the marks of the topic `event`, and where these tell of no `switch_on` or no `switch_off`, the
+    They are the marks of the topics `event`, and where these tell of no `switch_on` or no `switch_off`, the
     changes of `damping_active` in the control trace.
     """
-    marked = marked_events(recording)
+    marked = [
+        RecordedEvent(log_time, mark.time, mark.kind, mark.text)
+        for marks in recorded_marks(recording).values()
+        for log_time, mark in marks
+    ]
     kinds = {event.kind for event in marked}
     derived = [event for event in _switching(recording) if event.kind not in kinds]
     return sorted([*marked, *derived], key=lambda event: event.log_time)
 
 
-def marked_events(recording: Recording) -> list[RecordedEvent]:
-    """Return the marks of the topic `event`."""
-    if EVENT.name not in recording:
-        return []
-    series = recording[EVENT.name]
-    times = series.receive_times.tolist()
-    return [
-        RecordedEvent(time, mark.time, mark.kind, mark.text)
-        for time, mark in zip(times, read_marks(series), strict=True)
-    ]
+def recorded_marks(recording: Recording) -> dict[str, list[tuple[int, Mark]]]:
+    """Return the marks by topic, for each mount has its own `event`; each with its log time (ns)."""
+    return {
+        name: list(zip(recording[name].receive_times.tolist(), read_marks(recording[name]), strict=True))
+        for name, topic in recording.topics.items()
+        if registered_topic(name, topic.type) is EVENT
+    }
 
 
 def find_event(recording: Recording, wanted: str) -> RecordedEvent:

@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 
 from mount_bags.decoding import decode
 from mount_bags.definitions import Definition, installed_class, installed_definition
-from mount_bags.layout import Layout, LayoutError, layout_of
+from mount_bags.layout import HEAD, OPTIONS, Layout, LayoutError, layout_of
 from mount_ros.topics import JOINT_STATE, RACK_TOPICS, TOPICS, Scalar, Topic
 
 Column = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 _SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
+STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
+"""Where the stamp stands in a message: paths, and places in their runs of numbers."""
+STAMP_BYTES = 8
 _OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
 _STEP = re.compile(r'([^.\[\]]+)|\[(\d+)\]')
 
@@ -76,7 +79,7 @@ class Series:
         self.receive_times = receive_times
         self.publish_times = publish_times
         self.payloads = payloads
-        self.registered: Topic | None = registered_topic(topic)
+        self.registered: Topic | None = registered_topic(topic, type_name)
         self._known_definition = definition
         self._obstacle = obstacle
         self._zero = zero
@@ -87,13 +90,30 @@ class Series:
     @functools.cached_property
     def stamps(self) -> Times:
         """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
-        layout, rows = self._layout, self.payloads.rows
+        layout, rows = self.layout, self.payloads.rows
         if layout is None or rows is None:
             return np.array([self._stamp(message) for message in self._decoded], np.int64)
         if _SECONDS not in layout.numbers:
             raise self._without_stamp()
         seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
         return seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows)
+
+    @functools.cached_property
+    def stamp_place(self) -> int | None:
+        """Where the 8 bytes of the stamp begin, None where there is no stamp or its place varies."""
+        if self.layout is not None:
+            seconds = self.layout.numbers.get(_SECONDS)
+            return None if seconds is None else seconds.offset
+        try:
+            definition = self._definition
+        except SeriesError:
+            return None
+        kind = definition.name
+        for field in _SECONDS.split('.'):  # each the first one of its kind
+            first, kind = next(iter(definition.types[kind].items()))
+            if first != field:
+                return None
+        return HEAD
 
     @functools.cached_property
     def time(self) -> Column:
@@ -127,7 +147,7 @@ class Series:
         """The names of the columns."""
         if not len(self):
             return self.registered.names if self.registered else ()
-        layout = self._layout
+        layout = self.layout
         if self.type != JOINT_STATE:
             if layout is None:
                 raise SeriesError(f'{self.topic}: messages of different shape have no columns; use message()')
@@ -164,6 +184,17 @@ class Series:
         """
         return self._deserialised(index)
 
+    def content(self, index: int) -> bytes:
+        """Return the bytes of message `index` without its stamp and without the options of its encoding."""
+        raw, place = self.payloads[index], self.stamp_place
+        if place is None:  # where it varies, it stands in the message's own layout
+            try:
+                seconds = layout_of(raw, self._definition).numbers.get(_SECONDS)
+            except (LayoutError, SeriesError):
+                seconds = None
+            place = seconds.offset if seconds is not None else len(raw)
+        return raw[: OPTIONS.start] + raw[OPTIONS.stop : place] + raw[place + STAMP_BYTES :]
+
     def messages(self) -> Iterator[Any]:
         """Yield all messages, deserialised."""
         return (self._deserialised(index) for index in range(len(self)))
@@ -180,7 +211,7 @@ class Series:
         return self.registered.scalars if self.registered else ()
 
     @functools.cached_property
-    def _layout(self) -> Layout | None:
+    def layout(self) -> Layout | None:
         """The common layout of all messages, None where they differ or cannot be read in place."""
         rows = self.payloads.rows
         if rows is None or not len(rows):
@@ -216,7 +247,7 @@ class Series:
             raise SeriesError(
                 f'{self.topic} has no {name!r}; it has {", ".join(self.names) or "no messages"}'
             )
-        layout, rows = self._layout, self.payloads.rows
+        layout, rows = self.layout, self.payloads.rows
         if not len(self):
             return np.empty(0)
         if layout is None or rows is None:
@@ -227,7 +258,7 @@ class Series:
         return numbers.column(rows, self.names.index(name))
 
     def _path_column(self, path: str) -> Column:
-        layout, rows = self._layout, self.payloads.rows
+        layout, rows = self.layout, self.payloads.rows
         owner, place = _split_place(path)
         if layout is not None and rows is not None:
             numbers = layout.numbers.get(path) or layout.numbers.get(owner)
@@ -259,11 +290,15 @@ class Series:
             raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
 
 
-def registered_topic(name: str) -> Topic | None:
-    """Return the registered topic behind a full name with any namespace, None if there is none."""
+def registered_topic(name: str, type_name: str = '') -> Topic | None:
+    """Return the registered topic behind a full name with any namespace, None if there is none.
+
+    Where `type_name` is given, a topic of another type is a foreign one, whatever its name.
+    """
     known = TOPICS + RACK_TOPICS
     fitting = [topic for topic in known if f'/{name}'.endswith('/' + topic.name.lstrip('/'))]
-    return max(fitting, key=lambda topic: len(topic.name), default=None)
+    found = max(fitting, key=lambda topic: len(topic.name), default=None)
+    return found if found is None or type_name in ('', found.type) else None
 
 
 def _joint_number(message: Any, name: str, part: str) -> float:

@@ -7,17 +7,27 @@ from typing import Any
 import yaml
 
 from mount_bags.reading import Recording
+from mount_bags.series import registered_topic
 from mount_ros.topics import SESSION
 
 _OF_THE_MOMENT = re.compile(r'started|.*\.(uri|port)')  # differs from run to run and explains nothing
 _LISTED = 3  # parameters that only one names
 
 
+def session_texts(recording: Recording) -> dict[str, str]:
+    """Return the last session message by topic, for each mount has its own."""
+    return {
+        name: recording.latched(name).data
+        for name, topic in recording.topics.items()
+        if registered_topic(name, topic.type) is SESSION and len(recording[name])
+    }
+
+
 def session_text(recording: Recording) -> str:
-    """Return the last session message of a recording, empty where it has none."""
-    if SESSION.name not in recording or not len(recording[SESSION.name]):
-        return ''
-    return recording.latched(SESSION.name).data
+    """Return the last session message of a recording, empty where it has none or those of several mounts."""
+    found = session_texts(recording)
+    only = next(iter(found.values())) if len(found) == 1 else ''
+    return found.get(f'/{SESSION.name}', only)
 
 
 def session_differences(a: str, b: str) -> list[str]:

@@ -32,11 +32,13 @@ class Moment:
 class SignalDifference:
     """One signal in both recordings; values in `unit`, unknown is NaN.
 
+    `mount` is what stands before the topic where it is of a namespace: `mount_left/`.
     `differing` samples are beyond the tolerance; NaN in one recording alone always is, NaN in both never.
     `first` is the first of them, `largest` the sample with the largest difference of numbers; `rms` is that
     of the differences of numbers over all samples. `exact` says that all samples are equal to the bit.
     """
 
+    mount: str
     topic: str
     signal: str
     unit: str
@@ -52,7 +54,12 @@ class SignalDifference:
 
     @property
     def name(self) -> str:
-        """Topic and signal."""
+        """Mount, topic and signal."""
+        return f'{self.mount}{self.quantity}'
+
+    @property
+    def quantity(self) -> str:
+        """Topic and signal, of whatever mount."""
         return f'{self.topic}.{self.signal}'
 
     @property
@@ -67,6 +74,7 @@ class SignalDifference:
 class Column:
     """One signal of matched samples: where it is from, times (s), values in A and B."""
 
+    mount: str
     topic: str
     signal: str
     unit: str
@@ -82,6 +90,7 @@ def signal_difference(
 
     `places` numbers the samples in periods (s), for the lag; None where they have no rate.
     """
+    origin = column.mount, column.topic, column.signal, column.unit
     a, b = np.ascontiguousarray(column.a, float), np.ascontiguousarray(column.b, float)
     unknown_a, unknown_b = np.isnan(a), np.isnan(b)
     same = (a.view(np.int64) == b.view(np.int64)) | (unknown_a & unknown_b)
@@ -89,7 +98,7 @@ def signal_difference(
     sizes = np.abs(a[np.isfinite(a)])
     scale = float(sizes.max()) if len(sizes) else math.nan
     if same.all():
-        return SignalDifference(column.topic, column.signal, column.unit, len(a), scale=scale)
+        return SignalDifference(*origin, len(a), scale=scale)
     with np.errstate(invalid='ignore'):
         distance = np.where(same, 0.0, np.abs(b - a))
     bound = tolerance.bound(0.0 if math.isnan(scale) else scale)
@@ -99,9 +108,7 @@ def signal_difference(
     numbers = distance[known]
     largest = int(np.flatnonzero(known)[np.argmax(numbers)]) if (known & ~same).any() else None
     return SignalDifference(
-        column.topic,
-        column.signal,
-        column.unit,
+        *origin,
         samples=len(a),
         differing=len(differing),
         exact=False,

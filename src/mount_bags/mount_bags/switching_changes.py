@@ -12,11 +12,12 @@ _REACH = 0.5  # s, chosen: switchings further apart are not the same one moved
 
 @dataclass(frozen=True)
 class SwitchingChange:
-    """One switching: `on` or off, its times (s) in A and B, None where there is none."""
+    """One switching: `on` or off, its times (s) in A and B, None where there is none, and of which mount."""
 
     on: bool
     time_a: float | None
     time_b: float | None
+    mount: str = ''  # or such as `mount_left/`
 
     @property
     def moved(self) -> float:
@@ -43,7 +44,7 @@ def switching_times(time: Signal, active: Signal) -> tuple[Signal, Signal]:
 
 
 def paired_switchings(
-    a: tuple[Signal, Signal], b: tuple[Signal, Signal], least: float
+    a: tuple[Signal, Signal], b: tuple[Signal, Signal], least: float, mount: str = ''
 ) -> list[SwitchingChange]:
     """Return all switchings of both recordings (on, off) in the order of time.
 
@@ -53,12 +54,12 @@ def paired_switchings(
     found = [
         change
         for on, one, other in ((True, a[0], b[0]), (False, a[1], b[1]))
-        for change in _paired(on, one.tolist(), other.tolist(), least)
+        for change in _paired(on, one.tolist(), other.tolist(), least, mount)
     ]
     return sorted(found, key=lambda change: change.time)
 
 
-def _paired(on: bool, a: list[float], b: list[float], least: float) -> list[SwitchingChange]:
+def _paired(on: bool, a: list[float], b: list[float], least: float, mount: str) -> list[SwitchingChange]:
     near = sorted(
         (abs(one - other), i, k)
         for i, one in enumerate(a)
@@ -72,10 +73,10 @@ def _paired(on: bool, a: list[float], b: list[float], least: float) -> list[Swit
             partner[i] = k
             taken.add(k)
     changes = [
-        SwitchingChange(on, time, _same(time, b[partner[i]], least) if i in partner else None)
+        SwitchingChange(on, time, _same(time, b[partner[i]], least) if i in partner else None, mount)
         for i, time in enumerate(a)
     ]
-    return changes + [SwitchingChange(on, None, time) for k, time in enumerate(b) if k not in taken]
+    return changes + [SwitchingChange(on, None, time, mount) for k, time in enumerate(b) if k not in taken]
 
 
 def _same(one: float, other: float, least: float) -> float:

@@ -35,14 +35,17 @@ class Tolerances:
     def __init__(self, texts: Iterable[str] = ()):
         """Read `NAME=0.01`, `NAME=1%` or, for all signals, `1%`; raises `ToleranceError`.
 
-        NAME is a signal (`current`), a topic (`current_setpoint`), both (`control_trace.current`), or
-        `switching` for the times of switching in s.
+        NAME is a signal (`current`), a topic (`current_setpoint`), both (`control_trace.current`), the same
+        of one mount (`mount_left/control_trace.current`), or `switching` for the times of switching in s.
         """
         self._by_name = dict(map(_read, texts))
 
-    def of(self, topic: str, signal: str) -> Tolerance:
-        """Return the tolerance of a signal; the name that says most counts."""
-        for name in (f'{topic}.{signal}', signal, topic, _ALL):
+    def of(self, mount: str, topic: str, signal: str) -> Tolerance:
+        """Return the tolerance of a signal; the name that says most counts.
+
+        `mount` is what stands before the topic: `mount_left/`, or nothing.
+        """
+        for name in (f'{mount}{topic}.{signal}', f'{topic}.{signal}', signal, mount + topic, topic, _ALL):
             if name in self._by_name:
                 return self._by_name[name]
         return EXACT
@@ -52,10 +55,12 @@ class Tolerances:
         """By how much a switching may move, s."""
         return self._by_name.get(SWITCHING, EXACT).value
 
-    def check(self, known: Collection[tuple[str, str]]) -> None:
-        """Raise `ToleranceError` for a name that is none of `known` (topic, signal)."""
-        topics, signals = {topic for topic, _ in known}, {signal for _, signal in known}
-        names = topics | signals | {f'{topic}.{signal}' for topic, signal in known} | {SWITCHING, _ALL}
+    def check(self, known: Collection[tuple[str, str, str]]) -> None:
+        """Raise `ToleranceError` for a name that is none of `known` (mount, topic, signal)."""
+        topics = {name for mount, topic, _ in known for name in (topic, mount + topic)}
+        signals = {signal for _, _, signal in known}
+        both = {f'{name}.{signal}' for mount, topic, signal in known for name in (topic, mount + topic)}
+        names = topics | signals | both | {SWITCHING, _ALL}
         for name in self._by_name:
             if name not in names:
                 near = difflib.get_close_matches(name, names - {_ALL}, n=3)

@@ -241,6 +241,7 @@ def test_json_holds_what_the_words_say_and_no_nan(compared):
     figures = json.loads(json.dumps(as_json(comparison), allow_nan=False))
     assert figures['equal'] is False
     assert figures['switching'][0] == {
+        'mount': '',
         'kind': 'on',
         'time_a_s': pytest.approx(0.1),
         'time_b_s': pytest.approx(0.112),

@@ -129,7 +129,7 @@ def test_undefined_bytes_between_numbers_do_not_matter(tmp_path):
     for index, raw in enumerate(raws):
         raw[17:20] = bytes([index] * 3)  # behind the empty frame_id
     series = bag_of(tmp_path / 'bag', '/displacement', JOINT_STATE, map(bytes, raws))['displacement']
-    assert series._layout is not None
+    assert series.layout is not None
     np.testing.assert_array_equal(series['mount'], range(10))
 
 

@@ -32,6 +32,12 @@ def test_the_frequency_between_two_lines_of_the_spectrum_is_found():
     assert sine.share == pytest.approx(1.0, abs=1e-9)
 
 
+def test_a_sine_of_which_less_than_two_periods_were_recorded_is_found_too():
+    sine = dominant_sine(TIME, 0.3 + 2.0 * np.sin(2 * np.pi * 0.2 * TIME + 1.0))
+    assert sine.frequency == pytest.approx(0.2, rel=1e-3)
+    assert sine.amplitude == pytest.approx(2.0, rel=1e-2)
+
+
 def test_noise_is_no_sine():
     assert dominant_sine(TIME, np.random.default_rng(1).normal(size=len(TIME))).share < 0.1
 

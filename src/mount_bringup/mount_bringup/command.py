@@ -3,7 +3,6 @@
 import sys
 
 import typer
-from rich.console import Console
 
 from mount_bringup.commands import (
     accept,
@@ -21,6 +20,7 @@ from mount_bringup.commands import (
     report,
 )
 from mount_bringup.commands.identify_arguments import with_repeated_options
+from mount_bringup.terminal import refuse, terminal
 from mount_ros.environment import prepare_environment
 
 app = typer.Typer(
@@ -47,7 +47,7 @@ def bench() -> None:
     """Measure what matters for speed, each figure beside its alternative in the same run."""
     from mount_bringup.bench.bench import print_bench
 
-    print_bench(Console())
+    print_bench(terminal())
 
 
 @app.command()
@@ -55,7 +55,7 @@ def prepare() -> None:
     """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""
     from mount_bringup.core.run import run_core
 
-    console = Console()
+    console = terminal()
     with console.status('compiling the laws for this machine (once, about half a minute)'):
         for scenario in ('bench', 'motorway'):
             sim = {'scenario': scenario, 'timeline.duration': 0.5}
@@ -89,8 +89,8 @@ def main(arguments: list[str] | None = None) -> None:
             raise
         end_process(end.code)
     except (KeyboardInterrupt, Interrupted):
-        Console(stderr=True).print('interrupted; the coil is at 0 A')
+        terminal(stderr=True).print('interrupted; the coil is at 0 A')
         end_process(_INTERRUPTED)
     except (ValueError, GraphError, OSError) as error:
-        Console(stderr=True).print(f'[red]engine-mount:[/red] {error}', soft_wrap=True, highlight=False)
+        refuse(error)
         end_process(1)

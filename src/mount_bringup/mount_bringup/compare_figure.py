@@ -53,18 +53,18 @@ def draw_comparison(comparison: Comparison, a: Recording, b: Recording, file: Pa
 
 
 def _chosen(comparison: Comparison) -> list[SignalDifference]:
-    drawable = [signal for signal in by_importance(comparison) if signal.samples >= _LEAST_SAMPLES]
+    drawable = [signal for signal in by_importance(comparison.signals) if signal.samples >= _LEAST_SAMPLES]
     if drawable:
         return _without_twins(drawable)[:_SIGNALS]
     known = [signal for signal in comparison.signals if signal.samples >= _LEAST_SAMPLES]
-    return [signal for signal in known if signal.name in _ALWAYS] or known[:1]
+    return [signal for signal in known if signal.quantity in _ALWAYS] or known[:1]
 
 
 def _without_twins(signals: list[SignalDifference]) -> list[SignalDifference]:
     """Leave out what is the same quantity a second time, such as the setpoint in the control trace."""
     seen, chosen = set(), []
     for signal in signals:
-        twin = (signal.unit, signal.largest)
+        twin = (signal.mount, signal.unit, signal.largest)
         if twin not in seen:
             seen.add(twin)
             chosen.append(signal)
@@ -74,13 +74,13 @@ def _without_twins(signals: list[SignalDifference]) -> list[SignalDifference]:
 def _columns(
     comparison: Comparison, a: Recording, b: Recording, signals: list[SignalDifference]
 ) -> list[tuple[SignalDifference, Column]]:
-    topics = {topic.topic: topic for topic in matched_topics(a, b, comparison.alignment)}
-    return [(signal, topics[signal.topic].column(signal.signal)) for signal in signals]
+    topics = {(topic.mount, topic.topic): topic for topic in matched_topics(a, b, comparison.alignments)}
+    return [(signal, topics[signal.mount, signal.topic].column(signal.signal)) for signal in signals]
 
 
 def _draw(axes: NDArray[Any], signal: SignalDifference, column: Column) -> None:
     factor, unit = _HANDY.get(signal.unit, (1.0, signal.unit))
-    named = f'{signal.topic}\n{signal.signal}' + (f' ({unit})' if unit else '')
+    named = f'{signal.mount}{signal.topic}\n{signal.signal}' + (f' ({unit})' if unit else '')
     centre = signal.largest or signal.first
     for place, (upper, lower) in enumerate(axes.T):
         shown = slice(None)

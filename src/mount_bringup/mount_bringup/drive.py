@@ -4,6 +4,7 @@ import contextlib
 import math
 import platform
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
 from importlib import metadata
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.text import Text
 
 from mount_bags.audit import audit
 from mount_bags.audit_report import as_table, sentences
@@ -37,6 +39,7 @@ from mount_bringup.summary import (
     summarise_snapshots,
     write_json,
 )
+from mount_bringup.terminal import note
 from mount_models.quantity import with_flattened
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
@@ -78,9 +81,12 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
         return _tell_snapshots(order, folder, run, complaints, console)
     recording = open_recording(folder.recording)
     complaints += recording.warnings
-    figures = _evaluate(order, folder, recording, run, console, complaints)
+    drive_data = load_drive(recording, time_axis(recording).zero)
+    figures = _evaluate(order, folder, recording, drive_data, run, console, complaints)
     if order.report:
-        complaints += _write_report(folder, recording, console)
+        begin = figures['excitation_start_s']
+        complaints += _complaint(folder.figure, lambda: _draw(order, folder, drive_data, begin))
+        complaints += _complaint(folder.report, lambda: _write_report(folder, recording, console))
     return DriveOutcome(figures, folder, [folder.recording], complaints)
 
 
@@ -90,9 +96,8 @@ def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[s
     Raises as `drive` does.
     """
     excitation = preflight(order.parameters)
-    for note in excitation.notes:
-        console.print('[yellow]note[/yellow]', end=' ')
-        console.print(note, soft_wrap=True, highlight=False, markup=False)
+    for remark in excitation.notes:
+        note(console, remark)
     folder = make_run_folder(order.out, order.scenario)
     complaints: list[str] = []
     if order.mode == 'core':
@@ -109,11 +114,10 @@ def _tell_snapshots(
         recording = open_recording(place)
         audits = audit(recording)
         found = losses(recording, audits)
-        verdict = sentences(audits, found)[-1]
-        console.print(f'{place.name}: {verdict}', soft_wrap=True, highlight=False)
+        console.print(f'{place.name}: {sentences(audits, found)[-1]}', soft_wrap=True)
         complaints += [*recording.warnings, *(f'{place.name}: {words}' for words in found.complaints())]
     parameters = _recorder_parameters(order)
-    console.print(snapshots_sentence(len(saved), parameters), soft_wrap=True, highlight=False)
+    console.print(snapshots_sentence(len(saved), parameters), soft_wrap=True)
     figures = summarise_snapshots(saved, run)
     write_json(figures, folder.summary)
     return DriveOutcome(figures, folder, saved, complaints)
@@ -127,17 +131,15 @@ def _evaluate(
     order: DriveOrder,
     folder: RunFolder,
     recording: Recording,
+    drive_data: Drive,
     run: dict[str, Any],
     console: Console,
     complaints: list[str],
 ) -> dict[str, Any]:
-    drive_data = load_drive(recording, time_axis(recording).zero)
     audits = audit(recording)
     found = losses(recording, audits)
     complaints += [*found.complaints(), *samples_at_the_ends(recording, audits, run['samples'])]
     figures = summarise(recording, audits, found, drive_data, order.parameters, run)
-    if order.report:
-        _draw(order, folder, drive_data, figures['excitation_start_s'])
     write_json(figures, folder.summary)
     print_summary(figures, found, console)
     console.print(as_table(audits))
@@ -152,16 +154,18 @@ def _draw(order: DriveOrder, folder: RunFolder, drive_data: Drive, begin: float)
     draw_drive(drive_data, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)
 
 
-def _write_report(folder: RunFolder, recording: Recording, console: Console) -> list[str]:
-    """Write the page about the run; what prevents it is a complaint, for the recording is there."""
-    from mount_bags.report.chart import ChartError  # after the drive, as above
-    from mount_bags.report.report import ReportError
-    from mount_bringup.report_pages import write_report
+def _write_report(folder: RunFolder, recording: Recording, console: Console) -> None:
+    from mount_bringup.report_pages import write_report  # after the drive, as above
 
+    write_report([recording], None, folder.report, None, console)
+
+
+def _complaint(file: Path, make: Callable[[], None]) -> list[str]:
+    """Make the picture or page of a drive; what prevents it is a complaint, for the recording is there."""
     try:
-        write_report([recording], None, folder.report, None, console)
-    except (ReportError, ChartError) as error:
-        return [str(error)]
+        make()
+    except Exception as error:  # whatever it stumbles over
+        return [f'{file.name} could not be made: {str(error) or type(error).__name__}']
     return []
 
 
@@ -180,7 +184,10 @@ def _drive_graph(
     with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
         try:
             with console.status('starting') as status:
-                supervisor.start(lambda all_parameters: _session(order, all_parameters), status.update)
+                supervisor.start(
+                    lambda all_parameters: _session(order, all_parameters),
+                    lambda what: status.update(Text(what)),
+                )
             duration = excitation.start + excitation.duration
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
             _watch_drive(order, supervisor, limit, console)
@@ -189,8 +196,8 @@ def _drive_graph(
                 supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
         finally:
             complaints += supervisor.stop()
-            for note in supervisor.notes:
-                console.print(f'[yellow]note[/yellow] {note}')
+            for sentence in supervisor.notes:
+                note(console, sentence)
     return {
         'scenario': order.scenario,
         'mode': order.mode,
@@ -206,7 +213,7 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
     # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
     keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
     with keyboard as keys, progress_bar(console) as progress:
-        set_mark = supervisor.mark_setter(lambda answer: console.print(answer, highlight=False))
+        set_mark = supervisor.mark_setter(lambda answer: console.print(answer, soft_wrap=True))
         hint = '; m or space: mark' if keys is not None and keys.present else ''
         task = progress.add_task(f'driving ({order.scenario}{hint})', total=1.0)
 

@@ -6,5 +6,6 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 def progress_bar(console: Console, *, transient: bool = False) -> Progress:
     """Return the bar; a `transient` one is gone when the work is done."""
-    columns = (TextColumn('{task.description}'), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    what = TextColumn('{task.description}', markup=False)
+    columns = (what, BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     return Progress(*columns, console=console, transient=transient)

@@ -64,7 +64,7 @@ def record(order: RecordOrder, console: Console) -> RecordOutcome:
         recorder = _LoneRecorder(order, names, context)
         try:
             recorder.begin()
-            console.print(f'recording {len(names)} topics', highlight=False)
+            console.print(f'recording {len(names)} topics', soft_wrap=True)
             _watch(recorder, order, asked, console)
         finally:
             outcome = recorder.end()

@@ -11,6 +11,7 @@ from mount_bags.reading import Recording
 from mount_bags.report.report import ReportError, make_report, subjects_of
 from mount_bringup.progress_bar import progress_bar
 from mount_bringup.run_facts import run_facts
+from mount_bringup.terminal import note
 
 PAGE = 'report.html'
 
@@ -21,7 +22,13 @@ def default_page(path: Path) -> Path:
         return path / PAGE
     if path.name == 'recording' and path.is_dir():
         return path.absolute().parent / PAGE
-    return path.absolute().parent / f'{path.absolute().stem}_{PAGE}'
+    return path.absolute().with_name(f'{path.absolute().name if path.is_dir() else path.stem}_{PAGE}')
+
+
+def default_pictures(page: Path) -> Path:
+    """Return the folder of the PNGs beside `page`: its name without `.html`."""
+    named = page.name.removesuffix('.html')
+    return page.with_name(named if named != page.name else f'{named}_pictures')
 
 
 def write_report(
@@ -33,8 +40,8 @@ def write_report(
 ) -> list[Path]:
     """Write the page to `file` and its figures into `pictures` unless that is None; return those files.
 
-    With `other`, it shares the figures and its differences from the first recording are told. Raises
-    `ReportError`.
+    With `other`, it shares the figures and its differences from the first recording are told. What could
+    not be made of the page is printed. Raises `ReportError`.
     """
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
@@ -47,6 +54,8 @@ def write_report(
         on_step('comparing', 0.2)
         comparison = _comparison(recordings[0], other)
         made = make_report(subjects, comparison, lambda what, share: on_step(what, 0.2 + 0.4 * share))
+        for failure in made.failures:
+            note(console, failure)
         on_step('writing the page', 0.6)
         try:
             file.parent.mkdir(parents=True, exist_ok=True)

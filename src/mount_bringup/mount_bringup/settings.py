@@ -19,6 +19,10 @@ from mount_sim.parameters import SimParameters
 DEFAULT_DAMPER = 'viscous_2000'
 
 
+class SettingError(ParameterError):
+    """An option `--set` is not written as it must be; the text says how."""
+
+
 def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
     return {
@@ -38,15 +42,26 @@ def defaults_of_nodes() -> dict[str, dict[str, Any]]:
 
 
 def settings_of_options(options: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of options NODE.NAME=VALUE; raises `ParameterError`."""
+    """Return {node: {parameter: value}} of options NODE.NAME=VALUE; raises `SettingError`."""
     parameters: dict[str, dict[str, Any]] = {}
     for option in options:
         name, equals, text = option.partition('=')
         node, dot, parameter = name.partition('.')
         if not (equals and dot and parameter):
-            raise ParameterError(f'--set {option}: write NODE.NAME=VALUE, as in mount_control.quality=0.7')
-        parameters.setdefault(node, {})[parameter] = yaml.safe_load(text)
+            raise SettingError(f'--set {option}: write NODE.NAME=VALUE, as in mount_control.quality=0.7')
+        parameters.setdefault(node, {})[parameter] = setting_value(option, text)
     return parameters
+
+
+def setting_value(option: str, text: str) -> Any:
+    """Return the value that `text` (YAML) in `--set option` gives; raises `SettingError`."""
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError):  # the second of dates that are none
+        raise SettingError(
+            f'--set {option}: the value {text!r} is no YAML; put it in quotes of its own, as in '
+            f'\'{option.removesuffix(text)}"{text}"\''
+        ) from None
 
 
 def checked_settings(

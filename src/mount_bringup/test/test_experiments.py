@@ -77,7 +77,6 @@ def test_the_list_names_every_experiment():
         (['sawtooth', '--set', 'sawtooth.amplitude=1'], 'must lie within 0.0005 .. 0.01 m'),
         (['sawtooth', '--set', 'mount_sim.seed=1'], "'mount_sim' is no owner of parameters here"),
         (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
-        (['sawtooth', '--set', 'amplitude=1'], 'write NODE.NAME=VALUE'),
     ],
 )
 def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, tmp_path):
@@ -87,6 +86,13 @@ def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, t
     assert isinstance(refused.exception, ValueError)
     assert sentence in str(refused.exception)
     assert not (out.exists() and any(out.iterdir()))
+
+
+def test_a_setting_without_its_owner_is_a_wrong_use(tmp_path):
+    refused = command('sawtooth', '--set', 'amplitude=1', '--out', str(tmp_path / 'out'))
+    assert refused.exit_code == 2
+    assert 'write NODE.NAME=VALUE' in refused.output
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_that_holds_something_is_refused(tmp_path):

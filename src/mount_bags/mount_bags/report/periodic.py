@@ -23,8 +23,8 @@ class Sine:
 def dominant_sine(time: Array, values: Array) -> Sine:
     """Return the sine that takes most of the variance of `values` (at the evenly spaced `time`, s).
 
-    Found in the discrete spectrum, then refined between its lines by least squares. NaN where there is no
-    variation or are fewer than 8 samples.
+    Found in the discrete spectrum, then refined between its lines by least squares; a stretch shorter than a
+    period has one too. NaN where there is no variation or are fewer than 8 samples.
     """
     if len(values) < 8 or not np.isfinite(values).all() or np.ptp(values) == 0.0:
         return Sine(math.nan, math.nan, math.nan)
@@ -40,7 +40,7 @@ def dominant_sine(time: Array, values: Array) -> Sine:
         else:
             low = left
     frequency = 0.5 * (low + high)
-    amplitude = float(harmonics(time, values, frequency, 1)[0])
+    amplitude = float(_amplitudes(time, values, frequency, 1)[0])
     share = 1.0 - _residual(time, values, frequency) / float(centred @ centred)
     return Sine(frequency, amplitude, share)
 
@@ -54,8 +54,7 @@ def harmonics(time: Array, values: Array, frequency: float, count: int = 8) -> A
         raise ValueError(
             f'harmonics of {frequency:.4g} Hz need two periods; {time[-1] - time[0]:.4g} s were given'
         )
-    solution = np.linalg.lstsq(_base(time, frequency, count), values, rcond=None)[0]
-    return np.hypot(solution[1::2], solution[2::2])
+    return _amplitudes(time, values, frequency, count)
 
 
 def distortion(amplitudes: Array) -> float:
@@ -82,6 +81,11 @@ def cycle_work(displacement: Array, force: Array, periods: int) -> float:
     """
     steps = np.diff(displacement)
     return float(np.sum(0.5 * (force[1:] + force[:-1]) * steps)) / periods
+
+
+def _amplitudes(time: Array, values: Array, frequency: float, count: int) -> Array:
+    solution = np.linalg.lstsq(_base(time, frequency, count), values, rcond=None)[0]
+    return np.hypot(solution[1::2], solution[2::2])
 
 
 def _residual(time: Array, values: Array, frequency: float) -> float:

@@ -33,6 +33,7 @@ class Report:
     title: str
     sections: Sequence[Section]
     points: int
+    failures: Sequence[str] = ()  # a sentence for each section that could not be made
 
     def write_page(self, file: Path) -> None:
         """Write the HTML page; raises `OSError`."""
@@ -77,7 +78,10 @@ def make_report(
     comparison: Comparison | None = None,
     on_step: OnStep = lambda what, share: None,
 ) -> Report:
-    """Return the report of `subjects`; a `comparison` adds the differences that it found."""
+    """Return the report of `subjects`; a `comparison` adds the differences that it found.
+
+    In the place of a section that could not be made stands why.
+    """
     audits, found = [], []
     for place, subject in enumerate(subjects):
         on_step(f'auditing {subject.name}', 0.3 * place / len(subjects))
@@ -98,15 +102,26 @@ def make_report(
         ('parameters', lambda: run_sections.parameters(subjects)),
     ]
     made: list[Section] = []
+    failures: list[str] = []
     for place, (what, make) in enumerate(makers):
         on_step(what, 0.3 + 0.7 * place / len(makers))
-        section = make()
-        if section is not None:
-            made.append(section)
+        made += _section_or_reason(what, make, failures)
     # Last, for it also says what the others looked for in vain.
-    overview = run_sections.overview(subjects, audits, found)
+    overview = _section_or_reason(
+        'overview', lambda: run_sections.overview(subjects, audits, found), failures
+    )
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
-    return Report(title, [overview, *made], POINTS // len(subjects))
+    return Report(title, [*overview, *made], POINTS // len(subjects), failures)
+
+
+def _section_or_reason(what: str, make: Callable[[], Section | None], failures: list[str]) -> list[Section]:
+    try:
+        section = make()
+    except Exception as error:  # whatever it stumbles over: the other sections are worth having
+        reason = str(error) or type(error).__name__
+        failures.append(f'section {what} could not be made: {reason}')
+        return [Section(what, what.capitalize(), [f'Section {what} could not be made: {reason}'])]
+    return [] if section is None else [section]
 
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
@@ -121,6 +136,6 @@ def _names(recordings: Sequence[Recording]) -> list[str]:
 
 def _shares_stamps(first: Recording, other: Recording) -> bool:
     try:
-        return align(first, other).same_stamps
+        return align(first, other).first.same_stamps
     except ComparisonError:
         return False

@@ -126,12 +126,11 @@ def losses(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses])
 
 def differences(comparison: Comparison) -> Section:
     """Return in words and figures how B differs from A."""
-    alignment = comparison.alignment
     words = [
-        f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment.sentence}.',
+        f'A is {comparison.name_a}, B is {comparison.name_b}; {comparison.alignments.sentence}.',
         *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
     ]
-    ordered = by_importance(comparison)
+    ordered = by_importance(comparison.signals)
     rows = [
         (
             signal.name,

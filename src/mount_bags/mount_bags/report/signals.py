@@ -4,15 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.event_marks import Mark, read_marks
+from mount_bags.event_marks import Mark
 from mount_bags.origin import short_name
 from mount_bags.reading import ReadingError, Recording
+from mount_bags.recorded_events import recorded_marks
 from mount_bags.report.chart import Array
 from mount_bags.series import Series, SeriesError
 from mount_bags.session_differences import session_text
 from mount_bags.switching_changes import switching_times
 from mount_bags.time_axis import time_axis
-from mount_ros.topics import CONTROL_TRACE, EVENT
+from mount_ros.topics import CONTROL_TRACE
 
 
 @dataclass(frozen=True)
@@ -73,12 +74,12 @@ class Signals:
         """Return its marks with their times (s), none where there is no readable topic of them."""
         shift = (self.axis.zero - self.zero) / 1e9
         try:
-            if EVENT.name not in self.recording:
-                return []
-            series = self.recording[EVENT.name]
-            logged = zip(read_marks(series), series.receive_times.tolist(), strict=True)
-            return [(self.axis.of_mark(mark.time, time) + shift, mark) for mark, time in logged]
-        except (ReadingError, SeriesError, AttributeError):
+            return [
+                (self.axis.of_mark(mark.time, time) + shift, mark)
+                for marks in recorded_marks(self.recording).values()
+                for time, mark in marks
+            ]
+        except (ReadingError, SeriesError):
             return []
 
     def _ordered(self, series: Series, values: Array) -> Signal:

@@ -48,7 +48,7 @@ def print_bench(console: Console) -> None:
             table.add_row(row.what, _duration(row.ours), row.other_name, _duration(row.other), faster)
     console.print(table)
     for figure in storage:
-        console.print(f'{figure.what}: {figure.per_second:,.0f} messages/s', highlight=False)
+        console.print(f'{figure.what}: {figure.per_second:,.0f} messages/s', soft_wrap=True)
 
 
 def _packing() -> Comparison:
@@ -117,8 +117,8 @@ def _replay() -> Comparison:
         times = []
         for _ in range(_ROUNDS):
             outcome = replay_without_output(ReplayOrder(recording))
-            assert outcome.difference is not None
-            assert outcome.difference.equal
+            assert outcome.agreement is not None
+            assert outcome.agreement.equal
             times.append(outcome.computing_time / sum(len(run.stamps) for run in outcome.replayed.runs))
     return Comparison('replay one sample', statistics.median(times), 'real time', SAMPLE_TIME)
 

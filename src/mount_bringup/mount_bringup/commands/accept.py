@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+
+from mount_bringup.terminal import terminal
 
 EPILOG = """Examples:
 
@@ -27,13 +28,12 @@ def accept(
     from mount_bringup.recording_path import open_run
 
     accepted = accept_run(open_run(run), reference, reason, folder, versions())
-    console = Console()
+    console = terminal()
     for change in accepted.changes or ('new reference',):
-        console.print(f'- {change}', soft_wrap=True, highlight=False, markup=False)
+        console.print(f'- {change}', soft_wrap=True)
     console.print(
         f'reference  {accepted.folder}, {accepted.size / 1e6:.2f} MB; '
         f'all references {accepted.total / 1e6:.2f} MB\n'
         f'reason     {accepted.folder / ACCEPTED_NAME}',
         soft_wrap=True,
-        highlight=False,
     )

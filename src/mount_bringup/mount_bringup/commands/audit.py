@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from mount_bringup.commands.options import JsonFile
+from mount_bringup.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
 control left samples without a setpoint, on faults, or when nothing can be read.
@@ -37,19 +37,18 @@ def audit(
     from mount_bags.losses import losses
     from mount_bags.reading import open_recording
 
-    console = Console()
+    console = terminal()
     with console.status('reading'):
         opened = open_recording(recording)
         audits = audited(opened)
         found = losses(opened, audits)
     console.print(as_table(audits))
     for line in latency_lines(audits):
-        console.print(line, soft_wrap=True, highlight=False)
+        console.print(line, soft_wrap=True)
     for sentence in sentences(audits, found):
-        console.print(sentence, soft_wrap=True, highlight=False, markup=False)
+        console.print(sentence, soft_wrap=True)
     for warning in opened.warnings:
-        console.print('[yellow]note[/yellow]', end=' ')
-        console.print(warning, soft_wrap=True, highlight=False, markup=False)
+        note(console, warning)
     if json_file is not None:
         json_file.write_text(json.dumps(as_json(audits, found), indent=2) + '\n', encoding='utf-8')
     if not found.sound:

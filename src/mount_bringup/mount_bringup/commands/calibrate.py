@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn
 from rich.table import Table
+
+from mount_bringup.progress_bar import progress_bar
+from mount_bringup.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_models.specimen import Specimen
@@ -92,12 +94,12 @@ def actuator(
     from mount_models.actuator.fit import fit_force_law
     from mount_models.specimen import chosen_specimen
 
-    console = Console()
+    console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     given = GivenValues(_per_file(gaps or [], files, '--gap', 1e-6), {})
     chosen_orders = _orders(orders)
-    with _progress(console) as progress:
+    with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=None)
         points = read_force(files, _columns(columns or []), given)
         progress.update(task, description='fitting')
@@ -119,15 +121,15 @@ def actuator(
     for gap, rms in zip(fit.gaps, fit.gap_rms, strict=True):
         table.add_row(f'{gap * 1e6:.1f}', f'{rms:.2f}')
     console.print(table)
-    _say(
-        console,
+    console.print(
         f'{fit.points} points; error rms {fit.relative_rms:.2%} of the force above 20 N, worst '
         f'{fit.worst:.2%}; rms {fit.rms_error:.2f} N, largest {fit.largest_error:.2f} N',
+        soft_wrap=True,
     )
-    _say(
-        console,
+    console.print(
         f'positive, rising with the current and falling with the gap within {law.gap_low * 1e6:.1f} .. '
         f'{law.gap_high * 1e6:.1f} um and 0 .. {law.current_high:.2f} A; refused beyond',
+        soft_wrap=True,
     )
     figures: dict[str, Any] = {
         'specimen': specimen.name,
@@ -146,7 +148,7 @@ def actuator(
         from mount_bringup.calibration.figure import draw_force_law
 
         draw_force_law(points, law, figure)
-        console.print(f'figure     {figure}', highlight=False)
+        console.print(f'figure     {figure}', soft_wrap=True)
     _write(console, specimen, figures, json_file, out)
 
 
@@ -190,7 +192,7 @@ def inductance(
     from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
     from mount_models.specimen import chosen_specimen
 
-    console = Console()
+    console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     order = GapOrder(
@@ -202,7 +204,7 @@ def inductance(
     )
     area = _positive(turns_area, '--turns-area', 'm^2') or starting.turns_area
     given = _given_ripple(files, gaps or [], temperatures or [])
-    with _progress(console) as progress:
+    with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=2)
         recordings = read_ripple(files, _columns(columns or []), given, area)
         progress.update(task, description='fitting', completed=1)
@@ -219,15 +221,14 @@ def inductance(
     for table in result.tables():
         console.print(table)
     for sentence in result.sentences():
-        _say(console, sentence)
+        console.print(sentence, soft_wrap=True)
     for warning in result.warnings:
-        console.print('[yellow]warning[/yellow]', end=' ')
-        _say(console, warning)
+        note(console, warning, 'warning')
     if figure is not None:
         from mount_bringup.calibration.figure import draw_gap_curves
 
         draw_gap_curves(result, order, figure)
-        console.print(f'figure     {figure}', highlight=False)
+        console.print(f'figure     {figure}', soft_wrap=True)
     _write(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)
 
 
@@ -251,11 +252,11 @@ def rack(
     from mount_sim.rack import Rack, drawn_rack, write_force, write_ripple
     from mount_sim.rack_friction import drawn_friction, write_friction
 
-    console = Console()
+    console = terminal()
     chosen = replace(drawn_rack(seed) if drawn else Rack(seed=seed), noise=noise)
     pads = drawn_friction(seed) if drawn else (FrictionContact(), FrictionCoefficients())
     out.mkdir(parents=True, exist_ok=True)
-    with _progress(console) as progress:
+    with progress_bar(console, transient=True) as progress:
         each = tuple(celsius or (20.0,))
         task = progress.add_task('measuring', total=2 + len(each))
         written = [write_force(chosen, out / 'force.csv')]
@@ -265,7 +266,7 @@ def rack(
             progress.advance(task)
         written += write_friction(out, *pads, noise, seed)
         progress.advance(task)
-    console.print(f'{len(written)} recordings in {out}', highlight=False)
+    console.print(f'{len(written)} recordings in {out}', soft_wrap=True)
 
 
 _FLOOR = 0.006  # chosen: weights as 2 N of 330 N
@@ -371,22 +372,8 @@ def _write(
         write_json(figures, json_file)
     if out is not None:
         save_specimen(specimen, out)
-        console.print(f'specimen   {out}', highlight=False)
+        console.print(f'specimen   {out}', soft_wrap=True)
     note_foreign(console, foreign_parts(specimen), specimen.name)
-
-
-def _progress(console: Console) -> Progress:
-    return Progress(
-        SpinnerColumn(),
-        TextColumn('{task.description}'),
-        *Progress.get_default_columns()[1:],
-        console=console,
-        transient=True,
-    )
-
-
-def _say(console: Console, sentence: str) -> None:
-    console.print(sentence, soft_wrap=True, highlight=False, markup=False)
 
 
 def note_foreign(console: Console, parts: list[str], name: str) -> None:
@@ -396,8 +383,7 @@ def note_foreign(console: Console, parts: list[str], name: str) -> None:
         'friction': 'identify friction',
     }
     for part in parts:
-        console.print('[yellow]note[/yellow]', end=' ')
-        _say(
+        note(
             console,
             f'{part} is not yet that of {name!r} but of its base; run engine-mount {command[part]} with this '
             'file as --base',

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from mount_bringup.commands.options import JsonFile
+from mount_bringup.terminal import note, refuse, terminal
 
 EPILOG = """Examples:
 
@@ -17,7 +17,7 @@ EPILOG = """Examples:
 
 `engine-mount compare bags/long bags/cut --common --figure difference.png`
 """
-_INCOMPARABLE = 2
+_NOT_COMPARED = 2
 
 
 def compare(
@@ -28,7 +28,8 @@ def compare(
         typer.Option(
             '--tolerance',
             metavar='NAME=VALUE',
-            help='signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s',
+            help='signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
+            'also topic=, topic.signal=, mount_left/topic.signal=',
         ),
     ] = None,
     common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
@@ -39,40 +40,47 @@ def compare(
 ) -> None:
     """Tell in words how recording B differs from recording A.
 
-    Exit code 0: equal to the bit, or within the tolerances; 1: different; 2: not to be compared.
+    Exit code 0: equal to the bit, or within the tolerances; 1: different; 2: not compared, as where A or B is
+    no recording.
     """
-    from mount_bags.alignment import ComparisonError
+    try:
+        equal = _told(a, b, tolerances or [], common, json_file, figure)
+    except (ValueError, OSError) as error:
+        refuse(error)
+        raise typer.Exit(_NOT_COMPARED) from None
+    if not equal:
+        raise typer.Exit(1)
+
+
+def _told(
+    a: Path, b: Path, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
+) -> bool:
+    """Compare, print and write what differs; return whether all is equal."""
     from mount_bags.compare import compare as compare_recordings
     from mount_bags.comparison_words import as_json, as_table, sentences
     from mount_bags.tolerances import Tolerances
     from mount_bringup.recording_path import open_run
 
-    console = Console()
+    console = terminal()
     recordings = open_run(a), open_run(b)
-    try:
-        comparison = compare_recordings(*recordings, Tolerances(tolerances or ()), common_only=common)
-    except ComparisonError as error:
-        Console(stderr=True).print(f'[red]engine-mount:[/red] {error}', soft_wrap=True, highlight=False)
-        raise typer.Exit(_INCOMPARABLE) from None
-    console.print(f'A {comparison.name_a}, B {comparison.name_b}', highlight=False)
+    comparison = compare_recordings(*recordings, Tolerances(tolerances), common_only=common)
+    console.print(f'A {comparison.name_a}, B {comparison.name_b}', soft_wrap=True)
     for sentence in sentences(comparison):
-        console.print(f'- {sentence}', soft_wrap=True, highlight=False, markup=False)
+        console.print(f'- {sentence}', soft_wrap=True)
     if comparison.differing:
         console.print(as_table(comparison))
     console.print(
-        f'Times are from the first displacement sample of A; {comparison.alignment.sentence}.',
+        f'Times are from the first displacement sample of A; {comparison.alignments.sentence}.',
         soft_wrap=True,
-        highlight=False,
     )
     for recording in recordings:
         for warning in recording.warnings:
-            console.print(f'[yellow]note[/yellow] {recording.path}: {warning}', soft_wrap=True)
+            note(console, f'{recording.path}: {warning}')
     if json_file is not None:
         json_file.write_text(json.dumps(as_json(comparison), indent=2, allow_nan=False) + '\n')
     if figure is not None:
         from mount_bringup.compare_figure import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
-        console.print(f'figure {figure}', highlight=False)
-    if not comparison.equal:
-        raise typer.Exit(1)
+        console.print(f'figure {figure}', soft_wrap=True)
+    return comparison.equal

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+
+from mount_bringup.terminal import note, terminal
 
 EPILOG = """Examples:
 
@@ -54,17 +55,15 @@ def cut(
         reason = f'{found.kind} at {time:.3f} s' + (f': {found.text}' if found.text else '')
     target = out or _beside(opened.path, first, last)
     done = cut_recording(opened, target, first, last, reason)
-    console = Console()
+    console = terminal()
     around = f' around {reason}' if reason else ''
     console.print(
         f'{done.messages} messages from {done.begin:.3f} s to {done.end:.3f} s{around}, '
         f'{done.carried} latched ones from before\nrecording  {done.folder}',
         soft_wrap=True,
-        highlight=False,
-        markup=False,
     )
-    for note in (*opened.warnings, *done.losses):
-        console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True)
+    for sentence in (*opened.warnings, *done.losses):
+        note(console, sentence)
     if done.losses:
         raise typer.Exit(1)
 

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from mount_bringup.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
+from mount_bringup.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
 control was active, no fault, and the recording whole; 1 when one of these did not hold, or nothing was
@@ -85,7 +85,7 @@ def drive(
     from mount_bringup.domain import chosen_domain
     from mount_bringup.mount_choice import with_control_of_mount
     from mount_bringup.recorder_options import recorder_options
-    from mount_bringup.settings import checked_settings, settings_of_options
+    from mount_bringup.settings import SettingError, checked_settings, settings_of_options
     from mount_bringup.summary import write_json
 
     if lockstep and core:
@@ -94,7 +94,7 @@ def drive(
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
     try:
         parameters = settings_of_options(settings or [])
-    except ValueError as error:
+    except SettingError as error:
         raise typer.BadParameter(str(error)) from None
     given = {
         'scenario': scenario,
@@ -120,17 +120,17 @@ def drive(
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
     order = driving.DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart, report)
-    console = Console()
+    console = terminal()
     outcome = driving.drive(order, console)
     if json_file is not None:
         write_json(outcome.figures, json_file)
     if outcome.folder.figure.exists():
-        console.print(f'figure     {outcome.folder.figure}', highlight=False)
+        console.print(f'figure     {outcome.folder.figure}', soft_wrap=True)
     if outcome.folder.report.exists():
-        console.print(f'report     {outcome.folder.report}', highlight=False)
+        console.print(f'report     {outcome.folder.report}', soft_wrap=True)
     for place in outcome.recordings:
-        console.print(f'recording  {place}', highlight=False)
+        console.print(f'recording  {place}', soft_wrap=True)
     for complaint in outcome.complaints:
-        console.print(f'[yellow]note[/yellow] {complaint}')
+        note(console, complaint)
     if outcome.complaints:
         raise typer.Exit(1)

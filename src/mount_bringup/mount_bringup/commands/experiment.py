@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+
+from mount_bringup.terminal import terminal
 
 EPILOG = """Examples:
 
@@ -50,18 +51,20 @@ def experiment(
     from mount_bringup.experiments.page import print_outcome, write_page
     from mount_bringup.experiments.registry import EXPERIMENTS, experiments_named
     from mount_bringup.progress_bar import progress_bar
+    from mount_bringup.settings import SettingError
     from mount_bringup.summary import write_json
 
-    console = Console()
+    console = terminal()
     if show:
         for known in EXPERIMENTS.values():
-            console.print(
-                f'{known.name:22}{known.reference:15}{known.title}', highlight=False, soft_wrap=True
-            )
+            console.print(f'{known.name:22}{known.reference:15}{known.title}', soft_wrap=True)
         return
     if not names:
         raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')
-    given = orders(experiments_named(names), settings or [], out, graph=graph)
+    try:
+        given = orders(experiments_named(names), settings or [], out, graph=graph)
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
     with progress_bar(console) as progress:
         outcomes = run_all(given, progress)
     for known, outcome in outcomes:
@@ -71,4 +74,4 @@ def experiment(
         write_json(figures if len(figures) > 1 else next(iter(figures.values())), json_file)
     if page is not None:
         write_page(outcomes, page)
-        console.print(f'page       {page}', highlight=False)
+        console.print(f'page       {page}', soft_wrap=True)

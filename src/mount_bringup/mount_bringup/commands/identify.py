@@ -7,6 +7,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from mount_bringup.terminal import note, terminal
+
 if TYPE_CHECKING:
     from mount_bringup.identification.friction import Identification
 
@@ -73,23 +75,22 @@ def friction(
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
-    from rich.progress import Progress
-
     from mount_bringup.calibration.specimen import check_targets, foreign_parts, with_friction
     from mount_bringup.commands.calibrate import note_foreign
     from mount_bringup.identification.friction import IdentifyOrder, figures, identify
     from mount_bringup.identification.friction_files import parsed_channels
+    from mount_bringup.progress_bar import progress_bar
     from mount_bringup.summary import write_json
     from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
 
-    console = Console()
+    console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     order = IdentifyOrder(
         train or [], held_out or [], file or [], step, clamp, parsed_channels(channel or []), seed,
         friction_contact(starting.friction),
     )  # fmt: skip
-    with Progress(console=console, transient=True) as progress:
+    with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
         found = identify(order, lambda law, share: progress.update(task, description=law, completed=share))
     specimen = with_friction(starting, name, found) if out is not None else None
@@ -98,12 +99,12 @@ def friction(
         from mount_bringup.identification.figure import draw_identification
 
         draw_identification(found, figure)
-        console.print(f'figure {figure}', highlight=False)
+        console.print(f'figure {figure}', soft_wrap=True)
     if json_file is not None:
         write_json(figures(found), json_file)
     if out is not None and specimen is not None:
         save_specimen(specimen, out)
-        console.print(f'specimen {out}', highlight=False)
+        console.print(f'specimen {out}', soft_wrap=True)
         note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
@@ -141,7 +142,7 @@ def drift(
     from mount_bringup.summary import write_json
     from mount_models.specimen import chosen_specimen
 
-    console = Console()
+    console = terminal()
     check_targets(json_file, figure)
     told = {}
     for setting in hours or []:
@@ -159,7 +160,7 @@ def drift(
         from mount_bringup.identification.drift_figure import draw_drift
 
         draw_drift(result, figure)
-        console.print(f'figure {figure}', highlight=False)
+        console.print(f'figure {figure}', soft_wrap=True)
     if json_file is not None:
         write_json(figures(result), json_file)
     lines = [('contact gap', result.gap, 1e6, 'um/h'), ('offset current', result.current, 1e3, 'mA/h')]
@@ -167,7 +168,7 @@ def drift(
         lines.append(('friction', result.friction, 1.0, '1/h'))
     for label, line, factor, unit in lines:
         std = 'unknown' if line.slope_std != line.slope_std else f'{factor * line.slope_std:.2g}'
-        console.print(f'{label}: {factor * line.slope:+.3g} +- {std} {unit} (one deviation)', highlight=False)
+        console.print(f'{label}: {factor * line.slope:+.3g} +- {std} {unit} (one deviation)', soft_wrap=True)
     console.print(
         f'{1e6 * result.left:.1f} +- {1e6 * result.left_std:.2g} um left until the contact gap reaches '
         f'{1e6 * result.limit:.1f} um, where the pressed gap leaves the range of the law'
@@ -177,15 +178,14 @@ def drift(
             else '; no wear beyond two deviations is seen'
         ),
         soft_wrap=True,
-        highlight=False,
     )
 
 
 def _print(found: 'Identification', console: Console) -> None:
     from mount_bringup.identification.friction import chosen_fit, figures
 
-    for note in found.notes:
-        console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True, highlight=False)
+    for sentence in found.notes:
+        note(console, sentence)
     result = figures(found)
     if found.ramps:
         console.print(_step_1(result['step_1']))
@@ -195,12 +195,12 @@ def _print(found: 'Identification', console: Console) -> None:
             f'steps 2, 3: {len(found.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} (a) '
             f'and {fit.b_rms_mm:.2f} 1/mm (b) rms',
             soft_wrap=True,
-            highlight=False,
         )
         for variant, values in result['variants'].items():
             if values['held_out_error'] is not None:
                 console.print(
-                    f'  form of b: {variant}: {_percent(values["held_out_error"])} held out', highlight=False
+                    f'  form of b: {variant}: {_percent(values["held_out_error"])} held out',
+                    soft_wrap=True,
                 )
     for each in result.get('validation', []):
         console.print(
@@ -208,13 +208,12 @@ def _print(found: 'Identification', console: Console) -> None:
             f'{_percent(each["simplified_error"])}; macroslip {_percent(each["full_macroslip_error"])}, '
             f'{_percent(each["simplified_macroslip_error"])}',
             soft_wrap=True,
-            highlight=False,
         )
     if 'pairs' in result:
         console.print(_pairs(result['pairs']))
     if 'ladder' in result:
         console.print(_ladder(result['ladder']))
-        console.print(f'best: {result["best"]}', highlight=False)
+        console.print(f'best: {result["best"]}', soft_wrap=True)
 
 
 def _step_1(ramps: list[dict]) -> Table:

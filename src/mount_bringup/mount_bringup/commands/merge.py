@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+
+from mount_bringup.terminal import note, terminal
 
 EPILOG = 'Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`'
 
@@ -22,15 +23,14 @@ def merge(
 
     opened = [open_run(path) for path in recordings]
     done = merge_recordings(opened, out, different_sessions=different_sessions)
-    console = Console()
+    console = terminal()
     console.print(
         f'{done.messages} messages; {done.repeated} stood in more than one part and were written once\n'
         f'recording  {done.folder}',
         soft_wrap=True,
-        highlight=False,
     )
     warnings = [warning for recording in opened for warning in recording.warnings]
-    for note in (*warnings, *done.holes, *done.losses):
-        console.print(f'[yellow]note[/yellow] {note}', soft_wrap=True)
+    for sentence in (*warnings, *done.holes, *done.losses):
+        note(console, sentence)
     if done.losses:
         raise typer.Exit(1)

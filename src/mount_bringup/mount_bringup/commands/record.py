@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 from mount_bringup.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
+from mount_bringup.terminal import terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
 loss, when the disk was full, or when nothing could be recorded; 2 for a wrong use of the command.
@@ -60,13 +61,13 @@ def record(
         namespace=namespace,
         duration=duration,
     )
-    console = Console()
+    console = terminal()
     outcome = run_record(order, console)
     if outcome.failure:
         _print('note', outcome.failure, console)
     sound = [_told(folder, console) for folder in outcome.folders]
     if not sound and not outcome.failure:
-        console.print('no event came, so no snapshot was saved')
+        console.print('no event came, so no snapshot was saved', soft_wrap=True)
     if outcome.failure or outcome.lost or not all(sound):
         raise typer.Exit(1)
 
@@ -91,4 +92,4 @@ def _told(folder: Path, console: Console) -> bool:
 
 
 def _print(word: str, what: Any, console: Console) -> None:
-    console.print(f'{word:<10} {what}', soft_wrap=True, highlight=False, markup=False)
+    console.print(f'{word:<10} {what}', soft_wrap=True)

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+
+from mount_bringup.terminal import note, terminal
 
 INCOMPLETE = 3
 
@@ -30,19 +31,17 @@ def recover(
     ] = None,
 ) -> None:
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
-    from rich.progress import Progress
-
     from mount_bags.recover import recover as recovered
+    from mount_bringup.progress_bar import progress_bar
 
-    console = Console()
+    console = terminal()
     target = out if out is not None else _beside(recording)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+    with progress_bar(console, transient=True) as bar:
         task = bar.add_task('recovering', total=None)
         result = recovered(recording, target, lambda done, of: bar.update(task, completed=done, total=of))
-    for note in result.notes:
-        console.print('[yellow]note[/yellow]', end=' ')
-        console.print(note, soft_wrap=True, highlight=False, markup=False)
-    console.print(f'{result}; it stands in {result.folder}', soft_wrap=True, highlight=False, markup=False)
+    for sentence in result.notes:
+        note(console, sentence)
+    console.print(f'{result}; it stands in {result.folder}', soft_wrap=True)
     if not result.complete:
         raise typer.Exit(INCOMPLETE)
 

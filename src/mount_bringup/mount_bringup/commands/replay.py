@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-import yaml
 from rich.console import Console
 
 from mount_bringup.commands.options import Domain, JsonFile, NewFolder
+from mount_bringup.terminal import terminal
 
 EPILOG = """Examples:
 
@@ -81,7 +81,7 @@ def replay(
 
     if core + lockstep + live > 1:
         raise typer.BadParameter('choose one of --core, --lockstep and --live')
-    console = Console()
+    console = terminal()
     changes = _changes(settings or [])
     if live:
         from mount_bringup.replay.live import LiveOrder, play_live
@@ -112,8 +112,7 @@ def _replay(
     domain: int,
     console: Console,
 ) -> None:
-    from rich.progress import Progress
-
+    from mount_bringup.progress_bar import progress_bar
     from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder
     from mount_bringup.replay.replay import replay as run_replay
     from mount_bringup.replay.summary import print_replay, replay_figures
@@ -121,7 +120,7 @@ def _replay(
 
     mode = LOCKSTEP if lockstep else CORE
     order = ReplayOrder(recording, mode, changes, table, foreign, out, domain)
-    with Progress(console=console, transient=True) as progress:
+    with progress_bar(console, transient=True) as progress:
         task = progress.add_task(f'replaying ({mode})', total=1.0)
         outcome = run_replay(order, lambda share: progress.update(task, completed=share))
     figures = replay_figures(outcome)
@@ -130,7 +129,7 @@ def _replay(
     write_json(figures, outcome.folder.summary)
     if json_file is not None:
         write_json(figures, json_file)
-    console.print(f'recording  {outcome.folder.recording}', highlight=False)
+    console.print(f'recording  {outcome.folder.recording}', soft_wrap=True)
     if not outcome.held:
         raise typer.Exit(1)
 
@@ -143,11 +142,15 @@ def _foreign(maps: list[str], scale: float, offset: str) -> Any:
 
 def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
     from mount_bringup.replay.replay import parsed_changes
+    from mount_bringup.settings import SettingError, setting_value
 
     values = {}
     for setting in settings:
         name, equals, text = setting.partition('=')
         if not (equals and name):
             raise typer.BadParameter(f'--set {setting}: write NAME=VALUE, as in quality=0.7')
-        values[name] = yaml.safe_load(text)
+        try:
+            values[name] = setting_value(setting, text)
+        except SettingError as error:
+            raise typer.BadParameter(str(error)) from None
     return parsed_changes(values)

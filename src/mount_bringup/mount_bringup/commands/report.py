@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+
+from mount_bringup.terminal import note, terminal
 
 EPILOG = """Examples:
 
@@ -43,19 +44,18 @@ def report(
     Several recordings share the figures. What a recording lacks stands in the page in words.
     """
     from mount_bringup.recording_path import open_run
-    from mount_bringup.report_pages import default_page, write_report
+    from mount_bringup.report_pages import default_page, default_pictures, write_report
 
-    console = Console()
+    console = terminal()
     opened = [open_run(path) for path in recordings]
     compared = None if other is None else open_run(other)
     file = out or default_page(recordings[0])
-    files = write_report(opened, compared, file, pictures or file.with_suffix(''), console)
+    files = write_report(opened, compared, file, pictures or default_pictures(file), console)
     for recording in (*opened, *([compared] if compared else [])):
         for warning in recording.warnings:
-            console.print('[yellow]note[/yellow]', end=' ')
-            console.print(f'{recording.path}: {warning}', soft_wrap=True, highlight=False, markup=False)
-    console.print(f'report     {file}', soft_wrap=True, highlight=False, markup=False)
-    console.print(_pictures_line(files), soft_wrap=True, highlight=False, markup=False)
+            note(console, f'{recording.path}: {warning}')
+    console.print(f'report     {file}', soft_wrap=True)
+    console.print(_pictures_line(files), soft_wrap=True)
 
 
 def _pictures_line(files: Sequence[Path]) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from rich.console import Console
 
 from mount_bags.reading import open_recording
 from mount_bringup.domain import chosen_domain
@@ -17,6 +16,7 @@ from mount_bringup.evaluation import Drive, excitation_stamp, load_drive
 from mount_bringup.experiments.contract import ExperimentError, Order
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.settings import defaults_of_nodes
+from mount_bringup.terminal import terminal
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def ride(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], experim
         out=order.out / label,
     )
     # the experiments' own bar is on the screen
-    folder, run, complaints = record_drive(drive_order, Console(file=io.StringIO()))
+    folder, run, complaints = record_drive(drive_order, terminal(file=io.StringIO()))
     recording = open_recording(folder.recording)
     complaints += recording.warnings
     if complaints:

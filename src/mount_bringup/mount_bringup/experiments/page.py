@@ -34,7 +34,7 @@ def print_outcome(experiment: Experiment, outcome: Outcome, console: Console) ->
         ('page', outcome.pages),
     ):
         for place in places:
-            console.print(f'{kind:11}{place}', highlight=False, soft_wrap=True)
+            console.print(f'{kind:11}{place}', soft_wrap=True)
 
 
 def write_page(outcomes: Sequence[tuple[Experiment, Outcome]], file: Path) -> None:

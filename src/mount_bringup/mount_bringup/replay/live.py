@@ -25,6 +25,7 @@ from mount_bringup.replay.lockstep import ros_context
 from mount_bringup.replay.playback import Playback
 from mount_bringup.replay.ramps import MeasuredGap, measured_gaps
 from mount_bringup.replay.replay import check_parameters, with_changes
+from mount_bringup.terminal import note
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.message_types import message_class
@@ -76,8 +77,8 @@ def play_live(order: LiveOrder, console: Console) -> None:
         raise ReplayError(f'--from ({order.begin:g} s) must lie within 0 .. {film.times[-1]:.3f} s')
     gaps = measured_gaps(recording)
     parameters = _parameters(recording, order, gaps)
-    if recording.warnings:
-        console.print(*recording.warnings, sep='\n')
+    for warning in recording.warnings:
+        note(console, warning)
     with domain_lock(order.domain, order.namespace), ros_context(order.domain) as context:
         owner = Node('mount_replay', namespace=order.namespace, context=context, enable_rosout=False)
         path = DataPath(owner)
@@ -118,7 +119,7 @@ class _Show:
         playback, shown = self._playback, 0.0
         with Keyboard() as keyboard:
             if keyboard.present:
-                self._console.print(_KEYS, highlight=False)
+                self._console.print(_KEYS, soft_wrap=True)
             self._arrive()
             playback.play(time.monotonic())
             try:

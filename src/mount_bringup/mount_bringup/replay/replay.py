@@ -12,8 +12,8 @@ import numpy as np
 from mount_bags.reading import Recording
 from mount_bringup.core.chain import Parameters, chosen_damper, chosen_specimen, control_parameters
 from mount_bringup.recording_path import open_run
+from mount_bringup.replay.agreement import Agreement, agreement
 from mount_bringup.replay.core import Progress, Replayed, controller_for, replay_in_core
-from mount_bringup.replay.difference import Difference, difference
 from mount_bringup.replay.foreign import ForeignOrder, chosen_gap, foreign_input
 from mount_bringup.replay.input import ReplayError, ReplayInput, replay_input
 from mount_bringup.replay.output import write_replay
@@ -57,7 +57,7 @@ class ReplayOutcome:
     given: ReplayInput
     parameters: Parameters
     replayed: Replayed
-    difference: Difference | None
+    agreement: Agreement | None
     reading_time: float
     decoding_time: float = 0.0
     folder: RunFolder | None = None
@@ -79,7 +79,7 @@ class ReplayOutcome:
     @property
     def held(self) -> bool:
         """Whether the replay gave what it promises: the recorded answers, where nothing was changed."""
-        return not self.as_recorded or self.difference is None or self.difference.agrees
+        return not self.as_recorded or self.agreement is None or self.agreement.agrees
 
 
 def replay(order: ReplayOrder, progress: Progress = lambda share: None) -> ReplayOutcome:
@@ -104,7 +104,7 @@ def replay_without_output(order: ReplayOrder, progress: Progress = lambda share:
         _load_compiled_run(given, parameters)
         replayed = replay_in_core(given, parameters)
     return ReplayOutcome(
-        order, given, parameters, replayed, difference(given, replayed), reading_time, decoding_time
+        order, given, parameters, replayed, agreement(given, replayed), reading_time, decoding_time
     )
 
 

@@ -7,20 +7,19 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from mount_bringup.replay.core import Replayed
-from mount_bringup.replay.difference import (
+from mount_bags.signal_difference import Moment
+from mount_bringup.evaluation import Switching
+from mount_bringup.replay.agreement import (
     SETTLED,
     SETTLING,
-    Moment,
-    Switching,
-    change_in_words,
-    difference_in_words,
     recorded_switching,
     replayed_switching,
     switching_changes,
 )
+from mount_bringup.replay.core import Replayed
 from mount_bringup.replay.input import ReplayInput
 from mount_bringup.replay.replay import LOCKSTEP, ReplayOutcome
+from mount_bringup.terminal import note
 from mount_models.sampling import SAMPLE_TIME
 
 _SHOWN = 8  # switchings in the printed summary
@@ -28,9 +27,8 @@ _SHOWN = 8  # switchings in the printed summary
 
 def replay_figures(outcome: ReplayOutcome) -> dict[str, Any]:
     """Return the figures of a replay; times in s on the recording's time axis, unknown is null."""
-    given, replayed, found = outcome.given, outcome.replayed, outcome.difference
+    given, replayed, found = outcome.given, outcome.replayed, outcome.agreement
     now, before = replayed_switching(given, replayed), recorded_switching(given)
-    changes = switching_changes(before, now) if before is not None else []
     samples = sum(len(run.stamps) for run in replayed.runs)
     return {
         'source': given.source,
@@ -45,16 +43,18 @@ def replay_figures(outcome: ReplayOutcome) -> dict[str, Any]:
         'restarts': sum(run.counts.restarts for run in replayed.runs),
         'invalid_samples': sum(run.counts.invalid for run in replayed.runs),
         'equal_to_recorded': None if found is None else found.equal,
-        'compared_setpoints': 0 if found is None else found.compared,
-        'differing_setpoints': None if found is None else found.differing,
-        'first_difference': _moment(found.first if found else None),
-        'largest_difference': _moment(found.largest if found else None),
-        'differing_intermediates': found.traces_differing if found else {},
-        'switch_on_s': now.on,
-        'switch_off_s': now.off,
-        'recorded_switch_on_s': before.on if before else None,
-        'recorded_switch_off_s': before.off if before else None,
-        'switching_changes': [change_in_words(change) for change in changes],
+        'compared_setpoints': 0 if found is None else found.setpoints.samples,
+        'differing_setpoints': None if found is None else found.setpoints.differing,
+        'first_difference': _moment(found.setpoints.first if found else None),
+        'largest_difference': _moment(found.setpoints.largest if found else None),
+        'differing_intermediates': {
+            each.signal: each.differing for each in (found.intermediates if found else ()) if each.differing
+        },
+        'switch_on_s': list(now.on),
+        'switch_off_s': list(now.off),
+        'recorded_switch_on_s': list(before.on) if before else None,
+        'recorded_switch_off_s': list(before.off) if before else None,
+        'switching_changes': switching_changes(before, now) if before else [],
         'peak_current_a': _peak(replayed),
         'recorded_peak_current_a': _recorded_peak(given),
         'control_run_s': replayed.control_time,
@@ -88,8 +88,8 @@ def print_replay(outcome: ReplayOutcome, figures: dict[str, Any], console: Conso
     for place, sentence in enumerate(_speed_text(outcome, figures)):
         table.add_row('' if place else 'speed', sentence)
     console.print(table)
-    for note in figures['notes']:
-        console.print(f'[yellow]note[/yellow] {note}', highlight=False)
+    for sentence in figures['notes']:
+        note(console, sentence)
 
 
 def _replayed_text(figures: dict[str, Any]) -> str:
@@ -126,10 +126,10 @@ def _recorded_value(outcome: ReplayOutcome, node: str, name: str) -> str:
 
 
 def _verdict(outcome: ReplayOutcome) -> list[str]:
-    found = outcome.difference
+    found = outcome.agreement
     if found is None:
         return ['nothing recorded to compare with']
-    sentences = difference_in_words(found)
+    sentences = found.sentences
     if found.settling_skipped:
         sentences.append(
             f'not compared: the first {SETTLING:g} s ({found.settling_skipped} setpoints), see the notes; '
@@ -190,7 +190,8 @@ def _recorded_peak(given: ReplayInput) -> float | None:
     return None if math.isnan(peak) else peak
 
 
-def _moment(moment: Moment | None) -> dict[str, float] | None:
+def _moment(moment: Moment | None) -> dict[str, float | None] | None:
     if moment is None:
         return None
-    return {'time_s': moment.time, 'recorded_a': moment.recorded, 'replayed_a': moment.replayed}
+    recorded, replayed = (None if math.isnan(value) else value for value in (moment.a, moment.b))
+    return {'time_s': moment.time, 'recorded_a': recorded, 'replayed_a': replayed}

@@ -1,0 +1,27 @@
+"""One table of exit codes holds for all commands, and says of each what it promises."""
+
+import re
+from pathlib import Path
+
+from mount_bringup.command import app
+from mount_bringup.commands import compare
+
+PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'interface.md'
+
+
+def _rows() -> dict[str, str]:
+    """Return {command: its row} of the page."""
+    chapter = PAGE.read_text(encoding='utf-8').split('## Exit codes')[1].split('\n## ')[0]
+    rows = [line for line in chapter.splitlines() if line.startswith('| `')]
+    return {name: row for row in rows for name in re.findall(r'`(\w+)`', row.split('|')[1])}
+
+
+def test_every_command_has_its_row():
+    names = {each.name or each.callback.__name__ for each in app.registered_commands}
+    groups = {each.name or each.typer_instance.info.name for each in app.registered_groups}
+    assert _rows().keys() == names | groups
+
+
+def test_compare_tells_different_from_not_compared_in_its_help_and_on_the_page():
+    assert '| different | 2: not compared' in _rows()['compare']
+    assert '1: different; 2: not compared' in ' '.join(compare.compare.__doc__.split())
