@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from mount_bags.recording import RecorderFigures
+from mount_bags.recording import RecorderFigures, Unobserved
 from mount_bags.snapshot import SnapshotFigures
 from mount_bags.stamps import StampWatch
 from mount_ros.diagnostics import Level, Verdict
@@ -31,6 +31,7 @@ class RecorderState:
     free: int = LEAST_FREE
     rate: float = 0.0
     overflowed: Mapping[str, int] = field(default_factory=dict)
+    unobserved: Mapping[str, Unobserved] = field(default_factory=dict)
     marks: int = 0  # set by the recorder itself
     events: int = 0  # all that came on `event`
     snapshot: SnapshotFigures | None = None
@@ -55,6 +56,8 @@ def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:
             f'{figures.lost} of {figures.received} messages lost: the disk is slower than the data; '
             'record fewer topics or use a faster disk'
         )
+    if state.unobserved:
+        return Level.WARN, f'{unobserved_sentence(state.unobserved)}; who else publishes there?'
     missing = {topic: watch.lost for topic, watch in state.watches.items() if watch.lost}
     if missing:
         counts = ', '.join(f'{topic} {count}' for topic, count in missing.items())
@@ -74,6 +77,15 @@ def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:
         Level.OK,
         f'{_activity(state.snapshot)}; {found} of {len(state.publishers)} topics have a publisher',
     )
+
+
+def unobserved_sentence(unobserved: Mapping[str, Unobserved]) -> str:
+    """Return what the recorder could write but not read, by topic."""
+    counts = ', '.join(
+        f'{topic} {entry.count} (the last of {entry.size} bytes; {entry.why})'
+        for topic, entry in unobserved.items()
+    )
+    return f'malformed messages, recorded but neither watched nor marked: {counts}'
 
 
 def _activity(snapshot: SnapshotFigures | None) -> str:
@@ -102,6 +114,7 @@ def _figures(state: RecorderState) -> dict[str, object]:
         **_snapshot_figures(state.snapshot),
         **{f'lost.{topic}': count for topic, count in state.overflowed.items()},
         **{f'publishers.{topic}': count for topic, count in state.publishers.items()},
+        **{f'malformed.{topic}': entry.count for topic, entry in state.unobserved.items()},
         **{f'missing.{topic}': watch.lost for topic, watch in state.watches.items()},
     }
 
