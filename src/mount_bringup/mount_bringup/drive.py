@@ -171,9 +171,10 @@ def _drive_graph(
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
             _watch_drive(order, supervisor, limit, console)
             figures = supervisor.figures(SIM)
-            if supervisor.figures(RECORDER).get('failed') == 'True':
-                supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
         finally:
+            recorder = supervisor.figures(RECORDER)
+            if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
+                supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
             for note in supervisor.notes:
                 console.print(f'[yellow]note[/yellow] {note}')
@@ -198,8 +199,6 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
 
         def finished() -> bool:
             figures = supervisor.figures(SIM)
-            if supervisor.figures(RECORDER).get('failed') == 'True':
-                supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
             share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
             progress.update(task, completed=share)
             for key in keys.wait(0.0) if keys is not None else ():
