@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from mount_bags.chunks import (
@@ -28,6 +28,7 @@ from mount_bags.chunks import (
     partial_chunk,
     scattered_chunks,
 )
+from mount_bags.message_compression import plain
 from mount_bags.summary import Proof, data_proof, parsed, parsed_metadata, read_summary
 from mount_bags.whole_files import FileError, mapped
 
@@ -108,18 +109,18 @@ class McapFile:
         return self._times
 
     def blocks(self, channels: Collection[int]) -> Iterator[Contents]:
-        """Yield the messages of `channels` in the order of the file."""
+        """Yield the messages of `channels` in the order of the file, unpacked where each is packed."""
         self.data_proof()
         wanted = np.array(sorted(channels), np.int64)
         for chunk in self.chunks:
             if chunk.channels is None or not chunk.channels.isdisjoint(channels):
                 contents = self.contents(chunk)
                 if contents is not None and (found := contents.of(wanted)).offsets.size:
-                    yield found
+                    yield plain(found)
         if self._loose:
             found = messages_at(self._data, np.array(self._loose)).of(wanted)
             if found.offsets.size:
-                yield found
+                yield plain(found)
 
     def contents(self, chunk: Chunk) -> Contents | None:
         """Return what is in a chunk; None, with a warning, if it is damaged."""
@@ -160,13 +161,25 @@ class McapFile:
             return False
         self.chunks = sorted((chunk for chunk in chunks if chunk), key=lambda chunk: chunk.position)
         self._counts = dict(statistics.channel_message_counts)
-        if statistics.message_count:
-            self._times = statistics.message_start_time, statistics.message_end_time
         self._walk_between_chunks()
+        self._take_times(statistics)
         self.closed = True
         if self._data[-len(MCAP0_MAGIC) :] != MCAP0_MAGIC:
             self._warn('its last bytes are damaged; all else is read')
         return True
+
+    def _take_times(self, statistics: Statistics) -> None:
+        """Take the times of the chunks, which are nearer to the messages than the statistics of the file."""
+        for chunk in self.chunks:
+            # Without indexes, whether a chunk holds messages shows in its times alone.
+            if chunk.channels or (chunk.channels is None and chunk.end_time):
+                self._widen(chunk.start_time, chunk.end_time)
+        if self._loose:
+            times = messages_at(self._data, np.array(self._loose)).heads['log_time']
+            self._widen(int(times.min()), int(times.max()))
+        told = statistics.message_start_time, statistics.message_end_time
+        if self._times is not None and told != self._times:
+            self._warn('its statistics tell of other times than its chunks; believed are the chunks')
 
     def _walk_between_chunks(self) -> None:
         lengths = {index.chunk_start_offset: index.message_index_length for index in self._summary.chunks}

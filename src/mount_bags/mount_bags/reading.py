@@ -21,7 +21,6 @@ from mount_bags.piece_topics import (
 )
 from mount_bags.series import Payloads, Series
 from mount_bags.topic_times import TimesCollector, TopicTimes
-from mount_bags.whole_files import unpacked_payload
 
 # Key of the custom data in which `engine-mount recover` says what it could not prove.
 RECOVERY_NOTE = 'recovered_unchecked'
@@ -235,7 +234,7 @@ class Recording:
         return Series(
             name,
             self.topics[name].type,
-            Payloads([_plain(block.payloads()) for block in blocks]),
+            Payloads([block.payloads() for block in blocks]),
             head['log_time'].astype(np.int64),
             head['publish_time'].astype(np.int64),
             definition=definition,
@@ -273,12 +272,3 @@ class Recording:
 
 def _first(block: Contents) -> tuple[bytes, int]:
     return block.message(0)
-
-
-def _plain(payloads: Any) -> Any:
-    """Return payloads as they were before rosbag2 compressed each of them."""
-    return [unpacked_payload(raw) for raw in map(bytes, payloads)] if _is_packed(payloads) else payloads
-
-
-def _is_packed(payloads: Any) -> bool:
-    return len(payloads) > 0 and bytes(payloads[0][:4]) == b'\x28\xb5\x2f\xfd'

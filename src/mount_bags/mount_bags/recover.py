@@ -19,6 +19,7 @@ import numpy as np
 
 from mount_bags.chunks import Contents, records_in, stored_parts
 from mount_bags.mcap_file import McapFile
+from mount_bags.message_compression import plain
 from mount_bags.metadata import NO_TIME
 from mount_bags.piece_topics import BagFile, repeated_topics
 from mount_bags.reading import RECOVERY_NOTE, Recording, open_recording
@@ -169,8 +170,9 @@ def _salvaged(file: McapFile) -> Contents | None:
     for place, (channel, raw, log_time, _) in enumerate(_messages(contents)):
         credible = encodings.get(channel) == raw[:4] and tail.start_time <= log_time <= tail.end_time
         if not credible:
-            return Contents(contents.data, contents.offsets[:place], contents.heads[:place])
-    return contents
+            contents = Contents(contents.data, contents.offsets[:place], contents.heads[:place])
+            break
+    return plain(contents)
 
 
 def _encodings(file: McapFile) -> dict[int, bytes]:
