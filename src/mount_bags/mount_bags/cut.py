@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.inherited_statement import sources_of
 from mount_bags.messages import Messages, read_messages, write_messages
 from mount_bags.metadata import TopicInformation
 from mount_bags.origin import short_name, with_step
@@ -49,12 +50,14 @@ def cut(
 
     Times are in s from the first message of `recording`; None is its beginning, or its end with the last
     message. Messages keep their bytes, log and publish times. Of latched topics and of `event` the last
-    message before `begin` comes with it; `reason` goes into the note of origin. Raises `CutError`.
+    message before `begin` comes with it, and so do attachments and metadata. What the recorder lost is told
+    of the piece too: nobody knows when that was. `reason` goes into the note of origin. Raises `CutError`.
     """
     span = _checked_span(recording, begin, end)
-    parts, losses, carried = [], [], 0
+    parts, losses, carried, read = [], [], 0, {}
     for name in recording:
         messages, damages = read_messages(recording, name)
+        read[name] = len(messages)
         before, inside = _places(messages, span)
         parts.append(messages.chosen(np.concatenate([before, inside])))
         carried += len(before)
@@ -63,7 +66,8 @@ def cut(
     if not count:
         raise CutError(f'{recording.path} has no message {span}; it lasts {span.whole / 1e9:.3f} s')
     distro = recording.information.ros_distro if recording.information else ''
-    write_messages(out, parts, with_step([recording], _step(recording, span, reason)), distro)
+    custom = with_step([recording], _step(recording, span, reason))
+    write_messages(out, parts, [recording], sources_of(recording, read), custom, distro)
     return Cut(Path(out), span.begin / 1e9, span.end / 1e9, count, carried, tuple(losses))
 
 

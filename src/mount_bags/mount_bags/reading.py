@@ -237,6 +237,7 @@ class Recording:
             Payloads([block.payloads() for block in blocks]),
             head['log_time'].astype(np.int64),
             head['publish_time'].astype(np.int64),
+            sequences=head['sequence'].astype(np.uint32),
             definition=definition,
             obstacle='' if definition else sentence,
             zero=self.time_range[0] if self.time_range else 0,

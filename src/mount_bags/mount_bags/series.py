@@ -50,7 +50,8 @@ class Series:
     """The messages of one topic in the order in which they were recorded.
 
     `receive_times` and `publish_times` are those of the recording, `stamps` those of the samples (from
-    the messages' headers); all in ns. `series[name]` is a column: of a `JointState` the position of
+    the messages' headers), all in ns; `sequences` are the publisher's numbers, 0 where it gave none.
+    `series[name]` is a column: of a `JointState` the position of
     that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
     `time` and `values` are the same for all columns at once, as arrays to plot.
     """
@@ -64,6 +65,7 @@ class Series:
         publish_times: Times,
         *,
         definition: Definition | None = None,
+        sequences: NDArray[np.uint32] | None = None,
         obstacle: str = '',
         zero: int = 0,
     ):
@@ -76,6 +78,7 @@ class Series:
         self.receive_times = receive_times
         self.publish_times = publish_times
         self.payloads = payloads
+        self.sequences = np.zeros(len(payloads), np.uint32) if sequences is None else sequences
         self.registered: Topic | None = registered_topic(topic)
         self._known_definition = definition
         self._obstacle = obstacle

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Attachment, Channel, Schema
 
 from mount_bags.chunks import LENGTH_BESIDES_PAYLOAD, MESSAGE_HEAD, Contents, messages_at
 from mount_bags.mcap_file import McapFileError
@@ -33,7 +33,9 @@ class SqliteFile:
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
         self.metadata: dict[str, dict[str, str]] = {}
+        self.records: list[tuple[str, dict[str, str]]] = []
         self.warnings: list[str] = []
+        self.lost_beside: list[str] = []
         self.damaged = False
         self._counts: dict[int, int] = {}
         self._times: tuple[int, int] | None = None
@@ -85,6 +87,10 @@ class SqliteFile:
         except sqlite3.Error as error:
             self.damaged = True
             self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield nothing: this storage has none."""
+        return iter(())
 
     def _connected(self) -> sqlite3.Connection:
         if not self._logs:

@@ -8,8 +8,8 @@ from rich.console import Console
 
 INCOMPLETE = 3
 
-EPILOG = f"""Exit code: 0 when nothing is missing in the new recording, {INCOMPLETE} when something is lost
-and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the command.
+EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when something
+is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the command.
 
 Examples:
 
@@ -17,7 +17,8 @@ Examples:
 
 `engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
 
-All chunks whose checksum holds are kept, with topics, times and session. Of a last chunk that was cut off,
+All chunks whose checksum holds are kept, with topics, times, session, attachments, metadata and what the
+recorder says of its own losses. Of a last chunk that was cut off,
 whole messages are kept where its compression lets its beginning be read; no checksum vouches for
 these, and the new recording says so each time it is opened. The original is not touched.
 """
