@@ -24,7 +24,7 @@ neighbouring stamps. The JSON holds for each topic `expected`, `present`, `lost`
 
 
 def audit(
-    recording: Annotated[Path, typer.Argument(help='folder of a recording, or one of its files')],
+    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording; exit code 1 if so."""
@@ -32,11 +32,11 @@ def audit(
 
     from mount_bags.audit import audit as audited
     from mount_bags.audit_report import as_json, as_table, is_lossless, latency_lines, sentences
-    from mount_bags.reading import open_recording
+    from mount_bringup.recording_path import open_run
 
     console = Console()
     with console.status('reading'):
-        opened = open_recording(recording)
+        opened = open_run(recording)
         audits = audited(opened)
     console.print(as_table(audits))
     for line in latency_lines(audits):

@@ -8,8 +8,8 @@ from rich.console import Console
 
 INCOMPLETE = 3
 
-EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when something
-is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the command.
+EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when
+something is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the command.
 
 Examples:
 
@@ -25,7 +25,7 @@ these, and the new recording says so each time it is opened. The original is not
 
 
 def recover(
-    recording: Annotated[Path, typer.Argument(help='folder of a recording, or one of its files')],
+    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
     out: Annotated[
         Path | None, typer.Option(help='folder of the new recording; default: beside it, `..._recovered`')
     ] = None,
@@ -34,12 +34,14 @@ def recover(
     from rich.progress import Progress
 
     from mount_bags.recover import recover as recovered
+    from mount_bringup.recording_path import recording_place
 
     console = Console()
-    target = out if out is not None else _beside(recording)
+    source = recording_place(recording)
+    target = out if out is not None else _beside(source)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task('recovering', total=None)
-        result = recovered(recording, target, lambda done, of: bar.update(task, completed=done, total=of))
+        result = recovered(source, target, lambda done, of: bar.update(task, completed=done, total=of))
     for note in result.notes:
         console.print('[yellow]note[/yellow]', end=' ')
         console.print(note, soft_wrap=True, highlight=False, markup=False)
