@@ -29,6 +29,7 @@ from mount_bringup.preflight import preflight
 from mount_bringup.progress_bar import progress_bar
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import (
+    SUMMARISED,
     print_summary,
     snapshots_sentence,
     summarise,
@@ -119,7 +120,7 @@ def _recorder_parameters(order: DriveOrder) -> RecorderParameters:
 def _evaluate(
     order: DriveOrder, folder: RunFolder, recording: Recording, run: dict[str, Any], console: Console
 ) -> dict[str, Any]:
-    drive_data = load_drive(recording, run['excitation_start'])
+    drive_data = load_drive(recording, run['excitation_start'], SUMMARISED)
     audits = audit(recording)
     figures = summarise(recording, audits, drive_data, order.parameters, run)
     if order.report:

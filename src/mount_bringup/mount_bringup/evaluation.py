@@ -1,7 +1,7 @@
 """Figures of a drive from its recording: gaps, switching, peaks, tracking, losses."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,11 @@ from mount_models.damper import DamperCurve
 from mount_models.sampling import SAMPLE_TIME
 
 _SECOND = 1e9  # ns
+_COLUMNS = {
+    'displacement': ('mount',),
+    'control_trace': ('damping_active', 'current'),
+    'sim/truth': ('velocity', 'friction_force'),
+}
 _MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')
 
 
@@ -41,11 +46,16 @@ class Drive:
     excitation_start: int  # ns
 
 
-def load_drive(recording: Recording, excitation_start: float) -> Drive:
-    """Read the signals of a drive whose excitation began `excitation_start` s after its first sample."""
-    names = ('displacement', 'control_trace', 'sim/truth')
-    recording.load(names)
-    displacement, trace, truth = (recording[name] for name in names)
+def load_drive(
+    recording: Recording, excitation_start: float, others: Mapping[str, Sequence[str]] | None = None
+) -> Drive:
+    """Read the signals of a drive whose excitation began `excitation_start` s after its first sample.
+
+    `others` are the columns by topic that the caller is about to ask for: they are read in the same pass.
+    """
+    others = others or {}
+    recording.load_columns({name: (*names, *others.get(name, ())) for name, names in _COLUMNS.items()})
+    displacement, trace, truth = (recording[name] for name in _COLUMNS)
     zero = int(truth.stamps.min()) + round(excitation_start * _SECOND)
     shown, traced, seen = (np.argsort(series.stamps) for series in (displacement, trace, truth))
     stamps = displacement.stamps[shown]

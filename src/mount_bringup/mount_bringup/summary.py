@@ -16,6 +16,9 @@ from mount_bags.recorder_parameters import RecorderParameters
 from mount_bringup.core.chain import Parameters, chosen_damper, control_parameters
 from mount_bringup.evaluation import Drive, lost_samples, switching, tracking_error, unanswered_samples
 
+SUMMARISED = {'sim/truth': ('rest_gap', 'contact_gap')}
+"""Columns that `summarise` asks for beside those of `load_drive`, by topic."""
+
 _UM, _MM, _US = 1e6, 1e3, 1e6
 
 

@@ -17,10 +17,25 @@ from mount_ros.topics import (
     CURRENT_SETPOINT,
     DISPLACEMENT,
     EVENT,
+    SIM_CHASSIS_ACCELERATION,
+    SIM_MOUNT_FORCE,
     SIM_TRUTH,
 )
 
 _ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)
+# What a report may ask for, to be read in one pass. The first names stand for their topics.
+_SHOWN = {
+    DISPLACEMENT.name: ('mount',),
+    COIL_RIPPLE.name: ('coil_current',),
+    CURRENT_SETPOINT.name: ('coil_current',),
+    CONTROL_TRACE.name: (CONTROL_TRACE.names[0], 'damping_active', 'current'),
+    SIM_TRUTH.name: (
+        *('displacement', 'velocity', 'mount_force', 'friction_force'),
+        *('coil_current', 'road_height', 'chassis_acceleration'),
+    ),
+    SIM_MOUNT_FORCE.name: ('wrench.force.z',),
+    SIM_CHASSIS_ACCELERATION.name: ('linear_acceleration.z',),
+}
 _OTHER_CLOCK = 86_400_000_000_000  # ns, chosen: marks so far off are of another clock
 
 
@@ -41,6 +56,7 @@ class Signals:
         self.name = name or short_name(recording)
         self.missing: list[str] = []
         self._found: dict[tuple[str, str], Signal | None] = {}
+        recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
         self.zero = self._first_stamp() if zero is None else zero
 
     @property

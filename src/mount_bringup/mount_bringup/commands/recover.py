@@ -9,7 +9,8 @@ from rich.console import Console
 INCOMPLETE = 3
 
 EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when
-something is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the command.
+something is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the
+command.
 
 Examples:
 

@@ -20,6 +20,14 @@ from mount_bringup.settings import defaults_of_nodes
 
 FloatArray = npt.NDArray[np.float64]
 
+_COLUMNS = {
+    'sim/truth': (
+        *('displacement', 'velocity', 'mount_force', 'friction_force'),
+        *('chassis_acceleration', 'coil_current'),
+    ),
+    'control_trace': ('band_displacement',),
+}
+
 
 @dataclass(frozen=True)
 class Ride:
@@ -88,7 +96,7 @@ def ride(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], experim
 
 
 def _read(recording: Any, place: Path, excitation_start: float) -> Ride:
-    seen = load_drive(recording, excitation_start)
+    seen = load_drive(recording, excitation_start, _COLUMNS)
     truth, trace = recording['sim/truth'], recording['control_trace']
     order = np.argsort(truth.stamps)
     order = order[truth.stamps[order] >= seen.excitation_start]
