@@ -3,10 +3,12 @@
 from collections.abc import Callable, Iterable
 
 import numpy as np
+from numpy.lib.recfunctions import repack_fields
 
 from mount_bags.chunks import MESSAGE_HEAD, Contents
 from mount_bags.series import Column, Payloads, Series, SeriesError, Times
 
+_KEPT = ['log_time', 'publish_time', 'sequence']  # of the head of a message
 _BLOCK = 4096  # messages, chosen: 3 MB of the longest ones of this project
 
 MakeSeries = Callable[[Payloads, np.ndarray], Series]
@@ -37,12 +39,14 @@ class ColumnCollector:
         """Return the heads of all messages, the columns, and the stamps in ns, None where there are none."""
         if self._count:
             self._take()
-        columns = {name: np.concatenate([np.empty(0), *parts]) for name, parts in self._columns.items()}
-        stamps = None if self._stamps is None else np.concatenate([np.empty(0, np.int64), *self._stamps])
-        return np.concatenate([np.empty(0, MESSAGE_HEAD), *self._heads]), columns, stamps
+        if not self._heads:
+            return np.empty(0, MESSAGE_HEAD), {}, None
+        columns = {name: np.concatenate(parts) for name, parts in self._columns.items()}
+        stamps = None if self._stamps is None else np.concatenate(self._stamps)
+        return np.concatenate(self._heads), columns, stamps
 
     def _take(self) -> None:
-        heads = np.concatenate(self._waiting_heads)
+        heads = repack_fields(np.concatenate(self._waiting_heads)[_KEPT])
         series = self._make_series(Payloads(self._waiting), heads)
         self._heads.append(heads)
         self._waiting, self._waiting_heads, self._count = [], [], 0

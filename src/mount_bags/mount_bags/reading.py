@@ -123,8 +123,8 @@ class Recording:
         }
         for name, block in self._blocks(list(collectors)) if collectors else ():
             collectors[name].add(block)
-        for name, collector in collectors.items():
-            head, found, stamps = collector.finish()
+        for name in list(collectors):
+            head, found, stamps = collectors.pop(name).finish()
             self._note_damage(name, len(head))
             known = self._series[name].columns if name in self._series else {}
             self._series[name] = self._made(

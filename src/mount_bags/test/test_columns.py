@@ -128,9 +128,11 @@ def test_an_empty_topic_has_empty_columns(tmp_path):
     writer.add_topic('/sim/mount_force', SIM_MOUNT_FORCE.type)
     writer.close()
     recording = mount_bags.open(tmp_path / 'bag')
-    recording.load_columns({'displacement': ['mount'], 'sim/mount_force': ['wrench.force.z']})
+    recording.load_columns({'displacement': ['mount', 'nothing'], 'sim/mount_force': ['wrench.force.z']})
     assert len(recording['displacement']) == len(recording['displacement']['mount']) == 0
     assert len(recording['displacement'].stamps) == 0
+    with pytest.raises(SeriesError, match='it has mount'):
+        recording['displacement']['nothing']
 
 
 def peak_of_reading(folder, read):

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mount_bags.event_marks import Mark, read_marks
 from mount_bags.origin import short_name
@@ -56,6 +57,7 @@ class Signals:
         self.name = name or short_name(recording)
         self.missing: list[str] = []
         self._found: dict[tuple[str, str], Signal | None] = {}
+        self._orders: dict[str, tuple[Array, slice | NDArray[np.int64]]] = {}  # times, places of the values
         recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
         self.zero = self._first_stamp() if zero is None else zero
 
@@ -106,8 +108,12 @@ class Signals:
         return passed / 1e9 if abs(passed) < _OTHER_CLOCK else float('nan')
 
     def _ordered(self, series: Series, values: Array) -> Signal:
-        stamps, places = np.unique(series.stamps, return_index=True)
-        return Signal((stamps - self.zero) / 1e9, np.asarray(values, np.float64)[places])
+        if series.topic not in self._orders:
+            stamps, first = np.unique(series.stamps, return_index=True)
+            in_order = np.array_equal(first, np.arange(len(series)))
+            self._orders[series.topic] = (stamps - self.zero) / 1e9, slice(None) if in_order else first
+        time, places = self._orders[series.topic]
+        return Signal(time, np.asarray(values, np.float64)[places])
 
     def _first_stamp(self) -> int:
         for topic in _ANCHORS:
