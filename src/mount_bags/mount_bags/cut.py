@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.beside_messages import lost_beside_messages
 from mount_bags.inherited_statement import sources_of
 from mount_bags.messages import Messages, read_messages, write_messages
 from mount_bags.metadata import TopicInformation
@@ -68,6 +69,7 @@ def cut(
     distro = recording.information.ros_distro if recording.information else ''
     custom = with_step([recording], _step(recording, span, reason))
     write_messages(out, parts, [recording], sources_of(recording, read), custom, distro)
+    losses += [f'{name} is lost by damage' for name in lost_beside_messages([recording])]
     return Cut(Path(out), span.begin / 1e9, span.end / 1e9, count, carried, tuple(losses))
 
 

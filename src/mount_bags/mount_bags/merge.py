@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.beside_messages import lost_beside_messages
 from mount_bags.inherited_statement import sources_of, united
 from mount_bags.messages import Messages, joined_payloads, read_messages, write_messages
 from mount_bags.metadata import TopicInformation
@@ -74,6 +75,7 @@ def merge(
     sources = united(map(sources_of, recordings, read))
     custom = with_step(recordings, step)
     kept = write_messages(out, parts, recordings, sources, custom, next(iter(distros), ''))
+    losses += [f'{name} is lost by damage' for name in lost_beside_messages(recordings)]
     return Merge(Path(out), kept, repeated, tuple(_holes(recordings)), tuple(losses))
 
 

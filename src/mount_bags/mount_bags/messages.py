@@ -82,7 +82,7 @@ def write_messages(
             times = int(part.log_times[place]), int(part.publish_times[place])
             bag.write(channels[number], part.payloads[place], *times, int(part.sequences[place]))
         bag.flush()
-        copy_beside_messages((file for recording in recordings for file in recording.files), bag)
+        copy_beside_messages(recordings, bag)
         if sources:
             bag.add_record(RECORDER_RECORD, inherited_statement(sources, bag.kept_by_topic))
         bag.close(custom_data, ros_distro)

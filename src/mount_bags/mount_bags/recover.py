@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.beside_messages import copy_beside_messages
+from mount_bags.beside_messages import copy_beside_messages, lost_beside_messages
 from mount_bags.chunks import Contents, records_in, stored_parts
 from mount_bags.inherited_statement import inherited_statement, sources_of
 from mount_bags.mcap_file import McapFile
@@ -104,7 +104,7 @@ def recover(
         if copied.unchecked:
             custom[RECOVERY_NOTE] = copied.note
         custom['recovered_from'] = _origin(recording, copied)
-        copy_beside_messages(recording.files, bag)
+        copy_beside_messages([recording], bag)
         sources = sources_of(recording, bag.kept_by_topic)
         if sources:
             bag.add_record(RECORDER_RECORD, inherited_statement(sources, bag.kept_by_topic))
@@ -234,7 +234,7 @@ def _balance(recording: Recording, bag: VerbatimBag, copied: _Copied) -> Recover
         kept_bytes=size - lost_bytes,
         lost_bytes=lost_bytes,
         all_messages=complete,
-        lost_beside=tuple(name for file in recording.files for name in file.lost_beside),
+        lost_beside=tuple(lost_beside_messages([recording])),
         lost_before=_lost_before(recording),
         notes=(*recording.warnings, *((copied.note,) if copied.unchecked else ())),
     )

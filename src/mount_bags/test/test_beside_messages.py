@@ -136,6 +136,10 @@ def test_damaged_attachment_or_metadata_is_said_to_be_lost(place, what):
     assert 'nothing of the file is missing' not in str(result)
     attachments, notes, _ = stored(result.folder)
     assert len(attachments) + len(notes) == 2
+    name = 'track' if what.startswith(b'track') else 'attachment'
+    opened = mount_bags.open(folder)
+    for losses in (cut(opened, place()).losses, merge([mount_bags.open(folder)], place()).losses):
+        assert [name in sentence for sentence in losses] == [True]
 
 
 # What the recorder says of its losses.
