@@ -179,8 +179,10 @@ def _write(folder: Path, parts: list[Messages]) -> None:
     writer = BagWriter(folder, chunk_size=_CHUNK_SIZE)
     for part in parts:
         writer.add_topic(part.topic.name, part.topic.type, part.topic.offered_qos)
-    for number, raw, log_time, publish_time in in_log_order(parts):
-        writer.write(parts[number].topic.name, raw, log_time, publish_time)
+    for number, place in in_log_order(parts):
+        part = parts[number]
+        times = int(part.log_times[place]), int(part.publish_times[place])
+        writer.write(part.topic.name, part.payloads[place], *times)
     writer.close()
 
 

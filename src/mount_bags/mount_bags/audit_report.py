@@ -98,7 +98,9 @@ def _verdict(audits: Mapping[str, TopicAudit], found: Losses) -> str:
         return '. '.join(said) + '.'
     if not found.whole:
         return 'The recording is not whole: what the notes say is missing, its stamps cannot show.'
-    told = sum(entry.expected is not None for entry in audits.values())
+    if not any(entry.present for entry in audits.values()):
+        return 'The recording is empty: no message came, so none could be lost.'
+    told = sum(entry.expected is not None for entry in audits.values() if entry.present)
     untold = sum(entry.expected is None and entry.present > 0 for entry in audits.values())
     if not told:
         return 'Whether anything was lost cannot be told: no topic has stamps with a rate, nobody counted.'

@@ -327,7 +327,7 @@ def _heads(data: Bytes, offsets: Offsets) -> np.ndarray:
 
 def _rows(data: Bytes, begins: Offsets, width: int) -> NDArray[np.uint8]:
     """Return `width` bytes from each of `begins` on, which the caller knows to be inside of `data`."""
-    if not width:
-        return np.empty((len(begins), 0), np.uint8)
+    if not (width and len(begins)):
+        return np.empty((len(begins), width), np.uint8)
     windows = np.lib.stride_tricks.as_strided(data, (data.size - width + 1, width), (1, 1), writeable=False)
     return windows[begins]

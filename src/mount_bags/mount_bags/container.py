@@ -15,6 +15,8 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
+    Attachment,
+    AttachmentIndex,
     Channel,
     Chunk,
     ChunkIndex,
@@ -59,6 +61,7 @@ class ChunkedMcap:
         self._chunk_indexes = bytearray()  # packed: a long recording has very many of them
         self._chunk_count = 0
         self._metadata_indexes: list[MetadataIndex] = []
+        self._attachment_indexes: list[AttachmentIndex] = []
         self._written_schemas: set[int] = set()
         self._written_channels: set[int] = set()
         self._data_crc = 0
@@ -97,7 +100,9 @@ class ChunkedMcap:
         self._room += 4 * len(_packed(channel))
         return number
 
-    def add_message(self, channel: int, raw: bytes, log_time: int, publish_time: int) -> None:
+    def add_message(
+        self, channel: int, raw: bytes, log_time: int, publish_time: int, sequence: int = 0
+    ) -> None:
         """Add one serialised message; times in ns. A full chunk goes to the file at once."""
         entries = self._entries.get(channel)
         if entries is None:
@@ -105,7 +110,7 @@ class ChunkedMcap:
         length = len(raw)
         entries += (log_time, self._size)
         self._parts += (
-            _MESSAGE.pack(_MESSAGE_OPCODE, length + _MESSAGE_HEAD, channel, 0, log_time, publish_time),
+            _MESSAGE.pack(_MESSAGE_OPCODE, length + _MESSAGE_HEAD, channel, sequence, log_time, publish_time),
             raw,
         )
         self._size += length + _MESSAGE.size
@@ -163,6 +168,23 @@ class ChunkedMcap:
         offset = self.file.size
         self._append(record)
         self._metadata_indexes.append(MetadataIndex(offset=offset, length=len(record), name=name))
+
+    def add_attachment(self, attachment: Attachment) -> None:
+        """Write an attachment behind what is already in the file."""
+        record = _packed(attachment)
+        offset = self.file.size
+        self._append(record)
+        self._attachment_indexes.append(
+            AttachmentIndex(
+                offset=offset,
+                length=len(record),
+                log_time=attachment.log_time,
+                create_time=attachment.create_time,
+                data_size=len(attachment.data),
+                name=attachment.name,
+                media_type=attachment.media_type,
+            )
+        )
 
     def finish(self) -> None:
         """Write summary and footer; the room that was held back is used for it."""
@@ -255,6 +277,7 @@ class ChunkedMcap:
             Opcode.CHANNEL: _all_packed(self._channels),
             Opcode.STATISTICS: _packed(self._statistics()),
             Opcode.CHUNK_INDEX: self._chunk_indexes,
+            Opcode.ATTACHMENT_INDEX: _all_packed(self._attachment_indexes),
             Opcode.METADATA_INDEX: _all_packed(self._metadata_indexes),
         }
         data = bytearray()
@@ -272,7 +295,7 @@ class ChunkedMcap:
 
     def _statistics(self) -> Statistics:
         return Statistics(
-            attachment_count=0,
+            attachment_count=len(self._attachment_indexes),
             channel_count=len(self._channels),
             channel_message_counts=self.message_counts,
             chunk_count=self._chunk_count,

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.beside_messages import lost_beside_messages
+from mount_bags.inherited_statement import sources_of
 from mount_bags.messages import Messages, read_messages, write_messages
 from mount_bags.metadata import TopicInformation
 from mount_bags.origin import short_name, with_step
@@ -50,13 +52,15 @@ def cut(
 
     Times are in s on the time axis of `recording` (`mount_bags.time_axis`), which the piece keeps; None is
     its beginning, or its end with the last message. Messages keep their bytes, log and publish times. Of
-    latched topics and of `event` the last message before `begin` comes with it; `reason` goes into the note
-    of origin. Raises `CutError`.
+    latched topics and of `event` the last message before `begin` comes with it, and so do attachments and
+    metadata. What the recorder lost is told of the piece too: nobody knows when that was. `reason` goes into
+    the note of origin. Raises `CutError`.
     """
     span = _checked_span(recording, time_axis(recording), begin, end)
-    parts, losses, carried = [], [], 0
+    parts, losses, carried, read = [], [], 0, {}
     for name in recording:
         messages, damages = read_messages(recording, name)
+        read[name] = len(messages)
         before, inside = _places(messages, span)
         parts.append(messages.chosen(np.concatenate([before, inside])))
         carried += len(before)
@@ -65,7 +69,9 @@ def cut(
     if not count:
         raise CutError(f'{recording.path} has no message {span}; it ends at {span.whole:.3f} s')
     distro = recording.information.ros_distro if recording.information else ''
-    write_messages(out, parts, with_step([recording], _step(recording, span, reason)), distro)
+    custom = with_step([recording], _step(recording, span, reason))
+    write_messages(out, parts, [recording], sources_of(recording, read), custom, distro)
+    losses += [f'{name} is lost by damage' for name in lost_beside_messages([recording])]
     return Cut(Path(out), span.begin, span.end, count, carried, tuple(losses))
 
 

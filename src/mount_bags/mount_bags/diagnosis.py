@@ -1,10 +1,10 @@
 """The recorder's verdict on itself, from its figures alone."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from mount_bags.recording import RecorderFigures
+from mount_bags.recording import RecorderFigures, Unobserved
 from mount_bags.snapshot import SnapshotFigures
 from mount_bags.stamps import StampWatch
 from mount_ros.diagnostics import Level, Verdict
@@ -31,6 +31,7 @@ class RecorderState:
     free: int = LEAST_FREE
     rate: float = 0.0
     overflowed: Mapping[str, int] = field(default_factory=dict)
+    unobserved: Mapping[str, Unobserved] = field(default_factory=dict)
     marks: int = 0  # set by the recorder itself
     events: int = 0  # all that came on `event`
     snapshot: SnapshotFigures | None = None
@@ -50,30 +51,48 @@ def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:
         return Level.ERROR, f'{figures.failure}; free some space and start again'
     if figures.failure:
         return Level.WARN, f'the run goes on without recording: {figures.failure}'
-    if figures.lost:
-        return Level.WARN, (
-            f'{figures.lost} of {figures.received} messages lost: the disk is slower than the data; '
-            'record fewer topics or use a faster disk'
-        )
-    missing = {topic: watch.lost for topic, watch in state.watches.items() if watch.lost}
-    if missing:
-        counts = ', '.join(f'{topic} {count}' for topic, count in missing.items())
-        return Level.WARN, f'samples missing between the stamps: {counts}; is the machine overloaded?'
-    if _is_short_of_space(state):
-        return Level.WARN, (
-            f'{state.free / 1e9:.1f} GB left on the disk of {state.folder} at {state.rate / 1e6:.1f} MB/s; '
-            'free some space'
-        )
-    if state.snapshot is not None and state.snapshot.short_of_memory:
-        return Level.WARN, (
-            'the memory does not hold the wished time before an event; '
-            'raise snapshot_memory or record fewer topics'
-        )
+    if warnings := list(_warnings(state)):
+        return Level.WARN, '. '.join(warnings)
     found = sum(count > 0 for count in state.publishers.values())
     return (
         Level.OK,
         f'{_activity(state.snapshot)}; {found} of {len(state.publishers)} topics have a publisher',
     )
+
+
+def _warnings(state: RecorderState) -> Iterator[str]:
+    """Yield a sentence for each thing that is not as it should be; none hides another."""
+    figures = state.figures
+    if figures.lost:
+        yield (
+            f'{figures.lost} of {figures.received} messages lost: the disk is slower than the data; '
+            'record fewer topics or use a faster disk'
+        )
+    if state.unobserved:
+        yield f'{unobserved_sentence(state.unobserved)}; who else publishes there?'
+    missing = {topic: watch.lost for topic, watch in state.watches.items() if watch.lost}
+    if missing:
+        counts = ', '.join(f'{topic} {count}' for topic, count in missing.items())
+        yield f'samples missing between the stamps: {counts}; is the machine overloaded?'
+    if _is_short_of_space(state):
+        yield (
+            f'{state.free / 1e9:.1f} GB left on the disk of {state.folder} at {state.rate / 1e6:.1f} MB/s; '
+            'free some space'
+        )
+    if state.snapshot is not None and state.snapshot.short_of_memory:
+        yield (
+            'the memory does not hold the wished time before an event; '
+            'raise snapshot_memory or record fewer topics'
+        )
+
+
+def unobserved_sentence(unobserved: Mapping[str, Unobserved]) -> str:
+    """Return what the recorder could write but not read, by topic."""
+    counts = ', '.join(
+        f'{topic} {entry.count} (the last of {entry.size} bytes; {entry.why})'
+        for topic, entry in unobserved.items()
+    )
+    return f'malformed messages, recorded but neither watched nor marked: {counts}'
 
 
 def _activity(snapshot: SnapshotFigures | None) -> str:
@@ -102,6 +121,7 @@ def _figures(state: RecorderState) -> dict[str, object]:
         **_snapshot_figures(state.snapshot),
         **{f'lost.{topic}': count for topic, count in state.overflowed.items()},
         **{f'publishers.{topic}': count for topic, count in state.publishers.items()},
+        **{f'malformed.{topic}': entry.count for topic, entry in state.unobserved.items()},
         **{f'missing.{topic}': watch.lost for topic, watch in state.watches.items()},
     }
 

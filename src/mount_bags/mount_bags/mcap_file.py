@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Attachment, Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from mount_bags.chunks import (
@@ -28,7 +28,16 @@ from mount_bags.chunks import (
     partial_chunk,
     scattered_chunks,
 )
-from mount_bags.summary import Proof, data_proof, parsed, parsed_metadata, read_summary
+from mount_bags.message_compression import plain
+from mount_bags.piece_topics import ACCOUNTS
+from mount_bags.summary import (
+    Proof,
+    data_proof,
+    parsed,
+    parsed_attachment,
+    parsed_metadata,
+    read_summary,
+)
 from mount_bags.whole_files import FileError, mapped
 
 _LAST_OPCODE = Opcode.DATA_END
@@ -56,7 +65,9 @@ class McapFile:
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
         self.metadata: dict[str, dict[str, str]] = {}
+        self.records: list[tuple[str, dict[str, str]]] = []
         self.warnings: list[str] = []
+        self.lost_beside: list[str] = []  # names of metadata and attachments
         self.chunks: list[Chunk] = []
         self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
         self.closed = False  # whether the writer came to the end of its messages
@@ -65,6 +76,8 @@ class McapFile:
         self._data_end = 0  # where the messages end, by the file's own account
         self._footer_found = False
         self._loose: list[int] = []  # messages outside of chunks
+        self._records_at: set[int] = set()  # where those of metadata begin
+        self._attachments: list[tuple[int, int]] = []  # begin and end of their records
         self._counts: dict[int, int] = {}
         self._times: tuple[int, int] | None = None
         self._data = _opened(path)
@@ -108,18 +121,28 @@ class McapFile:
         return self._times
 
     def blocks(self, channels: Collection[int]) -> Iterator[Contents]:
-        """Yield the messages of `channels` in the order of the file."""
+        """Yield the messages of `channels` in the order of the file, unpacked where each is packed."""
         self.data_proof()
         wanted = np.array(sorted(channels), np.int64)
         for chunk in self.chunks:
             if chunk.channels is None or not chunk.channels.isdisjoint(channels):
                 contents = self.contents(chunk)
                 if contents is not None and (found := contents.of(wanted)).offsets.size:
-                    yield found
+                    yield plain(found)
         if self._loose:
             found = messages_at(self._data, np.array(self._loose)).of(wanted)
             if found.offsets.size:
-                yield found
+                yield plain(found)
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the attachments, without those that are damaged."""
+        for begin, end in self._attachments:
+            attachment = parsed_attachment(self._data[begin + RECORD.size : end])
+            if attachment is not None:
+                yield attachment
+            elif (name := f'attachment at byte {begin}') not in self.lost_beside:
+                self.lost_beside.append(name)
+                self._warn(f'the {name} is damaged and left out')
 
     def contents(self, chunk: Chunk) -> Contents | None:
         """Return what is in a chunk; None, with a warning, if it is damaged."""
@@ -160,13 +183,33 @@ class McapFile:
             return False
         self.chunks = sorted((chunk for chunk in chunks if chunk), key=lambda chunk: chunk.position)
         self._counts = dict(statistics.channel_message_counts)
-        if statistics.message_count:
-            self._times = statistics.message_start_time, statistics.message_end_time
         self._walk_between_chunks()
+        self._take_times(statistics)
+        self._note_lost_beside()
         self.closed = True
         if self._data[-len(MCAP0_MAGIC) :] != MCAP0_MAGIC:
             self._warn('its last bytes are damaged; all else is read')
         return True
+
+    def _take_times(self, statistics: Statistics) -> None:
+        """Take the times of the chunks, which are nearer to the messages than the statistics of the file."""
+        for chunk in self.chunks:
+            # Without indexes, whether a chunk holds messages shows in its times alone.
+            if chunk.channels or (chunk.channels is None and chunk.end_time):
+                self._widen(chunk.start_time, chunk.end_time)
+        if self._loose:
+            times = messages_at(self._data, np.array(self._loose)).heads['log_time']
+            self._widen(int(times.min()), int(times.max()))
+        told = statistics.message_start_time, statistics.message_end_time
+        if self._times is not None and told != self._times:
+            self._warn('its statistics tell of other times than its chunks; believed are the chunks')
+
+    def _note_lost_beside(self) -> None:
+        found = {begin for begin, _ in self._attachments} | self._records_at
+        for index in self._summary.beside:
+            if index.offset not in found and index.name not in ACCOUNTS:
+                self.lost_beside.append(index.name)
+                self._warn(f'{index.name}, metadata or attachment at byte {index.offset}, is damaged')
 
     def _walk_between_chunks(self) -> None:
         lengths = {index.chunk_start_offset: index.message_index_length for index in self._summary.chunks}
@@ -204,7 +247,7 @@ class McapFile:
         if not (self._footer_found and self._data[end:] == MCAP0_MAGIC):
             self.tail = self._tail(end)
             self._add_scattered_chunks()
-            self._note_unexplained()
+            self._note_unexplained(end)
             self.closed = bool(self._data_end)
             kept = f'read up to byte {end}, {len(self.chunks)} whole chunks'
             messages = 'all messages are there' if self.whole else kept
@@ -226,7 +269,7 @@ class McapFile:
         self.chunks = kept
         self._loose = [place for place in self._loose if not any(_holds(chunk, place) for chunk in kept)]
 
-    def _note_unexplained(self) -> None:
+    def _note_unexplained(self, walked: int) -> None:
         position = len(MCAP0_MAGIC)
         stretches = []
         for chunk in self.chunks:
@@ -234,21 +277,27 @@ class McapFile:
             position = chunk.end
         stretches.append((position, len(self._data)))
         for begin, limit in stretches:
-            understood = self._understood(begin, limit)
+            understood = self._understood(begin, limit, walked)
             if understood < limit and not 0 < self._data_end <= understood:
                 self.unexplained.append(Stretch(understood, limit))
         for stretch in self.unexplained:
             if stretch.end < len(self._data):
                 self._warn(f'bytes {stretch.begin} to {stretch.end} are damaged and left out')
 
-    def _understood(self, position: int, limit: int) -> int:
-        """Return where from `position` on the last whole record before `limit` ends."""
+    def _understood(self, position: int, limit: int, walked: int) -> int:
+        """Return where from `position` on the last whole record before `limit` ends.
+
+        What stands beside the messages is taken where nobody has `walked` so far.
+        """
         while position < limit:
             end = self._record_end(position, limit)
             if end is None or self._data[position] == Opcode.CHUNK:
                 break
-            if self._data[position] == Opcode.DATA_END:
+            opcode = self._data[position]
+            if opcode == Opcode.DATA_END:
                 self._data_end = end
+            if position >= walked and opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
+                self._take_record(opcode, position, end)
             position = end
         return position
 
@@ -302,7 +351,7 @@ class McapFile:
             if chunk is not None:
                 self.chunks.append(chunk)
             else:
-                self._take_record(opcode, position, self._data[position + RECORD.size : end])
+                self._take_record(opcode, position, end)
             position = end
             if opcode == Opcode.DATA_END:
                 self._data_end = position
@@ -328,10 +377,15 @@ class McapFile:
             return None  # only its first byte is damaged
         return end
 
-    def _take_record(self, opcode: int, position: int, content: bytes) -> None:
+    def _take_record(self, opcode: int, position: int, end: int) -> None:
         if opcode == Opcode.MESSAGE:
             self._loose.append(position)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            return
+        if opcode == Opcode.ATTACHMENT:
+            self._attachments.append((position, end))
+            return
+        content = self._data[position + RECORD.size : end]
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._declare(opcode, content)
         elif opcode == Opcode.METADATA:
             metadata = parsed_metadata(content)
@@ -339,6 +393,8 @@ class McapFile:
                 self._warn(f'the metadata at byte {position} is not readable')
             else:
                 self.metadata[metadata.name] = dict(metadata.metadata)
+                self.records.append((metadata.name, dict(metadata.metadata)))
+                self._records_at.add(position)
 
     def _declare(self, opcode: int, content: bytes) -> None:
         if opcode == Opcode.SCHEMA:

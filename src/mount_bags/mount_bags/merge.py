@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.beside_messages import lost_beside_messages
+from mount_bags.inherited_statement import sources_of, united
 from mount_bags.messages import Messages, joined_payloads, read_messages, write_messages
 from mount_bags.metadata import TopicInformation
 from mount_bags.origin import short_name, with_step
@@ -43,7 +45,8 @@ def merge(
     """Write all messages of `recordings` by log time to the new recording `out`, each message once.
 
     A message is the same where topic, times and bytes are; one that a recording itself has twice stays
-    there twice. Raises `MergeError` where a topic has two types, and where the sessions differ unless
+    there twice. Attachments and metadata come with them, each once, and what their recorders lost adds up.
+    Raises `MergeError` where a topic has two types, and where the sessions differ unless
     `different_sessions`.
     """
     if not recordings:
@@ -52,11 +55,13 @@ def merge(
     if not different_sessions:
         _refuse_different_sessions(recordings)
     parts, losses, repeated = [], [], 0
+    read: list[dict[str, int]] = [{} for _ in recordings]
     for topic in topics.values():
         found = []
-        for recording in recordings:
+        for recording, counts in zip(recordings, read, strict=True):
             if topic.name in recording.topics:
                 messages, damages = read_messages(recording, topic.name)
+                counts[topic.name] = len(messages)
                 found.append(messages)
                 losses += damages
         parts.append(_united(topic, found))
@@ -67,7 +72,10 @@ def merge(
         'made': datetime.now().astimezone().isoformat(timespec='seconds'),
     }
     distros = [recording.information.ros_distro for recording in recordings if recording.information]
-    kept = write_messages(out, parts, with_step(recordings, step), next(iter(distros), ''))
+    sources = united(map(sources_of, recordings, read))
+    custom = with_step(recordings, step)
+    kept = write_messages(out, parts, recordings, sources, custom, next(iter(distros), ''))
+    losses += [f'{name} is lost by damage' for name in lost_beside_messages(recordings)]
     return Merge(Path(out), kept, repeated, tuple(_holes(recordings)), tuple(losses))
 
 
@@ -123,6 +131,7 @@ def _united(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
         np.concatenate([part.log_times for part in parts]),
         np.concatenate([part.publish_times for part in parts]),
         joined_payloads([part.payloads for part in parts]),
+        np.concatenate([part.sequences for part in parts]),
     )
     order = np.argsort(united.log_times, kind='stable')
     repeated = _repeated(united, parts, order)

@@ -1,16 +1,19 @@
 """Messages as they were recorded, byte for byte, chosen by their log times and written to a new recording."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.beside_messages import copy_beside_messages
+from mount_bags.inherited_statement import Sources, inherited_statement
 from mount_bags.metadata import TopicInformation
 from mount_bags.piece_topics import BagFile
 from mount_bags.reading import Recording, open_recording
 from mount_bags.series import Payloads, Series, Times
+from mount_bags.statement import RECORDER_RECORD
 from mount_bags.verbatim import VerbatimBag
 
 _LARGE = 500_000  # messages, chosen: about 100 MB
@@ -28,6 +31,7 @@ class Messages:
     log_times: Times
     publish_times: Times
     payloads: Payloads
+    sequences: NDArray[np.uint32]
 
     def __len__(self) -> int:
         return len(self.log_times)
@@ -40,6 +44,7 @@ class Messages:
             self.log_times[places],
             self.publish_times[places],
             _at(self.payloads, places),
+            self.sequences[places],
         )
 
 
@@ -58,19 +63,28 @@ def read_messages(recording: Recording, name: str) -> tuple[Messages, list[str]]
 def write_messages(
     folder: str | os.PathLike[str],
     parts: Sequence[Messages],
+    recordings: Sequence[Recording],
+    sources: Sources,
     custom_data: Mapping[str, str],
     ros_distro: str = '',
 ) -> int:
     """Write `parts` by their log times to the new recording `folder` and return how many messages these are.
 
-    Schemas and channels are those of the files that the messages are from, so types need not be installed.
-    If that fails, nothing is left behind.
+    They are from `recordings`, whose attachments and metadata come with them, and whose recorders lost what
+    `sources` tell. Schemas and channels are those of their files, so types need not be installed. If that
+    fails, nothing is left behind.
     """
     bag = VerbatimBag(folder)
     try:
         channels = [bag.channel(*part.declared) if part.declared else 0 for part in parts]
-        for number, raw, log_time, publish_time in in_log_order(parts):
-            bag.write(channels[number], raw, log_time, publish_time)
+        for number, place in in_log_order(parts):
+            part = parts[number]
+            times = int(part.log_times[place]), int(part.publish_times[place])
+            bag.write(channels[number], part.payloads[place], *times, int(part.sequences[place]))
+        bag.flush()
+        copy_beside_messages(recordings, bag)
+        if sources:
+            bag.add_record(RECORDER_RECORD, inherited_statement(sources, bag.kept_by_topic))
         bag.close(custom_data, ros_distro)
     except BaseException:
         bag.discard()
@@ -78,11 +92,15 @@ def write_messages(
     return bag.kept
 
 
-def in_log_order(parts: Sequence[Messages]) -> Iterator[tuple[int, bytes, int, int]]:
-    """Yield (number of the part, message, log time, publish time) sorted by log time (ns), then by part."""
-    for number, place in _by_log_time([part.log_times for part in parts]):
-        part = parts[number]
-        yield number, part.payloads[place], int(part.log_times[place]), int(part.publish_times[place])
+def in_log_order(parts: Sequence[Messages]) -> Iterable[tuple[int, int]]:
+    """Return (number of the part, place in it) of all messages, sorted by log time, then by part."""
+    if not parts:
+        return ()
+    times = [part.log_times for part in parts]
+    numbers = np.repeat(np.arange(len(times)), [len(each) for each in times])
+    places = np.concatenate([np.arange(len(each)) for each in times])
+    order = np.argsort(np.concatenate(times), kind='stable')
+    return zip(numbers[order].tolist(), places[order].tolist(), strict=True)
 
 
 def joined_payloads(payloads: Iterable[Payloads]) -> Payloads:
@@ -98,7 +116,9 @@ def _declaration(recording: Recording, name: str) -> tuple[BagFile, int] | None:
 
 
 def _in_order(topic: TopicInformation, declared: tuple[BagFile, int] | None, series: Series) -> Messages:
-    messages = Messages(topic, declared, series.receive_times, series.publish_times, series.payloads)
+    messages = Messages(
+        topic, declared, series.receive_times, series.publish_times, series.payloads, series.sequences
+    )
     if (np.diff(messages.log_times) >= 0).all():
         return messages
     return messages.chosen(np.argsort(messages.log_times, kind='stable'))
@@ -112,13 +132,3 @@ def _at(payloads: Payloads, places: NDArray[np.int64]) -> Payloads:
 
 def _pieces(payloads: Payloads) -> NDArray[np.uint8] | list[bytes]:
     return payloads.rows if payloads.rows is not None else [payloads[i] for i in range(len(payloads))]
-
-
-def _by_log_time(times: Sequence[Times]) -> Iterable[tuple[int, int]]:
-    """Return (part, place in it) of all messages, sorted by time, then by part."""
-    if not times:
-        return ()
-    numbers = np.repeat(np.arange(len(times)), [len(each) for each in times])
-    places = np.concatenate([np.arange(len(each)) for each in times])
-    order = np.argsort(np.concatenate(times), kind='stable')
-    return zip(numbers[order].tolist(), places[order].tolist(), strict=True)

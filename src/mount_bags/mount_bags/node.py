@@ -11,7 +11,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from mount_bags.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
-from mount_bags.diagnosis import OnFull, RecorderState, judge
+from mount_bags.diagnosis import OnFull, RecorderState, judge, unobserved_sentence
 from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time
 from mount_bags.offered_qos import OfferedQos
 from mount_bags.recorder_parameters import RecorderParameters, split_of
@@ -52,6 +52,7 @@ class MountRecorder(SafeLifecycleNode):
         self._on_full = OnFull.STOP
         self._event = EVENT.name
         self._announced_failure = ''
+        self._announced_malformed: set[str] = set()
         self._begun_at = 0.0
         self._mark_service = self.create_service(Trigger, '~/mark', self._on_mark)
 
@@ -80,6 +81,7 @@ class MountRecorder(SafeLifecycleNode):
             on_loss=self._mark_loss,
         )
         self._announced_failure = ''
+        self._announced_malformed = set()
         for entry in topics:
             self._record(data_path, entry)
         if self.lockstep:
@@ -117,6 +119,10 @@ class MountRecorder(SafeLifecycleNode):
         if figures.failure and not self._announced_failure:
             self._announced_failure = figures.failure
             self.get_logger().error(figures.failure)
+        unobserved = dict(recorder.unobserved)
+        if new := {name: unobserved[name] for name in unobserved.keys() - self._announced_malformed}:
+            self._announced_malformed |= new.keys()
+            self.get_logger().warning(unobserved_sentence(new))
         elapsed = time.monotonic() - self._begun_at
         state = RecorderState(
             str(sink.folder),
@@ -126,6 +132,7 @@ class MountRecorder(SafeLifecycleNode):
             self._space.free() if self._space is not None else 0,
             figures.file_size / elapsed if elapsed > 1.0 else 0.0,
             recorder.overflowed(),
+            unobserved,
             self._marks.sent if self._marks is not None else 0,
             recorder.received_on(self._event),
             sink.figures() if isinstance(sink, Snapshot) else None,

@@ -9,6 +9,7 @@ import yaml
 from mount_bags.container import ChunkedMcap
 from mount_bags.metadata import NO_TIME, FileInformation
 from mount_bags.offered_qos import OfferedQos, qos_text
+from mount_bags.piece_topics import PIECE_RECORD
 from mount_bags.record_file import RecordFile
 from mount_bags.schemas import schema_text
 
@@ -16,7 +17,6 @@ PROFILE = 'ros2'
 LIBRARY = 'engine-mount mount_bags 0.1.0'
 SCHEMA_ENCODING = 'ros2msg'
 MESSAGE_ENCODING = 'cdr'
-PIECE_RECORD = 'engine_mount_piece'  # name of the metadata record at the head of every piece but the first
 
 Offers = Callable[[], Sequence[OfferedQos]]
 

@@ -9,15 +9,18 @@ from pathlib import Path
 from typing import Protocol
 
 import yaml
-from mcap.records import Channel, Schema
+from mcap.records import Attachment, Channel, Schema
 
 from mount_bags.chunks import Contents
 from mount_bags.definitions import Definition, DefinitionError, installed_definition, text_definition
 from mount_bags.metadata import BagInformation, TopicInformation
 from mount_bags.offered_qos import OfferedQos, QosError, read_qos
+from mount_bags.statement import RECORDER_RECORD
 
-# The writer's note at the head of a piece: which latched topics it repeats there.
+# The writer's note at the head of every piece but the first: which latched topics it repeats there.
 PIECE_RECORD = 'engine_mount_piece'
+# Metadata records in which a recording tells of itself; one that is made of it has its own.
+ACCOUNTS = ('rosbag2', RECORDER_RECORD, PIECE_RECORD)
 
 
 class BagFile(Protocol):
@@ -26,8 +29,10 @@ class BagFile(Protocol):
     path: Path
     channels: dict[int, Channel]
     schemas: dict[int, Schema]
-    metadata: dict[str, dict[str, str]]
+    metadata: dict[str, dict[str, str]]  # the last record of each name
+    records: list[tuple[str, dict[str, str]]]  # all of them
     warnings: list[str]
+    lost_beside: list[str]  # names of metadata and attachments that are known to be lost
 
     @property
     def whole(self) -> bool: ...
@@ -39,6 +44,7 @@ class BagFile(Protocol):
     def message_counts(self) -> dict[int, int]: ...
     def time_range(self) -> tuple[int, int] | None: ...
     def blocks(self, channels: Collection[int]) -> Iterator[Contents]: ...
+    def attachments(self) -> Iterator[Attachment]: ...
 
 
 @dataclass

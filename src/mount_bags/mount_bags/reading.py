@@ -1,7 +1,8 @@
 """Opens recordings: those of this project and genuine rosbag2 bags, whole or in part."""
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from mount_bags.bag_folder import BagFolderError, find_pieces, open_piece
 from mount_bags.chunks import MESSAGE_HEAD, Contents
+from mount_bags.columns import ColumnCollector
 from mount_bags.definitions import Definition
 from mount_bags.mcap_file import McapFileError
 from mount_bags.metadata import METADATA_NAME, BagInformation, MetadataError, TopicInformation, read_metadata
@@ -19,9 +21,8 @@ from mount_bags.piece_topics import (
     readable_definition,
     repeated_topics,
 )
-from mount_bags.series import Payloads, Series
+from mount_bags.series import Column, Payloads, Series, Times
 from mount_bags.topic_times import TimesCollector, TopicTimes
-from mount_bags.whole_files import unpacked_payload
 
 # Key of the custom data in which `engine-mount recover` says what it could not prove.
 RECOVERY_NOTE = 'recovered_unchecked'
@@ -108,7 +109,27 @@ class Recording:
     def load(self, names: Iterable[str]) -> None:
         """Read several topics in one pass through the files, for later use; raises `ReadingError`."""
         wanted = dict.fromkeys(self.resolve(name) for name in names)
-        self._series |= self._load([name for name in wanted if name not in self._series])
+        self._series |= self._load([name for name in wanted if not self._is_loaded(name)])
+
+    def load_columns(self, columns: Mapping[str, Iterable[str]]) -> None:
+        """Read columns of topics and their stamps in one pass, for later use; raises `ReadingError`.
+
+        In memory are at no time more messages than a block. What else is asked of these topics later, such
+        as a message or a column that is not in each of them, is read then.
+        """
+        wanted = {self.resolve(topic): self._unread(self.resolve(topic), columns[topic]) for topic in columns}
+        collectors = {
+            name: ColumnCollector(partial(self._made, name), names) for name, names in wanted.items() if names
+        }
+        for name, block in self._blocks(list(collectors)) if collectors else ():
+            collectors[name].add(block)
+        for name in list(collectors):
+            head, found, stamps = collectors.pop(name).finish()
+            self._note_damage(name, len(head))
+            known = self._series[name].columns if name in self._series else {}
+            self._series[name] = self._made(
+                name, partial(self._payloads, name), head, columns={**known, **found}, stamps=stamps
+            )
 
     def latched(self, name: str) -> Any:
         """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
@@ -229,15 +250,42 @@ class Recording:
         return {name: self._series_of(name, found) for name, found in blocks.items()}
 
     def _series_of(self, name: str, blocks: list[Contents]) -> Series:
-        definition, sentence = self._definitions[name]
         head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, MESSAGE_HEAD)
         self._note_damage(name, len(head))
+        return self._made(name, Payloads([block.payloads() for block in blocks]), head)
+
+    def _is_loaded(self, name: str) -> bool:
+        return name in self._series and self._series[name].loaded
+
+    def _payloads(self, name: str) -> Payloads:
+        return self._load([name])[name].payloads
+
+    def _unread(self, name: str, columns: Iterable[str]) -> set[str]:
+        """Return which of the columns need a pass through the files: none where all messages are here."""
+        known = self._series.get(name)
+        if known is None:
+            return set(columns)
+        return set() if known.loaded else set(columns) - known.columns.keys()
+
+    def _made(
+        self,
+        name: str,
+        payloads: Payloads | Callable[[], Payloads],
+        head: np.ndarray,
+        *,
+        columns: Mapping[str, Column] | None = None,
+        stamps: Times | None = None,
+    ) -> Series:
+        definition, sentence = self._definitions[name]
         return Series(
             name,
             self.topics[name].type,
-            Payloads([_plain(block.payloads()) for block in blocks]),
+            payloads,
             head['log_time'].astype(np.int64),
             head['publish_time'].astype(np.int64),
+            sequences=head['sequence'].astype(np.uint32),
+            columns=columns,
+            stamps=stamps,
             definition=definition,
             obstacle='' if definition else sentence,
             zero=self.time_range[0] if self.time_range else 0,
@@ -273,12 +321,3 @@ class Recording:
 
 def _first(block: Contents) -> tuple[bytes, int]:
     return block.message(0)
-
-
-def _plain(payloads: Any) -> Any:
-    """Return payloads as they were before rosbag2 compressed each of them."""
-    return [unpacked_payload(raw) for raw in map(bytes, payloads)] if _is_packed(payloads) else payloads
-
-
-def _is_packed(payloads: Any) -> bool:
-    return len(payloads) > 0 and bytes(payloads[0][:4]) == b'\x28\xb5\x2f\xfd'

@@ -67,6 +67,15 @@ class RecorderFigures:
     failure: str
 
 
+@dataclass(frozen=True)
+class Unobserved:
+    """Messages of a topic, all recorded, that its observer could not read: bytes of the last, and why."""
+
+    count: int
+    size: int
+    why: str
+
+
 class Recorder:
     """Takes serialised messages of announced topics and writes them from `begin` to `end`.
 
@@ -74,6 +83,7 @@ class Recorder:
     and `end` by any other. The writing is done by a thread of its own, or (`threaded` off) by whoever
     calls `poll`. What `watch` and `observe` take is called where the writing is done, and so is
     `on_loss`, with the number of messages for which the queue had no room since it was called last.
+    A message on which an observer fails is recorded all the same and counted in `unobserved`.
     """
 
     def __init__(
@@ -86,6 +96,7 @@ class Recorder:
         on_loss: Callable[[int], None] = lambda _: None,
     ):
         self.watches: dict[str, StampWatch] = {}
+        self.unobserved: dict[str, Unobserved] = {}
         self.begun = False
         self._writer = writer
         self._memory_limit = memory_limit
@@ -283,10 +294,20 @@ class Recorder:
                 taken_bytes += len(raw)
                 write(topic, raw, received, sent)
                 if topic in observers:
-                    observers[topic](raw, received)
+                    try:
+                        observers[topic](raw, received)
+                    except Exception as error:
+                        # Anybody may publish anything: what is wrong with one message ends no recording.
+                        self._note_unobserved(topic, raw, error)
         finally:
             self._handed += taken
             self._drained_bytes += taken_bytes
+
+    def _note_unobserved(self, topic: str, raw: bytes, error: Exception) -> None:
+        before = self.unobserved.get(topic)
+        count = 1 if before is None else before.count + 1
+        why = f'{type(error).__name__}: {error}'.splitlines()[0]
+        self.unobserved[topic] = Unobserved(count, len(raw), why)
 
     def _discard_queued(self) -> None:
         for _ in range(len(self._queue)):

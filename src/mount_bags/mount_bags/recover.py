@@ -17,11 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
+from mount_bags.beside_messages import copy_beside_messages, lost_beside_messages
 from mount_bags.chunks import Contents, records_in, stored_parts
+from mount_bags.inherited_statement import inherited_statement, sources_of
 from mount_bags.mcap_file import McapFile
+from mount_bags.message_compression import plain
 from mount_bags.metadata import NO_TIME
 from mount_bags.piece_topics import BagFile, repeated_topics
 from mount_bags.reading import RECOVERY_NOTE, Recording, open_recording
+from mount_bags.statement import RECORDER_RECORD, read_statement
 from mount_bags.verbatim import VerbatimBag
 
 _ZEROS = 16  # chosen: so many zeros at the end of a cut file are room that was never written
@@ -39,7 +43,7 @@ class Recovery:
     """What was kept and what is lost; NaN and None where it cannot be told.
 
     `unchecked` of the kept messages come from a chunk without its checksum; `lost` is an estimate from
-    bytes unless `lost_is_counted`.
+    bytes unless `lost_is_counted`. `lost_before` never reached the file: its recorder says so itself.
     """
 
     folder: Path
@@ -51,14 +55,24 @@ class Recovery:
     lost_seconds: float
     kept_bytes: int
     lost_bytes: int
-    complete: bool
+    all_messages: bool
+    lost_beside: tuple[str, ...]  # names of attachments and metadata
+    lost_before: int
     notes: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing of the file is lost."""
+        return self.all_messages and not self.lost_beside
 
     def __str__(self) -> str:
         kept = f'kept {self.kept} messages, {self.kept_seconds:.3f} s, {_size(self.kept_bytes)}'
-        if self.complete:
-            return f'{kept}; nothing is missing'
-        return f'{kept}; lost {self._lost_text()}'
+        losses = [] if self.all_messages else [self._lost_text()]
+        losses += [', '.join(self.lost_beside)] if self.lost_beside else []
+        lost = f'lost {"; and ".join(losses)}' if losses else 'nothing of the file is missing'
+        if self.lost_before:
+            lost += f', but {self.lost_before} messages never reached it, as its recorder says'
+        return f'{kept}; {lost}'
 
     def _lost_text(self) -> str:
         if self.lost is None:
@@ -90,6 +104,10 @@ def recover(
         if copied.unchecked:
             custom[RECOVERY_NOTE] = copied.note
         custom['recovered_from'] = _origin(recording, copied)
+        copy_beside_messages([recording], bag)
+        sources = sources_of(recording, bag.kept_by_topic)
+        if sources:
+            bag.add_record(RECORDER_RECORD, inherited_statement(sources, bag.kept_by_topic))
         bag.close(custom, recording.information.ros_distro if recording.information else '')
     except BaseException:
         bag.discard()
@@ -121,7 +139,7 @@ def _copy(recording: Recording, bag: VerbatimBag, progress: Progress) -> _Copied
         names = {number: channel.topic for number, channel in file.channels.items()}
         pending = set(repeated)
         for contents, is_checked in _all_contents(file):
-            for channel, raw, log_time, publish_time in _messages(contents):
+            for channel, raw, log_time, publish_time, sequence in _messages(contents):
                 copied.stored += is_checked
                 name = names[channel]
                 if name in watched:
@@ -130,7 +148,7 @@ def _copy(recording: Recording, bag: VerbatimBag, progress: Progress) -> _Copied
                     last[name] = raw, publish_time
                     if is_first and same:
                         continue
-                bag.write(targets[channel], raw, log_time, publish_time)
+                bag.write(targets[channel], raw, log_time, publish_time, sequence)
                 if not is_checked:
                     copied.first_unchecked = copied.first_unchecked or log_time
                     copied.unchecked += 1
@@ -148,12 +166,12 @@ def _all_contents(file: BagFile) -> Iterator[tuple[Contents, bool]]:
             yield rest, False
 
 
-def _messages(contents: Contents) -> Iterator[tuple[int, bytes, int, int]]:
+def _messages(contents: Contents) -> Iterator[tuple[int, bytes, int, int, int]]:
     heads = contents.heads
     raws = map(bytes, contents.payloads())
-    columns = (heads[name].tolist() for name in ('channel', 'log_time', 'publish_time'))
-    for channel, log_time, publish_time, raw in zip(*columns, raws, strict=True):
-        yield channel, raw, log_time, publish_time
+    columns = (heads[name].tolist() for name in ('channel', 'log_time', 'publish_time', 'sequence'))
+    for channel, log_time, publish_time, sequence, raw in zip(*columns, raws, strict=True):
+        yield channel, raw, log_time, publish_time, sequence
 
 
 def _salvaged(file: McapFile) -> Contents | None:
@@ -166,11 +184,12 @@ def _salvaged(file: McapFile) -> Contents | None:
     content = stored_parts(_without_zeros(file.tail_bytes()), tail.compression)
     contents = records_in(content)
     encodings = _encodings(file)
-    for place, (channel, raw, log_time, _) in enumerate(_messages(contents)):
+    for place, (channel, raw, log_time, _, _) in enumerate(_messages(contents)):
         credible = encodings.get(channel) == raw[:4] and tail.start_time <= log_time <= tail.end_time
         if not credible:
-            return Contents(contents.data, contents.offsets[:place], contents.heads[:place])
-    return contents
+            contents = Contents(contents.data, contents.offsets[:place], contents.heads[:place])
+            break
+    return plain(contents)
 
 
 def _encodings(file: McapFile) -> dict[int, bytes]:
@@ -214,7 +233,9 @@ def _balance(recording: Recording, bag: VerbatimBag, copied: _Copied) -> Recover
         lost_seconds=0.0 if complete else inside + _lost_at_ends(recording, span),
         kept_bytes=size - lost_bytes,
         lost_bytes=lost_bytes,
-        complete=complete,
+        all_messages=complete,
+        lost_beside=tuple(lost_beside_messages([recording])),
+        lost_before=_lost_before(recording),
         notes=(*recording.warnings, *((copied.note,) if copied.unchecked else ())),
     )
 
@@ -239,6 +260,11 @@ def _expected(recording: Recording) -> int | None:
         return sum(sum(file.message_counts().values()) for file in recording.files)
     information = recording.information
     return information.message_count if information is not None and recording.described else None
+
+
+def _lost_before(recording: Recording) -> int:
+    statements = [read_statement(file.metadata.get(RECORDER_RECORD, {})) for file in recording.files]
+    return sum(row.get('lost', 0) for rows in statements for row in rows.values())
 
 
 def _lost_bytes(file: McapFile) -> int:

@@ -3,7 +3,7 @@
 import functools
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,7 +53,8 @@ class Series:
     """The messages of one topic in the order in which they were recorded.
 
     `receive_times` and `publish_times` are those of the recording, `stamps` those of the samples (from
-    the messages' headers); all in ns. `series[name]` is a column: of a `JointState` the position of
+    the messages' headers), all in ns; `sequences` are the publisher's numbers, 0 where it gave none.
+    `series[name]` is a column: of a `JointState` the position of
     that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
     `time` and `values` are the same for all columns at once, as arrays to plot.
     """
@@ -62,30 +63,50 @@ class Series:
         self,
         topic: str,
         type_name: str,
-        payloads: Payloads,
+        payloads: Payloads | Callable[[], Payloads],
         receive_times: Times,
         publish_times: Times,
         *,
         definition: Definition | None = None,
+        sequences: NDArray[np.uint32] | None = None,
+        columns: Mapping[str, Column] | None = None,
+        stamps: Times | None = None,
         obstacle: str = '',
         zero: int = 0,
     ):
         """Take messages with their `definition`, or the sentence why there is none.
 
-        Without both the installed type tells the fields. `zero` (ns) is where `time` begins.
+        Without both the installed type tells the fields. `zero` (ns) is where `time` begins. A function in
+        place of `payloads` is asked where something else than `columns` and `stamps`, read before, is wanted.
         """
         self.topic = topic
         self.type = type_name
         self.receive_times = receive_times
         self.publish_times = publish_times
-        self.payloads = payloads
+        self._payloads = payloads
+        self.sequences = np.zeros(len(receive_times), np.uint32) if sequences is None else sequences
+        self.columns = dict(columns or {})
+        if stamps is not None:
+            self.stamps = stamps
         self.registered: Topic | None = registered_topic(topic, type_name)
         self._known_definition = definition
         self._obstacle = obstacle
         self._zero = zero
 
     def __len__(self) -> int:
-        return len(self.payloads)
+        return len(self.receive_times)
+
+    @property
+    def payloads(self) -> Payloads:
+        """The serialised messages."""
+        if not isinstance(self._payloads, Payloads):
+            self._payloads = self._payloads()
+        return self._payloads
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the messages are in memory, not only `columns` of them."""
+        return isinstance(self._payloads, Payloads)
 
     @functools.cached_property
     def stamps(self) -> Times:
@@ -158,6 +179,8 @@ class Series:
 
     def __getitem__(self, name: str) -> Column:
         """Return the column `name` in the unit `unit(name)`; raises `SeriesError` with the known names."""
+        if name in self.columns:
+            return self.columns[name]
         if self.type == JOINT_STATE:
             return self._joint_column(name, 'position')
         return self._path_column(name)

@@ -1,19 +1,28 @@
-"""Reads one file of a bag in sqlite3 storage, rosbag2's own before MCAP."""
+"""Reads one file of a bag in sqlite3 storage, rosbag2's own before MCAP.
 
+The source is never touched. What its writer had not yet brought into the database when it ended stands in a
+log beside it; with one, a copy is read, in which sqlite puts both together.
+"""
+
+import shutil
 import sqlite3
 import struct
+import tempfile
+import weakref
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Attachment, Channel, Schema
 
 from mount_bags.chunks import LENGTH_BESIDES_PAYLOAD, MESSAGE_HEAD, Contents, messages_at
 from mount_bags.mcap_file import McapFileError
+from mount_bags.message_compression import plain
 
 _AT_ONCE = 1000  # rows
 _HEAD = struct.Struct('<BQHIQQ')
+_LOGS = ('-wal', '-journal')  # behind the name of the database
 
 
 class SqliteFile:
@@ -24,29 +33,35 @@ class SqliteFile:
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
         self.metadata: dict[str, dict[str, str]] = {}
+        self.records: list[tuple[str, dict[str, str]]] = []
         self.warnings: list[str] = []
+        self.lost_beside: list[str] = []
         self.damaged = False
         self._counts: dict[int, int] = {}
         self._times: tuple[int, int] | None = None
+        self._logs = [log for log in _logs_of(path) if log.is_file() and log.stat().st_size]
         if not path.is_file():
             raise McapFileError(f'{path} cannot be read: no such file')
         if path.suffix != '.db3':
             raise McapFileError(f'{path} is compressed as a whole; unpack it first')
         try:
-            self._base = sqlite3.connect(f'{path.absolute().as_uri()}?mode=ro&immutable=1', uri=True)
+            self._base = self._connected()
             self._read_topics()
         except sqlite3.Error as error:
             raise McapFileError(f'{path} is no readable sqlite3 bag: {error}') from None
+        if self._logs:
+            names = ', '.join(log.name for log in self._logs)
+            self.warnings.append(f'{path.name} was not closed by its writer; read with {names}')
 
     @property
     def whole(self) -> bool:
-        """Whether nothing of it is known to be missing."""
-        return not self.damaged
+        """Whether nothing of it is known to be missing: it was closed, and is readable."""
+        return not self.damaged and not self._logs
 
     @property
     def proven(self) -> bool:
-        """Whether it can be relied upon in what it says of itself: the database has its own checks."""
-        return True
+        """Whether what it says of itself can be relied upon: a closed database has its own checks."""
+        return not self._logs
 
     def topic_type(self, channel: int) -> str:
         """Return the type name of a channel."""
@@ -68,10 +83,29 @@ class SqliteFile:
         try:
             cursor = self._base.execute(query)
             while rows := cursor.fetchmany(_AT_ONCE):
-                yield _as_records(rows)
+                yield plain(_as_records(rows))
         except sqlite3.Error as error:
             self.damaged = True
             self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield nothing: this storage has none."""
+        return iter(())
+
+    def _connected(self) -> sqlite3.Connection:
+        if not self._logs:
+            return sqlite3.connect(f'{self.path.absolute().as_uri()}?mode=ro&immutable=1', uri=True)
+        try:
+            folder = Path(tempfile.mkdtemp(prefix='engine_mount_'))
+            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+            for file in (self.path, *self._logs):
+                shutil.copyfile(file, folder / file.name)
+        except OSError as error:
+            raise McapFileError(
+                f'{self.path} was not closed and cannot be copied to be read with its log: '
+                f'{error.strerror}; make room in {tempfile.gettempdir()}'
+            ) from None
+        return sqlite3.connect(folder / self.path.name)
 
     def _read_topics(self) -> None:
         cursor = self._base.execute('SELECT * FROM topics')
@@ -105,6 +139,10 @@ class SqliteFile:
             return {row[0]: (row[1], row[2]) for row in self._base.execute(query).fetchall()}
         except sqlite3.Error:
             return {}
+
+
+def _logs_of(path: Path) -> list[Path]:
+    return [path.with_name(path.name + suffix) for suffix in _LOGS]
 
 
 def _as_records(rows: list[tuple[int, int, bytes]]) -> Contents:

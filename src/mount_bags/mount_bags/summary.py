@@ -12,7 +12,17 @@ from typing import TypeVar
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Footer, Metadata, Schema, Statistics
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    Footer,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
 from mcap.writer import MCAP0_MAGIC
 
 from mount_bags.chunks import RECORD
@@ -21,6 +31,7 @@ T = TypeVar('T')
 
 _FOOTER_SIZE = 20  # bytes behind opcode and length
 _FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
+_CRC_SIZE = 4  # bytes
 _DATA_END = struct.Struct('<BQI')
 _STEP = 1 << 24  # bytes read at once for a checksum
 
@@ -44,6 +55,7 @@ class Summary:
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: list[ChunkIndex] = field(default_factory=list)
     statistics: Statistics | None = None
+    beside: list[MetadataIndex | AttachmentIndex] = field(default_factory=list)
 
 
 def read_summary(data: mmap.mmap) -> Summary:
@@ -97,6 +109,14 @@ def parsed_metadata(content: bytes) -> Metadata | None:
     return parsed(Metadata.read, content)
 
 
+def parsed_attachment(content: bytes) -> Attachment | None:
+    """Return the attachment in `content`, None if it is not readable or its checksum is wrong."""
+    crc = int.from_bytes(content[-_CRC_SIZE:], 'little')
+    if len(content) < _CRC_SIZE or (crc and zlib.crc32(content[:-_CRC_SIZE]) != crc):
+        return None
+    return parsed(Attachment.read, content)
+
+
 def _fill(summary: Summary, data: mmap.mmap) -> bool:
     position = summary.begin
     while position + RECORD.size <= summary.footer:
@@ -116,6 +136,10 @@ def _take(summary: Summary, opcode: int, content: bytes) -> bool:
         summary.channels[channel.id] = channel
     elif opcode == Opcode.CHUNK_INDEX and (chunk := parsed(ChunkIndex.read, content)):
         summary.chunks.append(chunk)
+    elif opcode == Opcode.METADATA_INDEX and (metadata := parsed(MetadataIndex.read, content)):
+        summary.beside.append(metadata)
+    elif opcode == Opcode.ATTACHMENT_INDEX and (attachment := parsed(AttachmentIndex.read, content)):
+        summary.beside.append(attachment)
     elif opcode == Opcode.STATISTICS and (statistics := parsed(Statistics.read, content)):
         summary.statistics = statistics
     else:

@@ -64,9 +64,9 @@ class TimesCollector:
     def _names(self) -> tuple[str, ...]:
         if self._first is None or self._obstacle:
             return ()
-        none = np.empty(0, np.int64)
+        time = np.zeros(1, np.int64)
         row = np.frombuffer(self._first, np.uint8)[None]
-        first = Series(self._topic, self._type, Payloads([row]), none, none, definition=self._definition)
+        first = Series(self._topic, self._type, Payloads([row]), time, time, definition=self._definition)
         try:
             return first.names
         except ValueError:

@@ -6,6 +6,8 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
+from mcap.records import Attachment
+
 from mount_bags.container import ChunkedMcap
 from mount_bags.metadata import (
     METADATA_NAME,
@@ -55,6 +57,14 @@ class VerbatimBag:
         start, end = self._container.start_time, self._container.end_time
         return None if start is None or end is None else (start, end)
 
+    @property
+    def kept_by_topic(self) -> dict[str, int]:
+        """How many messages of each topic stand in complete chunks."""
+        counts: dict[str, int] = {}
+        for number, topic in self._topics.items():
+            counts[topic.name] = counts.get(topic.name, 0) + self._container.message_counts.get(number, 0)
+        return counts
+
     def channel(self, file: BagFile, number: int) -> int:
         """Declare a channel of another file and return its number here; equal ones are declared once."""
         channel = file.channels[number]
@@ -76,9 +86,19 @@ class VerbatimBag:
             )
         return self._channels[wanted]
 
-    def write(self, channel: int, raw: bytes, log_time: int, publish_time: int) -> None:
+    def write(self, channel: int, raw: bytes, log_time: int, publish_time: int, sequence: int) -> None:
         """Add one message; times in ns."""
-        self._container.add_message(channel, raw, log_time, publish_time)
+        self._container.add_message(channel, raw, log_time, publish_time, sequence)
+
+    def add_record(self, name: str, values: Mapping[str, str]) -> None:
+        """Add a metadata record behind the messages so far."""
+        self.flush()
+        self._container.add_metadata(name, values)
+
+    def add_attachment(self, attachment: Attachment) -> None:
+        """Add an attachment behind the messages so far."""
+        self.flush()
+        self._container.add_attachment(attachment)
 
     def flush(self) -> None:
         """Complete the chunk that is being filled."""
@@ -100,9 +120,7 @@ class VerbatimBag:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _information(self, custom_data: Mapping[str, str], ros_distro: str) -> BagInformation:
-        counts: dict[str, int] = {}
-        for number, topic in self._topics.items():
-            counts[topic.name] = counts.get(topic.name, 0) + self._container.message_counts.get(number, 0)
+        counts = self.kept_by_topic
         start, end = self.time_range or (NO_TIME, NO_TIME)
         topics = {topic.name: topic for topic in self._topics.values()}
         return BagInformation(

@@ -31,16 +31,6 @@ def mapped(path: Path) -> mmap.mmap:
         raise FileError(f'{path} is empty') from None
 
 
-def unpacked_payload(raw: bytes) -> bytes:
-    """Return a message that rosbag2 compressed by itself; one that cannot be unpacked stays as it is."""
-    unpacking = zstandard.ZstdDecompressor().decompressobj()
-    try:
-        unpacked = unpacking.decompress(raw)
-    except (zstandard.ZstdError, MemoryError):
-        return raw
-    return unpacked if unpacking.eof else raw
-
-
 def _unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:
     """Unpack as far as the packed bytes go; what is cut off there is missing here."""
     try:

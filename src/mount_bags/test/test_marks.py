@@ -17,12 +17,15 @@ from mount_bags.automatic_marks import (
     SwitchOnWatch,
     mark_kinds,
 )
+from mount_bags.diagnosis import OnFull, RecorderState, judge
 from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time, read_mark
+from mount_bags.reading import open_recording
 from mount_bags.recording import Recorder
 from mount_bags.stamps import StampWatch
 from mount_bags.watching import watch_topic
 from mount_bags.writer import BagWriter
 from mount_ros.cdr import serialised
+from mount_ros.diagnostics import Level
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS
 
@@ -57,6 +60,14 @@ def test_mark_survives_its_text(time, kind, text):
     assert read_mark(mark_text(mark), received=0) == mark
 
 
+_WITH_LANE = '{time: 5, kind: pothole, text: deep, lane: 2}'
+_DEEP = 'text: ' + '[' * 5000
+# A list of lists of the one before: as text 10^9 words.
+_BOMB = '\n'.join(
+    ['a0: &a0 word', *(f'a{n}: &a{n} [{f"*a{n - 1}, " * 10}]' for n in range(1, 10)), 'text: *a9']
+)
+
+
 @pytest.mark.parametrize(
     ('text', 'mark'),
     [
@@ -66,7 +77,17 @@ def test_mark_survives_its_text(time, kind, text):
         ('{time: soon, kind: 3}', Mark(7, '3', '')),
         ('{unclosed', Mark(7, BY_HAND, '{unclosed')),
         ('', Mark(7, BY_HAND, '')),
+        ('Driver: heavy bump', Mark(7, BY_HAND, 'Driver: heavy bump')),
+        ('{time: 5, kind: pothole, text: deep, lane: 2}', Mark(5, 'pothole', _WITH_LANE)),
+        ('2026-02-30', Mark(7, BY_HAND, '2026-02-30')),
+        ('{time: 5, text: }', Mark(5, BY_HAND, '')),
+        ('{time: true, text: 12:30}', Mark(7, BY_HAND, '12:30')),
+        ('text: 2026-02-30', Mark(7, BY_HAND, '2026-02-30')),
+        ('{time: 5, text: [deep, wet]}', Mark(5, BY_HAND, '{time: 5, text: [deep, wet]}')),
+        (_DEEP, Mark(7, BY_HAND, _DEEP)),
+        (_BOMB, Mark(7, BY_HAND, _BOMB)),
     ],
+    ids=lambda value: f'{value}'[:30],
 )
 def test_anybody_may_publish_any_text(text, mark):
     assert read_mark(text, received=7) == mark
@@ -164,3 +185,35 @@ def test_recorder_marks_from_the_messages_that_it_writes(tmp_path, marks, sent):
         ('unanswered', START + 4 * PERIOD),
         ('fault', 77),
     ]
+
+
+@pytest.mark.parametrize('threaded', [True, False])
+@pytest.mark.parametrize(
+    ('topic', 'malformed'),
+    [(CONTROL_TRACE, b'\0\1\0\0' + bytes(13)), (CONTROL_TRACE, b''), (DIAGNOSTICS, b'\0\1\0\0\xff')],
+)
+def test_malformed_message_costs_its_observation_and_not_the_recording(
+    tmp_path, marks, sent, topic, malformed, threaded
+):
+    recorder = Recorder(BagWriter(tmp_path / 'bag'), threaded=threaded)
+    receivers = {}
+    for each in (CONTROL_TRACE, DIAGNOSTICS):
+        recorder._writer.add_topic(each.name, each.type)
+        watch_topic(recorder, each, each.name, marks, '/', lambda: 77)
+        receivers[each] = recorder.receiver(each.name)
+    recorder.begin()
+    numbers = [0.0] * len(CONTROL_TRACE.names)
+    step = ScalarsLayout(CONTROL_TRACE).pack
+    for index in range(4):
+        receivers[CONTROL_TRACE](step(START + index * PERIOD, numbers), START, START)
+        receivers[topic](malformed, START, START)
+    receivers[CONTROL_TRACE](step(START + 5 * PERIOD, numbers), START, START)
+    recorder.end()
+    figures = recorder.figures()
+    assert (figures.received, figures.kept, figures.lost, figures.failure) == (9, 9, 0, '')
+    assert open_recording(tmp_path / 'bag').message_count == 9
+    assert [mark.kind for mark in sent] == ['lost_sample']
+    verdict = judge(RecorderState('/data/bag', figures, unobserved=recorder.unobserved), OnFull.STOP)
+    assert verdict.level is Level.WARN
+    assert f'{topic.name} 4 (the last of {len(malformed)} bytes' in verdict.sentence
+    assert verdict.figures[f'malformed.{topic.name}'] == 4

@@ -22,7 +22,7 @@ from mount_bags.metadata import read_metadata
 from mount_bags.node import MountRecorder
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
-from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
+from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 STREAMS = (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT)
 COUNT = 2000
@@ -98,6 +98,26 @@ def test_verdict_names_the_last_stamp_and_missing_samples(make_recorder, source)
     wait_until(lambda: recorder.judge().figures['last_stamp'] == START + 4 * PERIOD, 'written')
     assert recorder.judge().figures['missing./displacement'] == 2
     assert '/displacement 2' in recorder.judge().sentence
+
+
+def test_malformed_messages_are_recorded_and_warned_of_once(make_recorder, source, tmp_path, monkeypatch):
+    publisher = source.publisher(CONTROL_TRACE)
+    recorder = make_recorder(topics=[CONTROL_TRACE.name])
+    logged = []
+    monkeypatch.setattr(recorder.get_logger(), 'warning', logged.append)
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    wait_until(publisher.get_subscription_count, 'matched by publisher')
+    wait_until(lambda: 'recording; 1 of 1' in recorder.judge().sentence, 'matched by recorder')
+    for count in (1, 2, 3):
+        publisher.publish(b'\0\1\0\0' + bytes(12))
+        wait_until(lambda: recorder.judge().figures.get('malformed./control_trace') == count, 'written')  # noqa: B023
+    publisher.publish(sample(CONTROL_TRACE, 0))
+    recorder.trigger_deactivate()
+    assert 'of 16 bytes' in recorder.judge().sentence
+    assert len(logged) == 1
+    assert '/control_trace 1 (the last of 16 bytes' in logged[0]
+    assert len(read(tmp_path / 'bag')['/control_trace']) == 4
 
 
 def test_latched_topic_received_before_activation_is_recorded(make_recorder, source, tmp_path):

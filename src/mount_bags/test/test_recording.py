@@ -11,7 +11,7 @@ from small_disk import small_disk
 
 from mount_bags import recording
 from mount_bags.diagnosis import OnFull, RecorderState, judge
-from mount_bags.recording import Recorder
+from mount_bags.recording import Recorder, Unobserved
 from mount_bags.space import SpaceGuard
 from mount_bags.statement import RECORDER_RECORD, read_statement
 from mount_bags.writer import BagWriter, RecordingError
@@ -252,6 +252,16 @@ def test_little_space_is_a_warning_with_what_is_left(tmp_path):
     assert '0.5 GB left' in verdict.sentence
     verdict = verdict_of(recorder, free=5_000_000_000, rate=1e8)
     assert verdict.level is Level.WARN
+    recorder.end()
+
+
+def test_one_warning_does_not_hide_another(tmp_path):
+    recorder = recorder_of(tmp_path / 'bag')
+    malformed = {'/displacement': Unobserved(1, 7, 'too short')}
+    verdict = verdict_of(recorder, free=500_000_000, rate=2e6, unobserved=malformed)
+    assert verdict.level is Level.WARN
+    assert '/displacement 1 (the last of 7 bytes; too short)' in verdict.sentence
+    assert '0.5 GB left' in verdict.sentence
     recorder.end()
 
 

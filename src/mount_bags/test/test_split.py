@@ -14,7 +14,8 @@ from small_disk import small_disk
 
 import mount_bags
 from mount_bags.metadata import read_metadata
-from mount_bags.piece import PIECE_RECORD, Piece
+from mount_bags.piece import Piece
+from mount_bags.piece_topics import PIECE_RECORD
 from mount_bags.split import SplitError, SplitRule, checked_rule, duration_in_nanoseconds, split_rule
 from mount_bags.writer import BagWriter, RecordingError
 from mount_ros.topics import DISPLACEMENT

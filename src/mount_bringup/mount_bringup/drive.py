@@ -20,7 +20,6 @@ from mount_bags.losses import losses
 from mount_bags.reading import Recording, open_recording
 from mount_bags.recorder_parameters import RecorderParameters, split_of
 from mount_bags.snapshot import saved_snapshots
-from mount_bags.time_axis import time_axis
 from mount_bringup.core.chain import Parameters, control_parameters
 from mount_bringup.core.recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
@@ -33,6 +32,7 @@ from mount_bringup.preflight import preflight
 from mount_bringup.progress_bar import progress_bar
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.summary import (
+    SUMMARISED,
     print_summary,
     snapshots_sentence,
     summarise,
@@ -81,7 +81,7 @@ def drive(order: DriveOrder, console: Console) -> DriveOutcome:
         return _tell_snapshots(order, folder, run, complaints, console)
     recording = open_recording(folder.recording)
     complaints += recording.warnings
-    drive_data = load_drive(recording, time_axis(recording).zero)
+    drive_data = load_drive(recording, others=SUMMARISED)
     figures = _evaluate(order, folder, recording, drive_data, run, console, complaints)
     if order.report:
         begin = figures['excitation_start_s']
@@ -192,9 +192,10 @@ def _drive_graph(
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
             _watch_drive(order, supervisor, limit, console)
             figures = supervisor.figures(SIM)
-            if supervisor.figures(RECORDER).get('failed') == 'True':
-                supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
         finally:
+            recorder = supervisor.figures(RECORDER)
+            if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
+                supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
             for sentence in supervisor.notes:
                 note(console, sentence)
@@ -219,8 +220,6 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
 
         def finished() -> bool:
             figures = supervisor.figures(SIM)
-            if supervisor.figures(RECORDER).get('failed') == 'True':
-                supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
             share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
             progress.update(task, completed=share)
             for key in keys.wait(0.0) if keys is not None else ():

@@ -1,7 +1,7 @@
 """The signals of a drive from its recording, and how well friction followed what was wanted."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +10,18 @@ from numpy.typing import NDArray
 
 from mount_bags.audit import TopicAudit
 from mount_bags.reading import Recording
+from mount_bags.time_axis import time_axis
 from mount_control import band_pass
 from mount_control.parameters import ControlParameters
 from mount_models.damper import DamperCurve
 from mount_models.sampling import SAMPLE_TIME
 
 _SECOND = 1e9  # ns
+_COLUMNS = {
+    'displacement': ('mount',),
+    'control_trace': ('damping_active', 'current'),
+    'sim/truth': ('velocity', 'friction_force'),
+}
 _MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')
 
 
@@ -41,11 +47,22 @@ class Drive:
     zero: int
 
 
-def load_drive(recording: Recording, zero: int) -> Drive:
-    """Read the signals of a drive, with time from the stamp `zero` (ns) on."""
-    names = ('displacement', 'control_trace', 'sim/truth')
-    recording.load(names)
-    displacement, trace, truth = (recording[name] for name in names)
+def load_drive(
+    recording: Recording,
+    excitation_start: float | None = None,
+    others: Mapping[str, Sequence[str]] | None = None,
+) -> Drive:
+    """Read the signals of a drive, with time from the zero of its time axis on.
+
+    With `excitation_start` (s from the plant's first sample) time begins there. `others` are the columns by
+    topic that the caller is about to ask for: they are read in the same pass.
+    """
+    others = others or {}
+    recording.load_columns({name: (*names, *others.get(name, ())) for name, names in _COLUMNS.items()})
+    displacement, trace, truth = (recording[name] for name in _COLUMNS)
+    zero = time_axis(recording).zero
+    if excitation_start is not None:
+        zero = excitation_stamp(recording, excitation_start)
     shown, traced, seen = (np.argsort(series.stamps) for series in (displacement, trace, truth))
     stamps = displacement.stamps[shown]
     active = np.zeros(len(stamps), dtype=bool)

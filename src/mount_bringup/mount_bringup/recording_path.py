@@ -8,8 +8,13 @@ from mount_bags.reading import Recording, open_recording
 
 def open_run(path: Path) -> Recording:
     """Open the recording at `path` or, for the folder of a run, the one in it; raises `ReadingError`."""
+    return open_recording(recording_place(path))
+
+
+def recording_place(path: Path) -> Path:
+    """Return the recording in `path` if that is the folder of a run, else `path` itself."""
     inside = path / 'recording'
-    return open_recording(inside if inside.is_dir() else path)
+    return inside if inside.is_dir() else path
 
 
 def recording_hash(path: Path) -> str:

@@ -73,14 +73,15 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
         return None, f'what was not recorded is needed: {", ".join(lacking)}'
     try:
         control, damper = control_parameters(parameters), chosen_damper(parameters)
-        drive = load_drive(recording, signals.zero)
+        drive = load_drive(recording)
         wanted, _ = wanted_force(drive, control, damper)
         error = tracking_error(drive, control, damper)
     except (ValueError, KeyError) as reason:
         return None, f'it cannot be computed: {reason}'
+    shift = (drive.zero - signals.zero) / 1e9
     # What the controller wants while damping is off is no force.
     active = np.interp(drive.true_time, drive.time, drive.damping_active.astype(float)) > 0.5
     shown = np.where(active, wanted, 0.0)
-    tracking = Tracking(drive.true_time, shown, drive.friction_force, error)
+    tracking = Tracking(drive.true_time + shift, shown, drive.friction_force, error)
     chosen = parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER)
     return tracking, f'wanted is the force of damper {chosen} at the true velocity in the band, without delay'

@@ -23,6 +23,9 @@ from mount_bringup.evaluation import Drive, excitation_stamp, tracking_error
 from mount_bringup.mount_choice import seat_of
 from mount_sim.mounts import without_friction
 
+SUMMARISED = {'sim/truth': ('rest_gap', 'contact_gap')}
+"""Columns that `summarise` asks for beside those of `load_drive`, by topic."""
+
 _UM, _MM, _US = 1e6, 1e3, 1e6
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mount_bags.event_marks import Mark
 from mount_bags.origin import short_name
@@ -13,7 +14,29 @@ from mount_bags.series import Series, SeriesError
 from mount_bags.session_differences import session_text
 from mount_bags.switching_changes import switching_times
 from mount_bags.time_axis import time_axis
-from mount_ros.topics import CONTROL_TRACE
+from mount_ros.topics import (
+    COIL_RIPPLE,
+    CONTROL_TRACE,
+    CURRENT_SETPOINT,
+    DISPLACEMENT,
+    SIM_CHASSIS_ACCELERATION,
+    SIM_MOUNT_FORCE,
+    SIM_TRUTH,
+)
+
+# What a report may ask for, to be read in one pass. The first names stand for their topics.
+_SHOWN = {
+    DISPLACEMENT.name: ('mount',),
+    COIL_RIPPLE.name: ('coil_current',),
+    CURRENT_SETPOINT.name: ('coil_current',),
+    CONTROL_TRACE.name: (CONTROL_TRACE.names[0], 'damping_active', 'current'),
+    SIM_TRUTH.name: (
+        *('displacement', 'velocity', 'mount_force', 'friction_force'),
+        *('coil_current', 'road_height', 'chassis_acceleration'),
+    ),
+    SIM_MOUNT_FORCE.name: ('wrench.force.z',),
+    SIM_CHASSIS_ACCELERATION.name: ('linear_acceleration.z',),
+}
 
 
 @dataclass(frozen=True)
@@ -33,6 +56,8 @@ class Signals:
         self.name = name or short_name(recording)
         self.missing: list[str] = []
         self._found: dict[tuple[str, str], Signal | None] = {}
+        self._orders: dict[str, tuple[Array, slice | NDArray[np.int64]]] = {}  # times, places of the values
+        recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
         self.axis = time_axis(recording)
         self.zero = self.axis.zero if zero is None else zero
 
@@ -83,8 +108,12 @@ class Signals:
             return []
 
     def _ordered(self, series: Series, values: Array) -> Signal:
-        stamps, places = np.unique(series.stamps, return_index=True)
-        return Signal((stamps - self.zero) / 1e9, np.asarray(values, np.float64)[places])
+        if series.topic not in self._orders:
+            stamps, first = np.unique(series.stamps, return_index=True)
+            in_order = np.array_equal(first, np.arange(len(series)))
+            self._orders[series.topic] = (stamps - self.zero) / 1e9, slice(None) if in_order else first
+        time, places = self._orders[series.topic]
+        return Signal(time, np.asarray(values, np.float64)[places])
 
     def _absence(self, topic: str) -> str:
         alike = [name for name in self.recording if name.endswith(f'/{topic}')]

@@ -26,7 +26,7 @@ The JSON holds them, and below `topics` for each topic `expected`, `present`, `l
 
 
 def audit(
-    recording: Annotated[Path, typer.Argument(help='folder of a recording, or one of its files')],
+    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
@@ -35,11 +35,11 @@ def audit(
     from mount_bags.audit import audit as audited
     from mount_bags.audit_report import as_json, as_table, latency_lines, sentences
     from mount_bags.losses import losses
-    from mount_bags.reading import open_recording
+    from mount_bringup.recording_path import open_run
 
     console = terminal()
     with console.status('reading'):
-        opened = open_recording(recording)
+        opened = open_run(recording)
         audits = audited(opened)
         found = losses(opened, audits)
     console.print(as_table(audits))

@@ -73,7 +73,7 @@ def record(
 
 
 def _told(folder: Path, console: Console) -> bool:
-    """Print what is there of a recording, and return whether nothing is known to be lost."""
+    """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
     from mount_bags.audit import audit
     from mount_bags.audit_report import sentences
     from mount_bags.losses import losses
@@ -84,11 +84,14 @@ def _told(folder: Path, console: Console) -> bool:
     found = losses(recording, audits)
     for warning in recording.warnings:
         _print('note', warning, console)
-    if not any(entry.present for name, entry in audits.items() if name != '/diagnostics'):
-        _print('note', 'only /diagnostics had messages; does a graph run in this domain, namespace?', console)
-    _print('audit', sentences(audits, found)[-1], console)
+    came = any(entry.present for name, entry in audits.items() if name != '/diagnostics')
+    if came:
+        _print('audit', sentences(audits, found)[-1], console)
+    else:
+        nothing = 'nothing was recorded, save perhaps /diagnostics'
+        _print('note', f'{nothing}; does a graph run in this domain, namespace?', console)
     _print('recording', folder, console)
-    return found.lossless
+    return came and found.lossless
 
 
 def _print(word: str, what: Any, console: Console) -> None:

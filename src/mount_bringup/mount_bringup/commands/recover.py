@@ -9,8 +9,9 @@ from mount_bringup.terminal import note, terminal
 
 INCOMPLETE = 3
 
-EPILOG = f"""Exit code: 0 when nothing is missing in the new recording, {INCOMPLETE} when something is lost
-and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the command.
+EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when
+something is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the
+command.
 
 Examples:
 
@@ -18,14 +19,15 @@ Examples:
 
 `engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
 
-All chunks whose checksum holds are kept, with topics, times and session. Of a last chunk that was cut off,
+All chunks whose checksum holds are kept, with topics, times, session, attachments, metadata and what the
+recorder says of its own losses. Of a last chunk that was cut off,
 whole messages are kept where its compression lets its beginning be read; no checksum vouches for
 these, and the new recording says so each time it is opened. The original is not touched.
 """
 
 
 def recover(
-    recording: Annotated[Path, typer.Argument(help='folder of a recording, or one of its files')],
+    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
     out: Annotated[
         Path | None, typer.Option(help='folder of the new recording; default: beside it, `..._recovered`')
     ] = None,
@@ -33,12 +35,14 @@ def recover(
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
     from mount_bags.recover import recover as recovered
     from mount_bringup.progress_bar import progress_bar
+    from mount_bringup.recording_path import recording_place
 
     console = terminal()
-    target = out if out is not None else _beside(recording)
+    source = recording_place(recording)
+    target = out if out is not None else _beside(source)
     with progress_bar(console, transient=True) as bar:
         task = bar.add_task('recovering', total=None)
-        result = recovered(recording, target, lambda done, of: bar.update(task, completed=done, total=of))
+        result = recovered(source, target, lambda done, of: bar.update(task, completed=done, total=of))
     for sentence in result.notes:
         note(console, sentence)
     console.print(f'{result}; it stands in {result.folder}', soft_wrap=True)

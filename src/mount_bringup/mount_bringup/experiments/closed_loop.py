@@ -12,13 +12,21 @@ import numpy.typing as npt
 from mount_bags.reading import open_recording
 from mount_bringup.domain import chosen_domain
 from mount_bringup.drive import DriveOrder, record_drive
-from mount_bringup.evaluation import Drive, excitation_stamp, load_drive
+from mount_bringup.evaluation import Drive, load_drive
 from mount_bringup.experiments.contract import ExperimentError, Order
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.settings import defaults_of_nodes
 from mount_bringup.terminal import terminal
 
 FloatArray = npt.NDArray[np.float64]
+
+_COLUMNS = {
+    'sim/truth': (
+        *('displacement', 'velocity', 'mount_force', 'friction_force'),
+        *('chassis_acceleration', 'coil_current'),
+    ),
+    'control_trace': ('band_displacement',),
+}
 
 
 @dataclass(frozen=True)
@@ -88,7 +96,7 @@ def ride(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], experim
 
 
 def _read(recording: Any, place: Path, excitation_start: float) -> Ride:
-    seen = load_drive(recording, excitation_stamp(recording, excitation_start))
+    seen = load_drive(recording, excitation_start, _COLUMNS)
     truth, trace = recording['sim/truth'], recording['control_trace']
     order = np.argsort(truth.stamps)
     order = order[truth.stamps[order] >= seen.zero]

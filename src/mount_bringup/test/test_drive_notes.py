@@ -1,0 +1,54 @@
+"""What a drive says of its recorder, without the graph."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from mount_bringup import drive
+from mount_bringup.drive import DriveOrder
+from mount_bringup.graph.nodes import RECORDER
+from mount_bringup.run_folder import make_run_folder
+from mount_sim.diagnosis import FINISHED
+from mount_sim.excitation import Excitation, Seat
+
+SENTENCE = 'the run goes on without recording: no space left'
+
+
+class Graph:
+    """A graph whose recorder has failed, looked at a thousand times until the simulator has finished."""
+
+    def __init__(self, *_):
+        self.notes = []
+
+    def start(self, session, status):
+        pass
+
+    def interrupt(self):
+        pass
+
+    def mark_setter(self, tell):
+        return lambda: None
+
+    def wait_until(self, condition, limit, what):
+        for _ in range(1000):
+            condition()
+
+    def figures(self, node):
+        if node is RECORDER:
+            return {'failed': 'True', 'fatal': 'False', 'sentence': SENTENCE}
+        figures = ('samples', 'excitation_start_s', 'real_time_factor', 'latency_median_s', 'latency_p99_s')
+        return {'sentence': FINISHED, **dict.fromkeys(figures, '1')}
+
+    def stop(self):
+        return []
+
+
+@pytest.mark.parametrize('mode', ['real time', 'lock-step'])
+def test_a_drive_that_goes_on_without_its_recording_says_so_once(tmp_path, monkeypatch, mode):
+    monkeypatch.setattr(drive, 'Supervisor', Graph)
+    console = Console(record=True, file=io.StringIO())
+    folder = make_run_folder(tmp_path / 'run', 'bench')
+    order = DriveOrder('bench', mode, {}, domain=0)
+    drive._drive_graph(order, Excitation(Seat.BENCH, [], 5e-5, 0.0), folder, console, [])
+    assert console.export_text().count('goes on without recording') == 1
