@@ -142,8 +142,8 @@ def _audit_topic(times: AllTimes, name: str) -> TopicAudit:
 
 def _own_topic(found: TopicTimes) -> Topic | None:
     """Return the registered topic of a series, None for a foreign one that only has the same name."""
-    topic = registered_topic(found.topic)
-    if topic is None or topic.type != found.type:
+    topic = registered_topic(found.topic, found.type)
+    if topic is None:
         return None
     return topic if not found.names or set(topic.names) <= set(found.names) else None
 

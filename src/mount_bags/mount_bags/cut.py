@@ -130,7 +130,7 @@ def _places(messages: Messages, span: _Span) -> tuple[NDArray[np.int64], NDArray
 
 def _carried(topic: TopicInformation) -> slice:
     """Return which of the messages before a cut come with it."""
-    registered = registered_topic(topic.name)
+    registered = registered_topic(topic.name, topic.type)
     if registered is not None and (registered is EVENT or registered.delivery is Delivery.LATCHED):
         return _LAST
     if any(offer.durability == 'transient_local' for offer in topic.offered_qos):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from mount_bags.answers import LONGEST_SILENCE
 from mount_bags.audit import CONTROL, TopicAudit
 from mount_bags.automatic_marks import MarkKind
-from mount_bags.event_marks import read_marks
 from mount_bags.node_reports import NodeReport, node_reports
 from mount_bags.reading import Recording
-from mount_bags.series import SeriesError, registered_topic
+from mount_bags.recorded_events import recorded_marks
+from mount_bags.series import registered_topic
 from mount_bags.time_axis import TimeAxis, time_axis
-from mount_ros.topics import DISPLACEMENT, EVENT
+from mount_ros.topics import DISPLACEMENT
 
 _SAME = 5.0  # s, chosen: a mark that repeats the sentence of a report so soon is of the same fault
 _NUMBERS = re.compile(r'\d+(\.\d+)?')
@@ -37,7 +37,7 @@ def faults(recording: Recording, audits: Mapping[str, TopicAudit]) -> list[Fault
     graph have verdicts of their own. Without an answer of control, all count.
     """
     axis, reports = time_axis(recording), node_reports(recording)
-    found = [*_silences(audits, axis), *_errors(reports, audits, axis)]
+    found = [*_silences(audits, axis), *_errors(recording, reports, axis)]
     found += _marks(recording, found, axis)
     begin, end = _drive(reports, audits, axis)
     return sorted((fault for fault in found if begin <= fault.time <= end), key=lambda fault: fault.time)
@@ -75,12 +75,12 @@ def _silences(audits: Mapping[str, TopicAudit], axis: TimeAxis) -> list[Fault]:
     ]
 
 
-def _errors(reports: Sequence[NodeReport], audits: Mapping[str, TopicAudit], axis: TimeAxis) -> list[Fault]:
+def _errors(recording: Recording, reports: Sequence[NodeReport], axis: TimeAxis) -> list[Fault]:
     """Return where a node began to report an error, or another one; numbers in a sentence make no other."""
     mounts = {
         name.removesuffix(DISPLACEMENT.name).strip('/')
-        for name in audits
-        if registered_topic(name) is DISPLACEMENT
+        for name, topic in recording.topics.items()
+        if registered_topic(name, topic.type) is DISPLACEMENT
     }
     found: list[Fault] = []
     present: dict[tuple[str, str], str] = {}
@@ -98,22 +98,16 @@ def _errors(reports: Sequence[NodeReport], audits: Mapping[str, TopicAudit], axi
 
 def _marks(recording: Recording, known: Sequence[Fault], axis: TimeAxis) -> list[Fault]:
     """Return the marks of faults that no report tells of already."""
-    found = []
-    for name in recording:
-        if registered_topic(name) is not EVENT:
-            continue
-        series = recording[name]
-        try:
-            marks = zip(read_marks(series), series.receive_times.tolist(), strict=True)
-            told = [(axis.of_mark(mark.time, logged), mark) for mark, logged in marks]
-        except (SeriesError, AttributeError):  # a foreign topic of this name
-            continue
-        found += [
-            Fault(time, '', mark.text)
-            for time, mark in told
-            if mark.kind == MarkKind.FAULT.value and not _is_told(time, mark.text, known)
-        ]
-    return found
+    told = [
+        (axis.of_mark(mark.time, logged), mark)
+        for marks in recorded_marks(recording).values()
+        for logged, mark in marks
+    ]
+    return [
+        Fault(time, '', mark.text)
+        for time, mark in told
+        if mark.kind == MarkKind.FAULT.value and not _is_told(time, mark.text, known)
+    ]
 
 
 def _is_told(time: float, text: str, known: Sequence[Fault]) -> bool:

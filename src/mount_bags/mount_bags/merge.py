@@ -196,5 +196,5 @@ def _streamed(recording: Recording) -> tuple[int, int] | None:
 
 
 def _latched(topic: TopicInformation) -> bool:
-    registered = registered_topic(topic.name)
+    registered = registered_topic(topic.name, topic.type)
     return registered is not None and registered.delivery is Delivery.LATCHED

@@ -16,11 +16,13 @@ def peak_current(recording: Recording, audits: Mapping[str, TopicAudit]) -> floa
 
     The ramp of an initialisation does not count. `audits` is the audit of `recording`.
     """
-    peaks = [
-        _peak(recording, name.removesuffix(DISPLACEMENT.name) + CURRENT_SETPOINT.name, entry.answers.spans)
+    spans = {
+        name.removesuffix(DISPLACEMENT.name) + CURRENT_SETPOINT.name: entry.answers.spans
         for name, entry in audits.items()
         if entry.answers is not None
-    ]
+    }
+    recording.load_columns({name: ('coil_current',) for name in spans if name in recording})
+    peaks = [_peak(recording, name, of_mount) for name, of_mount in spans.items()]
     return max((peak for peak in peaks if not math.isnan(peak)), default=math.nan)
 
 

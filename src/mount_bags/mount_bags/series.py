@@ -313,15 +313,15 @@ class Series:
             raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
 
 
-def registered_topic(name: str, type_name: str = '') -> Topic | None:
+def registered_topic(name: str, type_name: str) -> Topic | None:
     """Return the registered topic behind a full name with any namespace, None if there is none.
 
-    Where `type_name` is given, a topic of another type is a foreign one, whatever its name.
+    A topic of another type than `type_name` is a foreign one, whatever its name.
     """
     known = TOPICS + RACK_TOPICS
     fitting = [topic for topic in known if f'/{name}'.endswith('/' + topic.name.lstrip('/'))]
     found = max(fitting, key=lambda topic: len(topic.name), default=None)
-    return found if found is None or type_name in ('', found.type) else None
+    return found if found is not None and found.type == type_name else None
 
 
 def _joint_number(message: Any, name: str, part: str) -> float:

@@ -71,8 +71,8 @@ def time_axis(recording: Recording, times: Mapping[str, TopicTimes] | None = Non
     """Return the time axis of a recording; `times`, where known already, spare the reading of its samples."""
     told = [step[ZERO_KEY] for step in origin(recording) if isinstance(step.get(ZERO_KEY), int)]
     for topic in _ANCHORS:
-        for name in recording:
-            if registered_topic(name) is topic and recording.topics[name].message_count:
+        for name, information in recording.topics.items():
+            if registered_topic(name, information.type) is topic and information.message_count:
                 stamps, received = _arrivals(recording, name, times)
                 if stamps.size:
                     return TimeAxis(stamps, received, told)

@@ -10,8 +10,8 @@ from recorded_drive import PERIOD, START, sample
 
 import mount_bags
 from mount_bags.audit import audit
-from mount_bags.audit_report import is_lossless
 from mount_bags.cut import cut
+from mount_bags.losses import losses
 from mount_bags.merge import merge
 from mount_bags.recover import recover
 from mount_bags.schemas import schema_text
@@ -138,8 +138,8 @@ def test_damaged_attachment_or_metadata_is_said_to_be_lost(place, what):
     assert len(attachments) + len(notes) == 2
     name = 'track' if what.startswith(b'track') else 'attachment'
     opened = mount_bags.open(folder)
-    for losses in (cut(opened, place()).losses, merge([mount_bags.open(folder)], place()).losses):
-        assert [name in sentence for sentence in losses] == [True]
+    for said in (cut(opened, place()).losses, merge([mount_bags.open(folder)], place()).losses):
+        assert [name in sentence for sentence in said] == [True]
 
 
 # What the recorder says of its losses.
@@ -162,7 +162,7 @@ def losses_of(folder):
     recording = mount_bags.open(folder)
     audits = audit(recording)
     lost = {name: entry.lost for name, entry in audits.items() if entry.lost}
-    assert is_lossless(audits, recording) is not bool(lost)
+    assert losses(recording, audits).lossless is not bool(lost)
     return lost
 
 

@@ -212,7 +212,7 @@ def test_malformed_message_costs_its_observation_and_not_the_recording(
     figures = recorder.figures()
     assert (figures.received, figures.kept, figures.lost, figures.failure) == (9, 9, 0, '')
     assert open_recording(tmp_path / 'bag').message_count == 9
-    assert [mark.kind for mark in sent] == ['lost_sample']
+    assert [mark.kind for mark in sent] == ['unanswered']
     verdict = judge(RecorderState('/data/bag', figures, unobserved=recorder.unobserved), OnFull.STOP)
     assert verdict.level is Level.WARN
     assert f'{topic.name} 4 (the last of {len(malformed)} bytes' in verdict.sentence

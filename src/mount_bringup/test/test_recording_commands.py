@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 import mount_bags
 from mount_bags.audit import audit
 from mount_bags.audit_report import sentences
+from mount_bags.losses import losses
 from mount_bags.statement import Reception
 from mount_bags.writer import BagWriter
 from mount_bringup.command import app
@@ -39,14 +40,19 @@ def displacements(count):
     return [layout.pack(START + index * 1_000_000, (0.0,)) for index in range(count)]
 
 
+def verdict(recording):
+    audits = audit(recording)
+    return sentences(audits, losses(recording, audits))[-1]
+
+
 def test_an_empty_recording_is_not_said_to_be_complete(tmp_path):
     recording = mount_bags.open(recorded(tmp_path / 'bag', {}))
-    assert sentences(audit(recording), recording)[-1].startswith('The recording is empty')
+    assert verdict(recording).startswith('The recording is empty')
 
 
 def test_topics_without_a_message_are_not_counted_as_complete(tmp_path):
     recording = mount_bags.open(recorded(tmp_path / 'bag', {DISPLACEMENT: displacements(5)}))
-    assert 'Nothing is known to be lost: 1 topics are complete' in sentences(audit(recording), recording)[-1]
+    assert 'Nothing is known to be lost: 1 topics are complete' in verdict(recording)
 
 
 @pytest.mark.parametrize(

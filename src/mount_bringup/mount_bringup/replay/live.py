@@ -214,7 +214,7 @@ def _chosen(recording: Recording, order: LiveOrder) -> dict[str, Topic]:
         wanted += [recording.resolve(name) for name in names]
     chosen = {}
     for name in wanted:
-        topic = registered_topic(name) or _unregistered(recording, name)
+        topic = registered_topic(name, recording.topics[name].type) or _unregistered(recording, name)
         if topic is not None and not (order.with_control and topic.name in _ANSWERS):
             chosen[name] = topic
     return chosen
