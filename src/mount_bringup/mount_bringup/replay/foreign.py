@@ -23,8 +23,10 @@ from mount_bringup.replay.input import (
 )
 from mount_bringup.replay.ramps import MeasuredGap, measured_gaps
 from mount_init.parameters import InitParameters
+from mount_models.averages import mean
 from mount_models.closing import ClosingMechanics
 from mount_models.force_table import contact_force, current_force_table, offset_current
+from mount_models.interpolation import each_interpolated
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
@@ -91,7 +93,7 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
         stamps = stamps + SECOND
     values = order.scale * values
-    offset = float(np.mean(values)) if order.offset == 'mean' else float(order.offset)
+    offset = mean(values) if order.offset == 'mean' else float(order.offset)
     notes.append(
         f'factor {order.scale:g} to m; offset {1e3 * offset:.3f} mm removed '
         f'({"the mean" if order.offset == "mean" else "as given"})'
@@ -228,7 +230,9 @@ def _on_one_grid(signals: dict[str, _Signal], notes: list[str]) -> tuple[Times, 
     times = SAMPLE_TIME * np.arange(count)
     columns = {
         # Grids of two signals stand less than a sample apart, far above the band: a straight line is enough.
-        name: np.interp(times, (first - begin) / SECOND + SAMPLE_TIME * np.arange(len(values)), values)
+        name: each_interpolated(
+            times, (first - begin) / SECOND + SAMPLE_TIME * np.arange(len(values)), values
+        )
         for name, (first, values) in even.items()
     }
     stamps = begin + _PERIOD * np.arange(count, dtype=np.int64)
@@ -242,7 +246,7 @@ def _resampled(signal: RecordedSignal, notes: list[str]) -> Column:
     if np.allclose(steps, SAMPLE_TIME, rtol=0.0, atol=1e-6):
         return signal.values
     try:
-        values = resample(signal, SAMPLE_TIME) + np.mean(signal.values)  # the offset is dealt with later
+        values = resample(signal, SAMPLE_TIME) + mean(signal.values)  # the offset is dealt with later
     except ValueError as error:
         raise ReplayError(f'{signal.name} cannot be resampled to 1 kHz: {error}') from None
     notes.append(f'{signal.name}: resampled from {signal.rate:.4g} Hz to 1 kHz, band-limited')
