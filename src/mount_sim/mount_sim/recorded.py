@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_models.averages import mean
 from mount_sim.csv_table import CsvTable, RecordedInputError, read_table
+from mount_sim.resampling import change_rate, spline
 
 __all__ = ['RecordedInputError', 'RecordedSignal', 'load_signal', 'resample']
 
@@ -87,20 +89,16 @@ def resample(recorded: RecordedSignal, step_time: float) -> NDArray[np.float64]:
     First onto an even grid at its own rate, then band-limited (polyphase) to at least 1 kHz, then by a
     cubic spline to the step, where no more than 1/20 of the rate is in use.
     """
-    from scipy.interpolate import CubicSpline  # here, for they take longer to load than all the rest
-    from scipy.signal import resample_poly
-
     rate = recorded.rate
     count = math.floor(recorded.times[-1] * rate + 1e-9) + 1
-    even = CubicSpline(recorded.times, recorded.values - np.mean(recorded.values))(np.arange(count) / rate)
+    even = spline(recorded.times, recorded.values - mean(recorded.values), np.arange(count) / rate)
     if rate * step_time > 1.0:
         ratio = Fraction(1.0 / (step_time * rate)).limit_denominator(1000)
-        return resample_poly(even, ratio.numerator, ratio.denominator)
+        return change_rate(even, ratio.numerator, ratio.denominator)
     factor = max(1, math.ceil(1000.0 / rate))
-    fine = resample_poly(even, factor, 1)
+    fine = change_rate(even, factor, 1)
     fine_times = np.arange(len(fine)) / (rate * factor)
-    steps = np.arange(0.0, recorded.times[-1], step_time)
-    return CubicSpline(fine_times, fine)(steps)
+    return spline(fine_times, fine, np.arange(0.0, recorded.times[-1], step_time))
 
 
 def _checked(recorded: RecordedSignal) -> RecordedSignal:
