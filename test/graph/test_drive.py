@@ -40,7 +40,8 @@ def _payloads(folder, topic):
 
 
 def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equals_the_core_run(command):
-    options = ('--scenario', 'bench', '--duration', '1', '--set', 'mount_sim.timeline.start=2.9')
+    # long enough for two files by size; a split by wall time would depend on the speed of the machine
+    options = ('--scenario', 'bench', '--duration', '2', '--set', 'mount_sim.timeline.start=2.9')
     first = command.drive('--lockstep', *options)
     second = command.drive('--lockstep', '--namespace', 'mount_right', '--split', '1MB', *options)
     core = command.drive('--core', *options)

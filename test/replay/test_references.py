@@ -6,7 +6,9 @@ import pytest
 
 from mount_bags.accept import ACCEPTED_NAME, LARGEST_TOTAL
 from mount_bags.reference import differences_from_reference
+from mount_bringup.replay.recorded_versions import version_differences, versions_sentence
 from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from mount_bringup.versions import versions
 
 REFERENCES = sorted(
     folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()
@@ -22,6 +24,7 @@ def test_the_accepted_setpoints_are_met_to_the_bit(reference, mode, domain, tmp_
         [
             f'{reference.name}, {mode}:',
             *told,
+            versions_sentence(version_differences(outcome.given.session, versions()), versions()),
             f'if this is meant: engine-mount accept REPLAY --reference {reference.name} --reason "..."',
         ]
     )

@@ -2,12 +2,10 @@
 
 import contextlib
 import math
-import platform
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +38,7 @@ from mount_bringup.summary import (
     write_json,
 )
 from mount_bringup.terminal import note
+from mount_bringup.versions import versions
 from mount_models.quantity import with_flattened
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation
@@ -293,15 +292,3 @@ def _session(order: DriveOrder, parameters: Parameters) -> str:
             'versions': versions(),
         }
     )
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of this project and of what it runs on."""
-    names = ('mount_bringup', 'rclpy', 'numpy', 'scipy', 'numba', 'mcap', 'python-can', 'cantools')
-    found = {'python': platform.python_version()}
-    for name in names:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = 'unknown'  # installed from Debian packages without metadata
-    return found

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mount_models.compiled import compiled
+from mount_models.elementary import sine_and_cosine
 
 
 class BandPass(NamedTuple):
@@ -32,19 +33,21 @@ def design(eigenfrequency: float, quality: float, lead_time: float, sample_time:
     H(s) = (w0/Q) s / (s^2 + (w0/Q) s + w0^2): gain 1 and phase 0 at the eigenfrequency.
     """
     w0 = 2.0 * math.pi * eigenfrequency
-    warped = math.tan(0.5 * w0 * sample_time)  # s becomes (w0 / warped) (z - 1) / (z + 1)
+    half_sample = 0.5 * eigenfrequency * sample_time  # turns
+    sine, cosine = sine_and_cosine(half_sample)
+    warped = sine / cosine  # s becomes (w0 / warped) (z - 1) / (z + 1)
     bandwidth = warped / quality
     scale = 1.0 / (1.0 + bandwidth + warped * warped)
     # A sine A sin(p) has the band velocity A w0 cos(p - f) because the difference of two samples
     # stands half a sample back, f = w0 Ts/2. Wanted is A w0 cos(p + l), l = w0 lead_time.
-    lead, half_sample = w0 * lead_time, 0.5 * w0 * sample_time
+    lead = float(eigenfrequency * lead_time)  # turns
     return BandPass(
         gain=bandwidth * scale,
         a1=2.0 * (warped * warped - 1.0) * scale,
         a2=(1.0 - bandwidth + warped * warped) * scale,
         sample_time=sample_time,
-        from_velocity=math.cos(lead) / math.cos(half_sample),
-        from_displacement=-w0 * math.sin(lead + half_sample) / math.cos(half_sample),
+        from_velocity=sine_and_cosine(lead)[1] / cosine,
+        from_displacement=-w0 * sine_and_cosine(lead + half_sample)[0] / cosine,
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_models.compiled import compiled
+from mount_models.interpolation import each_interpolated
 
 FORCE_STEP = 0.5  # N, chosen: the table's own step
 _FIRST_TOUCH = 1.0  # N, chosen
@@ -51,7 +52,7 @@ def resample(
         )
     forces = np.arange(0.0, normal_force[-1], FORCE_STEP)
     return CurrentTable(
-        np.ascontiguousarray(np.interp(forces, normal_force, current)),
+        each_interpolated(forces, normal_force, current),
         CurrentLimits(float(offset_current), float(highest_current)),
     )
 

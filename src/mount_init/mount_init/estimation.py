@@ -13,6 +13,7 @@ import numpy.typing as npt
 from mount_init.errors import AmbiguousCurveError, OutsideCalibrationError, UnusableReadingsError
 from mount_init.parameters import InitParameters
 from mount_models.actuator.law import OutsideLawError, checked_force
+from mount_models.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, CrossingError, find_crossing
 from mount_models.coil.gap import (
     OutsideCurveError,
@@ -85,8 +86,8 @@ def dwell_inductance(current: FloatArray, inductance: FloatArray, parameters: In
         )
     good = values[kept]
     return Dwell(
-        inductance=float(good.mean()),
-        inductance_std=float(good.std(ddof=1)) / math.sqrt(good.size),
+        inductance=mean(good),
+        inductance_std=standard_deviation(good) / math.sqrt(good.size),
         current=float(np.median(current[finite])),
         samples=int(good.size),
         rejected=rejected,
@@ -153,7 +154,8 @@ def contact_gap(
     normal_force = force - spring * (rest.gap - gap)
     by_gap = 1.0 + (_force_per_gap(specimen, current, gap) + spring) / pads
     by_current = by_gap * gap_slope + _force_per_current(specimen, current, gap) / pads
-    std = float(np.hypot(by_current * current_std, spring / pads * rest.std))
+    of_current, of_rest = by_current * current_std, spring / pads * rest.std
+    std = math.sqrt(of_current * of_current + of_rest * of_rest)
     return ContactGap(gap, normal_force, gap + normal_force / pads, std)
 
 

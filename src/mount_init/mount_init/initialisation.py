@@ -3,6 +3,7 @@
 It knows neither clock nor middleware: the same samples give the same results to the bit.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,8 @@ from mount_init.plausibility import (
 from mount_init.ramp import Ramp, current_ramp
 from mount_init.readings import Readings, check_readings
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
-from mount_models.coil.crossing import Crossing
+from mount_models.averages import mean, standard_deviation
+from mount_models.coil.crossing import Crossing, find_crossing
 from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
 from mount_models.specimen import Specimen
 
@@ -195,6 +197,9 @@ def load_compiled_laws(specimen: Specimen) -> None:
     law = specimen.force_law
     middle = 0.5 * (law.gap_low + law.gap_high)
     checked_current_for_force(law, float(checked_force(law, specimen.rest_current, middle)), middle)
+    falling = np.linspace(1.0, 0.0, 50)
+    find_crossing(falling[::-1], falling, 0.5)
+    standard_deviation(falling)
 
 
 def _estimate(
@@ -274,5 +279,5 @@ def _complete(specimen: Specimen, parameters: InitParameters, evidence: Evidence
 
 def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
     """Return the plain mean of equally good estimates and its standard deviation."""
-    values = np.array(estimates)
-    return float(values[:, 0].mean()), float(np.sqrt(np.sum(values[:, 1] ** 2))) / len(estimates)
+    values, stds = np.array(estimates).T.copy()
+    return mean(values), math.sqrt(mean(stds * stds) / stds.size)

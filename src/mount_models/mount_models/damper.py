@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.compiled import compiled
+from mount_models.elementary import expm1
 from mount_models.quantity import ParameterError, Quantity, checked
 
 FloatArray = npt.NDArray[np.float64]
@@ -97,7 +98,8 @@ class DegressiveDamper(NamedTuple):
 
     def magnitude(self, excess_velocity: FloatArray) -> FloatArray:
         """Return the force (N) at velocity magnitudes above the dead zone (m/s, >= 0)."""
-        return -self.final_force * np.expm1(-self.damping_coefficient / self.final_force * excess_velocity)
+        exponents = self.damping_coefficient / self.final_force * excess_velocity
+        return -self.final_force * np.array([expm1(-exponent) for exponent in exponents])
 
 
 class ProgressiveDamper(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.compiled import compiled
+from mount_models.elementary import expm1
 from mount_models.quantity import Quantity
 
 
@@ -63,5 +64,5 @@ def dynamic_stiffness(elastomer: Elastomer, frequency: npt.ArrayLike) -> npt.NDA
 @compiled
 def _maxwell_step(force, stiffness, corner, displacement_change, dt):
     exponent = 2.0 * math.pi * corner * dt
-    lost = -math.expm1(-exponent)
+    lost = -expm1(-exponent)
     return force * (1.0 - lost) + stiffness * displacement_change * lost / exponent

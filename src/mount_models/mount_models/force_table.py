@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from mount_models.actuator.law import ForceLaw, checked_current_for_force, checked_force
 from mount_models.compiled import compiled
+from mount_models.interpolation import each_interpolated, interpolated
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -126,15 +127,17 @@ def checked_table(table: npt.ArrayLike) -> FloatArray:
 @compiled
 def table_current(current_row, force_row, normal_force):
     """Return the current (A) for `normal_force` (N), interpolated; NaN below 0 N or past the last entry."""
-    return _interpolated(force_row, current_row, normal_force)
+    if not 0.0 <= normal_force <= force_row[-1]:
+        return math.nan
+    return interpolated(normal_force, force_row, current_row)
 
 
 @compiled
 def table_normal_force(current_row, force_row, current):
     """Return the normal force (N) at `current` (A): 0 up to the contact current, NaN past the last entry."""
-    if 0.0 <= current <= current_row[0]:
-        return 0.0
-    return _interpolated(current_row, force_row, current)
+    if not 0.0 <= current <= current_row[-1]:
+        return math.nan
+    return interpolated(current, current_row, force_row)
 
 
 def checked_table_current(table: FloatArray, normal_force: npt.ArrayLike) -> FloatArray:
@@ -146,23 +149,7 @@ def checked_table_current(table: FloatArray, normal_force: npt.ArrayLike) -> Flo
             f'normal force ({float(wanted[~inside].flat[0]):.2f} N) must lie within 0.00 .. '
             f'{table[1, -1]:.2f} N, which {table[0, -1]:.2f} A reach; demand less force'
         )
-    return np.asarray(np.interp(wanted, table[1], table[0]))[()]
-
-
-@compiled
-def _interpolated(x_row, y_row, x):
-    last = x_row.size - 1
-    if not x_row[0] <= x <= x_row[last]:
-        return math.nan
-    low, high = 0, last
-    while high - low > 1:
-        middle = (low + high) // 2
-        if x_row[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    share = (x - x_row[low]) / (x_row[high] - x_row[low])
-    return y_row[low] + share * (y_row[high] - y_row[low])
+    return each_interpolated(wanted.ravel(), table[1], table[0]).reshape(wanted.shape)[()]
 
 
 def _highest_normal_force(

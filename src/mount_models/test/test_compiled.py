@@ -1,5 +1,8 @@
-"""The cache of compiled laws follows every source that a law may call."""
+"""The cache of compiled laws follows every source that a law may call, and keeps processors apart."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 from mount_models import compiled
@@ -21,3 +24,13 @@ def test_packages_that_a_file_imports_belong_to_its_digest(tmp_path, monkeypatch
     (tmp_path / 'mount_far' / 'part.py').write_text('X = 2\n')
     compiled._sources_digest.cache_clear()
     assert compiled._sources_digest(behind) != before
+
+
+def test_code_for_one_processor_is_not_taken_for_another(tmp_path):
+    plain = {name: value for name, value in os.environ.items() if name != 'NUMBA_CPU_NAME'}
+    for names in ({}, {'NUMBA_CPU_NAME': 'generic'}, {'NUMBA_CPU_NAME': 'generic'}):
+        subprocess.run(
+            [sys.executable, '-c', 'from mount_models.elementary import exp; exp(1.0)'],
+            env={**plain, 'XDG_CACHE_HOME': str(tmp_path), **names}, check=True,
+        )  # fmt: skip
+    assert len(list(tmp_path.rglob('elementary.exp-*.nbc'))) == 2

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from mount_models.actuator.reluctance import mean_incremental_inductance
 from mount_models.coil.ripple import current_rate, flux_rate
 from mount_models.compiled import compiled
+from mount_models.elementary import expm1
 from mount_models.quantity import Quantity
+from mount_models.random_numbers import RandomNumbers
 
 STATUS_EVERY = 100
 """Samples from one status to the next: 10 Hz; the first sample has one."""
@@ -56,7 +58,7 @@ class Noise:
     _BLOCK = 4096
 
     def __init__(self, seed: int):
-        self._generator = np.random.default_rng(seed)
+        self._random = RandomNumbers(seed)
         self._numbers: NDArray[np.float64] = np.empty((0, 4))
         self._place = 0
 
@@ -69,7 +71,7 @@ class Noise:
     def ahead(self, count: int) -> NDArray[np.float64]:
         """Return the numbers of the next `count` samples, (count, 4); they remain the next."""
         while len(self._numbers) - self._place < count:
-            drawn = self._generator.standard_normal((self._BLOCK, 4))
+            drawn = self._random.normal(self._BLOCK, 4)
             self._numbers = np.concatenate([self._numbers[self._place :], drawn])
             self._place = 0
         return self._numbers[self._place : self._place + count]
@@ -106,7 +108,7 @@ def advance_current(electronics, coil, actuator, current, gap, wanted, dt):
     mean rate over the step makes the decay exact: by its first value the loop would be 7 % too fast.
     """
     inductance = mean_incremental_inductance(actuator, current, gap)
-    decayed = -np.expm1(-2.0 * np.pi * electronics.current_bandwidth * dt)
+    decayed = -expm1(-2.0 * np.pi * electronics.current_bandwidth * dt)
     rate = decayed / dt * (wanted - current)
     voltage = coil.resistance * current + inductance * rate
     voltage = min(max(voltage, -coil.link_voltage), coil.link_voltage)

@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_models.elementary import cosines, sines
 from mount_models.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
 
 
@@ -45,7 +46,7 @@ def bench_sine(
     time = np.arange(round(duration / step_time)) * step_time
     fade = np.clip(time * frequency, 0.0, 1.0)
     # A half cosine has no corner at either end, so the fade adds no impact of its own.
-    values = amplitude * np.sin(2.0 * np.pi * frequency * time) * 0.5 * (1.0 - np.cos(np.pi * fade))
+    values = amplitude * sines(frequency * time) * 0.5 * (1.0 - cosines(0.5 * fade))
     return Excitation(Seat.BENCH, values, step_time, start)
 
 
@@ -66,5 +67,5 @@ def idle_force(
     amplitude: float, frequency: float, second_share: float, count: int, step_time: float
 ) -> NDArray[np.float64]:
     """Return the force (n,) in N of an idling engine: a sine (N, Hz) and a share of twice its frequency."""
-    phase = 2.0 * np.pi * frequency * np.arange(count) * step_time
-    return np.asarray(amplitude * (np.sin(phase) + second_share * np.sin(2.0 * phase)))
+    turns = frequency * (np.arange(count) * step_time)
+    return np.asarray(amplitude * (sines(turns) + second_share * sines(2.0 * turns)))

@@ -7,7 +7,8 @@ from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
 from mount_bags.signals.loading import load_signal
 from mount_bags.signals.plausibility import check_size
 from mount_bags.signals.resampling import resampled
-from mount_bags.signals.signal import FloatArray, mean_of
+from mount_bags.signals.signal import FloatArray
+from mount_models.averages import mean
 
 LOWEST_RATE = 50.0  # Hz, chosen: 2.5 times the 20 Hz below which the engine moves on its mounts
 LONGEST_GAP = 0.125  # s: one period of the eigenfrequency cannot be interpolated
@@ -28,7 +29,7 @@ def acceleration_at(even: EvenSignal, scale: float, step_time: float) -> FloatAr
 
     Raises `SignalError`, with the sample, beyond `LARGEST_ACCELERATION`.
     """
-    values = even.values - mean_of(even.values)
+    values = even.values - mean(even.values)
     check_size(
         even.name, scale * values, even.period, LARGEST_ACCELERATION, 'm/s^2 without the mean',
         'a chassis is not shaken so (the limit is chosen): is its unit another one (--scale), the column no '

@@ -148,7 +148,7 @@ def _is_even(
         return True
     by_number = prediction_error(np.arange(rising.size, dtype=float), values, off)
     by_stamp = prediction_error(rising, values[order], off)
-    return bool(by_number <= _AS_GOOD**2 * by_stamp)
+    return bool(by_number <= _AS_GOOD * _AS_GOOD * by_stamp)
 
 
 def _by_stamps(

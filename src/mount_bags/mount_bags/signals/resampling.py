@@ -22,6 +22,7 @@ from mount_bags.signals.even_grid import EvenSignal
 from mount_bags.signals.plausibility import check_range
 from mount_bags.signals.signal import FloatArray
 from mount_models.compiled import compiled
+from mount_models.elementary import sine_and_cosine
 
 HALF_LENGTH = 26  # samples of the slower rate
 CUTOFF = 0.45  # of the slower rate, chosen: what is left at its half is as small as the window allows
@@ -85,7 +86,7 @@ def _kernel_at(distance: float) -> float:
     share = distance / HALF_LENGTH
     window = _bessel(_SHAPE * math.sqrt(1.0 - share * share)) / _bessel(_SHAPE)
     turns = 2.0 * CUTOFF * distance
-    return window if turns == 0.0 else window * _sine_of_half_turns(turns) / (math.pi * turns)
+    return window if turns == 0.0 else window * sine_and_cosine(0.5 * turns)[0] / (math.pi * turns)
 
 
 @compiled
@@ -97,15 +98,3 @@ def _bessel(argument: float) -> float:
         term *= (0.5 * argument / number) ** 2
         total += term
     return total
-
-
-@compiled
-def _sine_of_half_turns(turns: float) -> float:
-    """Return sin(pi turns) by its series, for bytes must not depend on the library of the machine."""
-    whole = math.floor(turns + 0.5)
-    angle = math.pi * (turns - whole)
-    term, total = angle, angle
-    for number in range(1, 12):
-        term *= -angle * angle / (2 * number * (2 * number + 1))
-        total += term
-    return total if whole % 2 == 0 else -total

@@ -1,6 +1,5 @@
 """A signal as it was recorded, and the sentence why one cannot be used."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,8 +51,3 @@ def check_count(name: str, count: int) -> None:
     """Raise `SignalError` if a signal has too few samples to be one."""
     if count < _FEWEST:
         raise SignalError(f'{name} has {count} samples; at least {_FEWEST} are needed')
-
-
-def mean_of(values: FloatArray) -> float:
-    """Return the mean, to the last bit the same on every processor."""
-    return math.fsum(values.tolist()) / len(values)

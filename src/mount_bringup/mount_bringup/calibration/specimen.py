@@ -159,7 +159,7 @@ def _origin(files: Sequence[Path]) -> dict[str, Any]:
 
 
 def _made_with() -> dict[str, Any]:
-    from mount_bringup.drive import versions
+    from mount_bringup.versions import versions
 
     known = versions()
     return {

@@ -24,8 +24,8 @@ def accept(
     """Make a run the reference that `make test` replays; the reason is kept with it."""
     from mount_bags.accept import ACCEPTED_NAME
     from mount_bags.accept import accept as accept_run
-    from mount_bringup.drive import versions
     from mount_bringup.recording_path import open_run
+    from mount_bringup.versions import versions
 
     accepted = accept_run(open_run(run), reference, reason, folder, versions())
     console = terminal()

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from mount_bags.reading import Recording, open_recording
 from mount_bringup.core.recording import record_core
-from mount_bringup.drive import versions
 from mount_bringup.experiments.contract import (
     Experiment,
     Holds,
@@ -22,6 +21,7 @@ from mount_bringup.experiments.contract import (
 )
 from mount_bringup.experiments.drawing import BLUE, RED, family, finish, new_figure
 from mount_bringup.graph.supervisor import session_text
+from mount_bringup.versions import versions
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.calibration import RIG_CURRENTS, RigMeasurements, RigNoise, measure_actuator
 from mount_models.closing import ClosingMechanics, closed_state

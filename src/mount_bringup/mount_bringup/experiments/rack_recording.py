@@ -13,8 +13,8 @@ from geometry_msgs.msg import WrenchStamped
 from std_msgs.msg import String
 
 from mount_bags.writer import BagWriter
-from mount_bringup.drive import versions
 from mount_bringup.graph.supervisor import session_text
+from mount_bringup.versions import versions
 from mount_ros.cdr import serialised
 from mount_ros.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.temperature_message import temperature_layout

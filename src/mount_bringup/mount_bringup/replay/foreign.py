@@ -11,7 +11,7 @@ from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
 from mount_bags.signals.loading import is_recording, load_signal
 from mount_bags.signals.plausibility import check_size
 from mount_bags.signals.resampling import has_step, resampled
-from mount_bags.signals.signal import SECOND, mean_of
+from mount_bags.signals.signal import SECOND
 from mount_bringup.core.chain import Parameters, chosen_specimen, control_parameters
 from mount_bringup.recording_path import open_run
 from mount_bringup.replay.input import (
@@ -25,6 +25,7 @@ from mount_bringup.replay.input import (
 )
 from mount_bringup.replay.ramps import MeasuredGap, measured_gaps
 from mount_init.parameters import InitParameters
+from mount_models.averages import mean
 from mount_models.closing import ClosingMechanics
 from mount_models.force_table import contact_force, current_force_table, offset_current
 from mount_models.quantity import with_flattened
@@ -91,7 +92,7 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
         stamps = stamps - stamps[0] + SECOND
     values = order.scale * values
-    offset = mean_of(values) if order.offset == 'mean' else float(order.offset)
+    offset = mean(values) if order.offset == 'mean' else float(order.offset)
     notes.append(
         f'factor {order.scale:g} to m; offset {1e3 * offset:.3f} mm removed '
         f'({"the mean" if order.offset == "mean" else "as given"})'

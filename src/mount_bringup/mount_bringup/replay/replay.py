@@ -207,7 +207,7 @@ def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
 
 
 def _session(order: ReplayOrder, outcome: ReplayOutcome) -> dict[str, Any]:
-    from mount_bringup.drive import versions
+    from mount_bringup.versions import versions
 
     given = outcome.given
     recorded = given.session.get('parameters')

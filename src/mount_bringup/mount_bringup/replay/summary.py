@@ -18,8 +18,10 @@ from mount_bringup.replay.agreement import (
 )
 from mount_bringup.replay.core import Replayed
 from mount_bringup.replay.input import ReplayInput
+from mount_bringup.replay.recorded_versions import version_differences, versions_sentence
 from mount_bringup.replay.replay import LOCKSTEP, ReplayOutcome
 from mount_bringup.terminal import note
+from mount_bringup.versions import versions
 from mount_models.sampling import SAMPLE_TIME
 
 _SHOWN = 8  # switchings in the printed summary
@@ -43,6 +45,7 @@ def replay_figures(outcome: ReplayOutcome) -> dict[str, Any]:
         'restarts': sum(run.counts.restarts for run in replayed.runs),
         'invalid_samples': sum(run.counts.invalid for run in replayed.runs),
         'equal_to_recorded': None if found is None else found.equal,
+        'recorded_with': version_differences(given.session, versions()),
         'compared_setpoints': 0 if found is None else found.setpoints.samples,
         'differing_setpoints': None if found is None else found.setpoints.differing,
         'first_difference': _moment(found.setpoints.first if found else None),
@@ -78,6 +81,8 @@ def print_replay(outcome: ReplayOutcome, figures: dict[str, Any], console: Conso
     table.add_row('settings', _settings_text(outcome))
     for place, sentence in enumerate(_verdict(outcome)):
         table.add_row('' if place else 'setpoints', sentence)
+    if outcome.order.foreign is None:
+        table.add_row('versions', versions_sentence(figures['recorded_with'], versions()))
     table.add_row(
         'damping switched', _switching_text(Switching(figures['switch_on_s'], figures['switch_off_s']))
     )

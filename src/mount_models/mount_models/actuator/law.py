@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.compiled import compiled
+from mount_models.elementary import atan
 from mount_models.quantity import Quantity
 
 _POLYNOMIAL = 'polynomial coefficients in powers of the gap in micrometres, lowest power first'
@@ -163,9 +164,9 @@ _MOST_STEPS = 80
 def _force_and_slope(a, current):
     """Return Eq (3) in N and its derivative with respect to current in N/A, from a1 .. a5 at one gap."""
     a1, a2, a3, a4, a5 = a
-    knee = math.atan(a3 * a4)
+    knee = atan(a3 * a4)
     reach = a3 * (current - a4)
-    bend = math.atan(reach)
+    bend = atan(reach)
     bend_slope = a3 / (1.0 + reach * reach)
     line = a1 + a2 * current
     parabola = a5 * current * current

@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_models.compiled import compiled
+from mount_models.least_squares import combination_std, least_squares
+
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -87,8 +90,7 @@ def _local_crossing(
             f'must be at least {_FEWEST_SAMPLES}; ramp the current more slowly'
         )
     z = (currents - centre) / half_width
-    powers = np.stack([np.ones_like(z), z, z * z], axis=1)
-    coefficients, weights, noise = _robust_parabola(powers, inductances)
+    coefficients, triangle, noise = _robust_parabola(z, inductances)
     at = _root_near_zero(coefficients, level)
     slope = coefficients[1] + 2.0 * coefficients[2] * at
     if not (abs(at) <= 1.0 and slope < 0.0 and z[0] <= at <= z[-1]):
@@ -96,29 +98,37 @@ def _local_crossing(
             f'coil inductance must fall clearly through {level * 1e3:.1f} mH; around {centre:.3f} A it does '
             f'not: ramp the current more slowly or further, or check the ripple signals'
         )
-    place = np.array([1.0, at, at * at])
-    spread = np.linalg.solve(powers.T @ (powers * weights[:, np.newaxis]), place)
-    std = noise * math.sqrt(float(place @ spread)) / abs(float(slope))
+    std = noise * combination_std(triangle, np.array([1.0, at, at * at])) / abs(float(slope))
     return Crossing(centre + at * half_width, std * half_width, float(slope / half_width), int(currents.size))
 
 
-def _robust_parabola(powers: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return coefficients, final weights and noise (std) of a fit that outliers cannot pull."""
-    count, unknowns = powers.shape
-    weights, coefficients, noise = np.ones(count), np.zeros(unknowns), 0.0
+def _robust_parabola(z: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return coefficients, triangle of `least_squares` and noise (std) of a fit that outliers cannot pull."""
+    weights = np.ones(z.size)
     # the first turns weigh by 1/|error|, which leads to the median curve: a safe place to judge outliers from
     for turn in range(_TURNS_OF_WEIGHTING):
-        root = np.sqrt(weights)
-        solution = np.linalg.lstsq(powers * root[:, np.newaxis], values * root, rcond=None)[0]
-        coefficients = np.asarray(solution, np.float64)
-        error = np.abs(values - powers @ coefficients)
-        noise = _MAD_TO_STD * _median(error) * math.sqrt(count / (count - unknowns))
+        (c0, c1, c2), _ = _parabola(z, values, weights)
+        error = np.abs(values - (c0 + z * (c1 + z * c2)))
+        noise = _MAD_TO_STD * _median(error) * math.sqrt(z.size / (z.size - 3))
         noise = max(noise, 1e-12 * float(np.abs(values).max()))
         if turn < _TURNS_OF_WEIGHTING // 2:
             weights = noise / np.maximum(error, 0.1 * noise)
         else:
-            weights = np.clip(1.0 - (error / (_BISQUARE * noise)) ** 2, 0.0, 1.0) ** 2
-    return coefficients, weights, noise
+            far = error / (_BISQUARE * noise)
+            near = np.clip(1.0 - far * far, 0.0, 1.0)
+            weights = near * near
+    return np.array([c0, c1, c2]), _parabola(z, values, weights)[1], noise
+
+
+@compiled
+def _parabola(z, values, weights):
+    """Return coefficients, lowest first, and triangle of the parabola through weighted values, all (n,)."""
+    powers, weighted = np.empty((z.size, 3)), np.empty(z.size)
+    for k in range(z.size):
+        root = math.sqrt(weights[k])
+        powers[k, 0], powers[k, 1], powers[k, 2] = root, root * z[k], root * z[k] * z[k]
+        weighted[k] = root * values[k]
+    return least_squares(powers, weighted)
 
 
 def _median(values: FloatArray) -> float:

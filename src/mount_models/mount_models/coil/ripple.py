@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 from mount_models.actuator.reluctance import core_field, differential_permeability, gap_permeance
 from mount_models.compiled import compiled
+from mount_models.elementary import exp, expm1
 from mount_models.quantity import Quantity
 
 
@@ -87,8 +88,8 @@ def skin_factor_series(coil, diffusion_time, duty, terms):
         rate = (k * math.pi) ** 2 / diffusion_time
         if rate * coil.sample_delay > _FADED:
             break
-        term = math.exp(-rate * coil.sample_delay) * math.expm1(-rate * off_time)
-        total += term / math.expm1(-rate * coil.pwm_period)
+        term = exp(-rate * coil.sample_delay) * expm1(-rate * off_time)
+        total += term / expm1(-rate * coil.pwm_period)
     return 1.0 + 2.0 * total / (1.0 - duty)
 
 

@@ -11,13 +11,14 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.compiled import compiled
+from mount_models.elementary import exp, log
 from mount_models.quantity import Quantity
 
 _TABLE_2 = 'Table 2'
 _MM_PER_M = 1000.0
 _LARGEST_EXPONENT = 700.0  # exp() stays finite
-_NEWTON_STEPS = 60  # ten are usual; the limit only bounds the time of one step
-_NEWTON_TOLERANCE = 1e-12
+_MOST_STEPS = 60  # three are usual; the limit only bounds the time
+_LAST_STEP = 1e-3  # a step so small, relative, leaves its fourth power over 36: 3e-14 (derived)
 
 
 class FrictionCoefficients(NamedTuple):
@@ -90,7 +91,14 @@ def dynamic_coefficient(coefs, velocity, deflection_u, normal_force):
     `velocity` in m/s (its sign selects p or n; 0 counts as p), `deflection_u` = u = sign(F_F) xi in m,
     `normal_force` in N.
     """
-    offset = offset_coefficient(coefs, velocity, normal_force)
+    logarithm = speed_logarithm(coefs, velocity)
+    return dynamic_coefficient_with(logarithm, coefs, velocity, deflection_u, normal_force)
+
+
+@compiled
+def dynamic_coefficient_with(logarithm, coefs, velocity, deflection_u, normal_force):
+    """Return `dynamic_coefficient` with the `speed_logarithm` of `velocity`, for several normal forces."""
+    offset = offset_coefficient_with(logarithm, coefs, velocity, normal_force)
     slope = slope_coefficient(coefs, velocity, normal_force)
     return max(coefs.scale * (offset + slope * deflection_u), 0.0)
 
@@ -98,8 +106,21 @@ def dynamic_coefficient(coefs, velocity, deflection_u, normal_force):
 @compiled
 def offset_coefficient(coefs, velocity, normal_force):
     """Return a of Eq (14), dimensionless, for `velocity` in m/s and `normal_force` in N."""
-    amplitude, gain, shift = _offset_parts(coefs, velocity, normal_force)
-    return amplitude + gain * math.log(shift + abs(velocity) * _MM_PER_M)
+    return offset_coefficient_with(speed_logarithm(coefs, velocity), coefs, velocity, normal_force)
+
+
+@compiled
+def offset_coefficient_with(logarithm, coefs, velocity, normal_force):
+    """Return `offset_coefficient` with the `speed_logarithm` of `velocity`."""
+    amplitude, gain, _ = _offset_parts(coefs, velocity, normal_force)
+    return amplitude + gain * logarithm
+
+
+@compiled
+def speed_logarithm(coefs, velocity):
+    """Return the logarithm in Eq (14), all that depends on the size of `velocity` (m/s) there."""
+    shift = coefs.a_n3 if velocity < 0.0 else coefs.a_p3
+    return log(shift + abs(velocity) * _MM_PER_M)
 
 
 @compiled
@@ -121,8 +142,8 @@ def sliding_speed(coefs, direction, traction, deflection_u, normal_force, resist
     the inverse itself. `direction` is +1 or -1. Where mu falls with speed it is replaced by its running
     maximum (the monotone envelope), so there is one speed only; 0 means that the contact sticks.
 
-    Between its corners the sum is rising and concave, so Newton's method started at the lower end of the
-    right piece approaches the solution from below and cannot overshoot (derived).
+    Between its corners the sum is rising and concave; from the lower end of the right piece the solution is
+    approached from below and never passed (derived).
     """
     if normal_force <= 0.0:
         return traction / resistance if resistance > 0.0 else math.inf
@@ -139,48 +160,63 @@ def sliding_speed(coefs, direction, traction, deflection_u, normal_force, resist
     linear = force_per_mu * per_speed_mm * u_mm
     drag = resistance / _MM_PER_M
 
-    at_rest = rest + log_gain * math.log(shift)
+    log_at_rest = log(shift)
+    at_rest = rest + log_gain * log_at_rest
     if traction <= at_rest:
         return 0.0
     top = corner
     if linear < 0.0:
         top = min(max(-log_gain / linear - shift, 0.0), corner)
-    at_top = rest + log_gain * math.log(shift + top) + linear * top
+    log_at_top = log(shift + top)
+    at_top = rest + log_gain * log_at_top + linear * top
     if at_rest < 0.0 and traction < drag * top:
         free = traction / drag
-        if rest + log_gain * math.log(shift + free) + linear * free <= 0.0:
+        if rest + log_gain * log(shift + free) + linear * free <= 0.0:
             return free / _MM_PER_M
     if traction <= at_top + drag * top:
-        return _rising_root(rest - traction, log_gain, shift, linear + drag, 0.0) / _MM_PER_M
+        return _rising_root(rest - traction, log_gain, shift, linear + drag, 0.0, log_at_rest) / _MM_PER_M
 
     above = rest + linear * corner
     plateau = max(at_top, 0.0)
-    plateau_end = corner
+    plateau_end, log_at_end = corner, log_at_top
     if top < corner or plateau > at_top:
         plateau_end = max(_log_root(above - plateau, log_gain, shift), corner)
+        log_at_end = log(shift + plateau_end)
     if traction <= plateau + drag * plateau_end:
         return ((traction - plateau) / drag if drag > 0.0 else top) / _MM_PER_M
     if drag == 0.0:
         return _log_root(above - traction, log_gain, shift) / _MM_PER_M
-    return _rising_root(above - traction, log_gain, shift, drag, plateau_end) / _MM_PER_M
+    return _rising_root(above - traction, log_gain, shift, drag, plateau_end, log_at_end) / _MM_PER_M
 
 
 @compiled
-def _rising_root(constant, log_gain, shift, linear, start):
-    """Return v >= start with constant + log_gain ln(shift + v) + linear v = 0; negative at `start`."""
-    speed = start
-    for _ in range(_NEWTON_STEPS):
-        value = constant + log_gain * math.log(shift + speed) + linear * speed
-        step = -value / (log_gain / (shift + speed) + linear)
-        speed += max(step, 0.0)
-        if not step > _NEWTON_TOLERANCE * (shift + speed):
+def _rising_root(constant, log_gain, shift, linear, start, log_at_start):
+    """Return v >= start with constant + log_gain ln(shift + v) + linear v = 0; negative at `start`.
+
+    `log_at_start` is ln(shift + start), which the caller has. From v a step of y (shift + v) is taken with
+    ln(1 + y) replaced by y (6 + y) / (6 + 4 y): never less (derived), so no step is too long; and so near
+    that three steps do what takes Newton's method six.
+    """
+    speed, logarithm = start, log_at_start
+    for _ in range(_MOST_STEPS):
+        shifted = shift + speed
+        missing = -(constant + log_gain * logarithm + linear * speed)
+        along = linear * shifted
+        half = 3.0 * (log_gain + along) - 2.0 * missing
+        under = half * half + 6.0 * (log_gain + 4.0 * along) * missing
+        step = 6.0 * missing / (half + math.sqrt(max(under, 0.0)))
+        if step <= 0.0:
             break
+        speed += step * shifted
+        if not step > _LAST_STEP:  # also where it is not a number
+            break
+        logarithm = log(shift + speed)
     return speed
 
 
 @compiled
 def _log_root(constant, log_gain, shift):
-    return math.exp(min(-constant / log_gain, _LARGEST_EXPONENT)) - shift
+    return exp(min(-constant / log_gain, _LARGEST_EXPONENT)) - shift
 
 
 @compiled

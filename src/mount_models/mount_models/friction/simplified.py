@@ -1,11 +1,16 @@
 """Simplified friction model for control, Eq (9): sliding velocity = measured velocity, no spring c_Re."""
 
-import math
-
 import numpy as np
 
 from mount_models.compiled import compiled
-from mount_models.friction.coefficient import dynamic_coefficient, offset_coefficient, slope_coefficient
+from mount_models.elementary import expm1
+from mount_models.friction.coefficient import (
+    dynamic_coefficient,
+    dynamic_coefficient_with,
+    offset_coefficient_with,
+    slope_coefficient,
+    speed_logarithm,
+)
 
 FADE_VELOCITY = 0.001
 """v_w in m/s (chosen): below it the weight 1 - exp(-(v/v_w)^2) fades mu to zero, because the simplified
@@ -29,12 +34,14 @@ def simplified_step(contact, coefs, deflection, velocity, normal_force, dt):
     """
     load = max(normal_force, 0.0)
     direction = -1.0 if velocity < 0.0 else 1.0
-    weight = fade_weight(velocity) * coefs.scale
-    drive = direction * weight * load * offset_coefficient(coefs, velocity, load)
+    fading, logarithm = fade_weight(velocity), speed_logarithm(coefs, velocity)
+    weight = fading * coefs.scale
+    drive = direction * weight * load * offset_coefficient_with(logarithm, coefs, velocity, load)
     stiffness = contact.tangential_stiffness - weight * load * slope_coefficient(coefs, velocity, load)
     advance = _relaxation(stiffness * dt / contact.tangential_damping)
     new_deflection = deflection + (drive - stiffness * deflection) * advance * dt / contact.tangential_damping
-    coefficient = faded_coefficient(coefs, velocity, direction * new_deflection, load)
+    u = direction * new_deflection
+    coefficient = fading * dynamic_coefficient_with(logarithm, coefs, velocity, u, load)
     return direction * coefficient * load, new_deflection, coefficient
 
 
@@ -59,7 +66,7 @@ def faded_coefficient(coefs, velocity, deflection_u, normal_force):
 @compiled
 def fade_weight(velocity):
     """Return 1 - exp(-(v/v_w)^2) for `velocity` in m/s."""
-    return -math.expm1(-((velocity / FADE_VELOCITY) ** 2))
+    return -expm1(-((velocity / FADE_VELOCITY) ** 2))
 
 
 @compiled
@@ -69,18 +76,15 @@ def normal_force_for(coefs, desired_force, velocity, deflection_u, start):
     The inverse of `faded_coefficient`: mu depends on F_N, so F_N = F / mu(F_N) is solved by fixed-point
     steps from `start` (the last value, N). mu counts at least `LOWEST_COEFFICIENT`. u in m.
     """
+    fading, logarithm = fade_weight(velocity), speed_logarithm(coefs, velocity)
     wanted = abs(desired_force)
     normal_force = start
     for _ in range(_DAMPED_STEPS):
-        coefficient = _dividing_coefficient(coefs, velocity, deflection_u, normal_force)
-        normal_force += _DAMPING * (wanted / coefficient - normal_force)
-    coefficient = _dividing_coefficient(coefs, velocity, deflection_u, normal_force)
+        mu = fading * dynamic_coefficient_with(logarithm, coefs, velocity, deflection_u, normal_force)
+        normal_force += _DAMPING * (wanted / max(mu, LOWEST_COEFFICIENT) - normal_force)
+    mu = fading * dynamic_coefficient_with(logarithm, coefs, velocity, deflection_u, normal_force)
+    coefficient = max(mu, LOWEST_COEFFICIENT)
     return wanted / coefficient, coefficient
-
-
-@compiled
-def _dividing_coefficient(coefs, velocity, deflection_u, normal_force):
-    return max(faded_coefficient(coefs, velocity, deflection_u, normal_force), LOWEST_COEFFICIENT)
 
 
 @compiled
@@ -88,4 +92,4 @@ def _relaxation(exponent):
     """Return (1 - exp(-z)) / z, which is 1 at z = 0."""
     if abs(exponent) < 1e-8:
         return 1.0 - 0.5 * exponent
-    return -math.expm1(-exponent) / exponent
+    return -expm1(-exponent) / exponent

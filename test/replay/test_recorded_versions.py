@@ -1,0 +1,31 @@
+"""A replay tells with which versions and on which processor the recording was made."""
+
+import pytest
+from rich.console import Console
+
+from mount_bringup.core.recording import record_core
+from mount_bringup.graph.supervisor import session_text
+from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from mount_bringup.replay.summary import print_replay, replay_figures
+from mount_bringup.versions import versions
+
+SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.1}
+
+
+@pytest.mark.parametrize(
+    ('others', 'sentence'),
+    [
+        ({}, 'made with the same versions on the same kind of processor'),
+        ({'processor': 'Z80'}, f'others than here: processor Z80 (here {versions()["processor"]})'),
+    ],
+)
+@pytest.mark.parametrize('mode', [CORE, LOCKSTEP])
+def test_the_replay_is_equal_and_says_where_the_recording_is_from(others, sentence, mode, domain, tmp_path):
+    content = {'parameters': {'mount_sim': SIM}, 'versions': {**versions(), **others}}
+    record_core(tmp_path / 'drive', {'mount_sim': SIM}, session_text(content))
+    outcome = replay(ReplayOrder(tmp_path / 'drive', mode, out=tmp_path / 'replay', domain=domain))
+    figures, console = replay_figures(outcome), Console(record=True, width=400)
+    print_replay(outcome, figures, console)
+    assert outcome.held
+    assert sentence in console.export_text()
+    assert figures['recorded_with'] == others

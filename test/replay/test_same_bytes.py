@@ -1,0 +1,106 @@
+"""The same bytes on every processor: drives, references and replays under emulated ones.
+
+Libraries choose among variants of the same function by the processor that they find. What they find can be
+set from outside, so one machine shows what others would do. Where a setting means nothing, as those of an
+x86-64 on an aarch64, the process is one more repetition.
+"""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+import mount_bags
+from mount_bags.compare import compare
+from mount_bags.comparison_words import differences
+from mount_bringup.versions import versions
+from mount_ros.topics import EVENT, SESSION, TOPICS
+
+FOLDER = Path(__file__).parents[2] / 'bags' / 'reference'
+REFERENCES = sorted(path.name for path in FOLDER.iterdir() if path.is_dir())
+LIMIT = 600.0  # s: only a hang takes so long; the first time a process compiles the laws for its processor
+DATA = [topic for topic in TOPICS if topic not in (SESSION, EVENT) and not topic.name.startswith('/')]
+
+NO_FEATURES = ' '.join(feature for feature in __cpu_dispatch__ if __cpu_features__[feature])
+NO_FMA = 'glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F,-FMA4'
+EMULATED = {
+    'Haswell': {'OPENBLAS_CORETYPE': 'Haswell'},
+    'SkylakeX': {'OPENBLAS_CORETYPE': 'SkylakeX'},
+    'Zen': {'OPENBLAS_CORETYPE': 'Zen'},
+    'Sandybridge without kernels of numpy': {
+        'OPENBLAS_CORETYPE': 'Sandybridge',
+        'NPY_DISABLE_CPU_FEATURES': NO_FEATURES,
+    },
+    'C library without FMA and AVX2': {'GLIBC_TUNABLES': NO_FMA},
+    'Prescott, nothing but the baseline': {
+        'OPENBLAS_CORETYPE': 'Prescott',
+        'GLIBC_TUNABLES': NO_FMA,
+        'NUMBA_CPU_NAME': 'generic',
+        'NPY_DISABLE_CPU_FEATURES': NO_FEATURES,
+    },
+}
+
+
+def made(folder: Path, emulation: dict[str, str], *recording: Path) -> dict[str, Any]:
+    """Return what a process with this processor says about what it made in `folder`."""
+    settings = {name for each in EMULATED.values() for name in each}
+    inherited = {name: value for name, value in os.environ.items() if name not in settings}
+    process = subprocess.run(
+        [sys.executable, Path(__file__).with_name('made_here.py'), folder, FOLDER, *recording],
+        env={**inherited, **emulation}, capture_output=True, text=True, timeout=LIMIT, check=False,
+    )  # fmt: skip
+    assert process.returncode == 0, process.stderr
+    return json.loads(process.stdout.splitlines()[-1])
+
+
+def differences_of(here: Path, there: Path) -> list[str]:
+    """Return which topics and numbers are other bytes in the second folder, and by how much."""
+    told = []
+    for path in ('drive', *(f'{name}/replay/recording' for name in REFERENCES)):
+        a, b = mount_bags.open(here / path), mount_bags.open(there / path)
+        changed = [topic for topic in DATA if topic.name in a and payloads(a, topic) != payloads(b, topic)]
+        if changed:
+            words = differences(compare(a, b, topics=changed))
+            told.append(f'{path}, {", ".join(topic.name for topic in changed)}: {"; ".join(words)}')
+    a, b = np.load(here / 'numbers.npz'), np.load(there / 'numbers.npz')
+    distances = {name: np.abs(a[name] - b[name]) for name in a if a[name].tobytes() != b[name].tobytes()}
+    return told + [f'{name}: up to {np.max(distance):.3g} apart' for name, distance in distances.items()]
+
+
+def payloads(recording, topic) -> list[bytes]:
+    return [bytes(payload) for payload in recording[topic.name].payloads]
+
+
+def unmet(said: dict[str, Any]) -> list[str]:
+    return [f'the replay of {name} is not what was recorded' for name, met in said['met'].items() if not met]
+
+
+def test_every_processor_makes_and_repeats_the_same_bytes(tmp_path):
+    plain = made(tmp_path / 'plain', {})
+    told, seen = unmet(plain), {}
+    for name, emulation in EMULATED.items():
+        said = made(tmp_path / name, emulation, tmp_path / 'plain' / 'drive')
+        found = [*differences_of(tmp_path / 'plain', tmp_path / name), *unmet(said)]
+        told += [f'{name}: {text}' for text in found]
+        seen[name] = said['seen']
+    assert not told, '\n'.join(told)
+    if platform.machine() == 'x86_64':
+        check_that_libraries_were_deceived(plain['seen'], seen)
+
+
+def check_that_libraries_were_deceived(plain: dict[str, Any], seen: dict[str, Any]) -> None:
+    """An emulation that changes nothing would prove nothing."""
+    baseline = seen['Prescott, nothing but the baseline']
+    assert baseline['numpy'] == []
+    assert baseline['numba'] == 'generic no fma'
+    if any('openblas' in each for each in plain['blas']):
+        kernels = {each for said in seen.values() for each in said['blas']}
+        assert len(kernels) >= 4, kernels  # for Zen it takes those of Haswell
+    if ' fma' in versions()['processor'] and versions()['c_library'].startswith('glibc'):
+        assert seen['C library without FMA and AVX2']['c_library'] != plain['c_library']
