@@ -45,7 +45,7 @@ def _project_version(repository: Path) -> str:
         return version
     try:
         described = subprocess.run(
-            ['git', '-C', str(repository), 'describe', '--always', '--dirty'],
+            ['git', '--no-optional-locks', '-C', str(repository), 'describe', '--always', '--dirty'],
             capture_output=True, text=True, timeout=10.0, check=True,
         )  # fmt: skip
     except (OSError, subprocess.SubprocessError):

@@ -52,7 +52,7 @@ def resample(
         )
     forces = np.arange(0.0, normal_force[-1], FORCE_STEP)
     return CurrentTable(
-        each_interpolated(forces, normal_force, current),
+        each_interpolated(forces, np.array(normal_force), np.array(current)),  # copies: one type to compile
         CurrentLimits(float(offset_current), float(highest_current)),
     )
 

@@ -199,6 +199,7 @@ def load_compiled_laws(specimen: Specimen) -> None:
     checked_current_for_force(law, float(checked_force(law, specimen.rest_current, middle)), middle)
     falling = np.linspace(1.0, 0.0, 50)
     find_crossing(falling[::-1], falling, 0.5)
+    mean(falling)
     standard_deviation(falling)
 
 
