@@ -70,8 +70,10 @@ class MountDriver(SafeLifecycleNode):
     def deactivate(self) -> None:
         exchange, self._exchange = self._exchange, None
         if exchange is not None:
-            self._path.leave_work()
-            exchange.stop()
+            try:
+                self._path.leave_work()
+            finally:
+                exchange.stop()
 
     def cleanup(self) -> None:
         self._codec = None

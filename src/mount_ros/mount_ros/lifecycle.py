@@ -25,6 +25,7 @@ class SafeLifecycleNode(LifecycleNode):
         self.data_path: DataPath | Collector | None = None
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
         self.after_configure: Callable[[], None] = _nothing  # what a process wants done then
+        self.after_failure: Callable[[], None] = _nothing  # and when a thread of the node has ended by itself
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
@@ -63,15 +64,22 @@ class SafeLifecycleNode(LifecycleNode):
 
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
-        path = DataPath(self, lockstep=self.lockstep, thread=self.data_thread)
+        thread = self.data_thread or DataThread(self.context, self.tell_failure)
+        path = DataPath(self, lockstep=self.lockstep, thread=thread)
         self.data_path = path
         return path
 
     def open_collector(self) -> Collector:
         """Create the data path of a node that takes all messages but answers none."""
-        collector = Collector(self, thread=self.data_thread if self.lockstep else None)
+        thread = self.data_thread if self.lockstep else None
+        collector = Collector(self, thread=thread, on_failure=self.tell_failure)
         self.data_path = collector
         return collector
+
+    def tell_failure(self, sentence: str) -> None:
+        """Say that a thread of the node has ended by itself; the process ends the node then."""
+        self.get_logger().fatal(sentence)
+        self.after_failure()
 
     def close(self) -> None:
         """Leave the active state and release everything; called once at the end of the process."""
@@ -146,9 +154,9 @@ class SafeLifecycleNode(LifecycleNode):
 
     def _release(self) -> None:
         self._make_safe(self.cleanup)
-        if self.data_path is not None:
-            self.data_path.stop()
-            self.data_path = None
+        path, self.data_path = self.data_path, None
+        if path is not None:
+            self._make_safe(path.stop)
 
     def _make_safe(self, step) -> None:
         try:
@@ -157,13 +165,19 @@ class SafeLifecycleNode(LifecycleNode):
             self.get_logger().error(f'{step.__name__} failed: {type(error).__name__}: {error}')
 
     def _present_verdict(self) -> Verdict:
-        verdict = self._verdict_without_matches()
-        unmatched = ', '.join(self.data_path.unmatched()) if self.data_path is not None else 'not configured'
+        path = self.data_path
+        verdict = self._verdict_without_path()
+        if path is not None and path.failure:
+            verdict = Verdict(Level.ERROR, f'0 A: {path.failure}', {**verdict.figures, 'fatal': True})
+        elif path is not None and path.refused and verdict.level is Level.OK:
+            sentence = f'errors in the data path ({path.refused}), the last: {path.refusal}'
+            verdict = Verdict(Level.WARN, sentence, verdict.figures)
+        unmatched = ', '.join(path.unmatched()) if path is not None else 'not configured'
         state = 'active' if self._active else 'inactive'
         figures = {**verdict.figures, 'state': state, 'unmatched': unmatched}
         return Verdict(verdict.level, verdict.sentence, figures)
 
-    def _verdict_without_matches(self) -> Verdict:
+    def _verdict_without_path(self) -> Verdict:
         if self._refusal:
             return Verdict(Level.ERROR, self._refusal)
         if not self._active:
