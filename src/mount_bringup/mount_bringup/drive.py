@@ -36,7 +36,7 @@ from mount_bringup.summary import (
     write_json,
 )
 from mount_models.quantity import with_flattened
-from mount_sim.diagnosis import FINISHED
+from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation import Excitation
 
 _FIRST_PORT = 43113  # UDP port of domain 0 without a namespace
@@ -91,7 +91,7 @@ def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[s
     folder = make_run_folder(order.out, order.scenario)
     complaints: list[str] = []
     if order.mode == 'core':
-        return folder, _drive_in_core(order, excitation, folder, console), complaints
+        return folder, _drive_in_core(order, excitation, folder, console, complaints), complaints
     return folder, _drive_graph(order, excitation, folder, console, complaints), complaints
 
 
@@ -171,6 +171,7 @@ def _drive_graph(
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
             _watch_drive(order, supervisor, limit, console)
             figures = supervisor.figures(SIM)
+            complaints += _beyond_range(int(figures['beyond_range']), float(figures['first_beyond_range_s']))
             if supervisor.figures(RECORDER).get('failed') == 'True':
                 supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
         finally:
@@ -211,7 +212,7 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
 
 
 def _drive_in_core(
-    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
 ) -> dict[str, Any]:
     with progress_bar(console) as progress:
         task = progress.add_task(f'driving ({order.scenario})', total=1.0)
@@ -224,6 +225,7 @@ def _drive_in_core(
             namespace=order.namespace,
             split=split_of(_recorder_parameters(order)),
         )
+    complaints += _beyond_range(outcome.beyond_range.samples, outcome.beyond_range.first)
     return {
         'scenario': order.scenario,
         'mode': order.mode,
@@ -233,6 +235,10 @@ def _drive_in_core(
         'latency_median_s': float('nan'),
         'latency_p99_s': float('nan'),
     }
+
+
+def _beyond_range(samples: int, first: float) -> list[str]:
+    return [beyond_range_sentence(samples, first)] if samples else []
 
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:

@@ -175,7 +175,10 @@ class PlantSimulation:
 
 @compiled
 def read(plant, state, truth, noise):
-    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` four numbers."""
+    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` four numbers.
+
+    The displacement is NaN where anything of the state is no finite number.
+    """
     law, now, seen = plant.view(_PLANT)[0], state.view(_STATE)[0], truth.view(TRUTH)[0]
     seen.displacement = now.displacement
     seen.velocity = now.velocity
@@ -193,9 +196,15 @@ def read(plant, state, truth, noise):
     seen.rest_gap = law.mechanics.rest_gap
     seen.contact_gap = law.mechanics.contact_gap
     seen.setpoint_latency = np.nan
-    return read_sensors(
-        law.electronics, law.coil, law.actuator, now.displacement, now.current, now.gap, noise
-    )
+    displacement = now.displacement if _finite(now) else np.nan
+    return read_sensors(law.electronics, law.coil, law.actuator, displacement, now.current, now.gap, noise)
+
+
+@compiled
+def _finite(now):
+    motion = now.displacement + now.velocity + now.chassis_acceleration + now.vehicle.wheel_height
+    forces = now.mount_force + now.friction_force + now.normal_force + now.deflection
+    return np.isfinite(motion + forces + now.current + now.gap)
 
 
 @compiled
