@@ -17,6 +17,7 @@ from mount_bringup.core.chain import chosen_damper, control_parameters
 from mount_bringup.core.run import CoreOutcome, run_core
 from mount_bringup.evaluation import Drive, switching, tracking_error
 from mount_bringup.mount_choice import with_control_of_mount
+from mount_control.controller import _STATE
 from mount_models.specimen import default_specimen
 from mount_ros import topics
 from mount_ros.scalars import ScalarsLayout
@@ -293,3 +294,21 @@ def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
     monkeypatch.setattr(core_run, 'build_excitation', poisoned)
     with pytest.raises(DivergedError, match=r'has diverged: at 3\.851 s not all of its state is a finite'):
         run_core({'mount_sim': BENCH}, lambda topic, raw, stamp: None)
+
+
+def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(monkeypatch):
+    take_many, poisoned = core_run._take_many, []
+
+    def take_many_and_poison(mount, chain, controller, samples, pending):
+        if mount.time > 5.0 and not poisoned:
+            controller.memory.state.view(_STATE)['band']['z1'] = np.nan
+            poisoned.append(mount.sample)
+        return take_many(mount, chain, controller, samples, pending)
+
+    monkeypatch.setattr(core_run, '_take_many', take_many_and_poison)
+    recorded = _run(BENCH)
+    trace = recorded[topics.CONTROL_TRACE]
+    place = recorded.stamps(topics.CONTROL_TRACE).tolist().index(poisoned[0] * 1_000_000)
+    assert recorded.outcome.control_faults == 1
+    assert trace['damping_active'][place - 1] == trace['damping_active'][-1] == 1.0
+    assert trace['damping_active'][place] == trace['current'][place] == 0.0

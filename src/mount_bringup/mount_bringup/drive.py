@@ -22,7 +22,7 @@ from mount_bringup.core.recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.ending_signals import ending_signals
 from mount_bringup.evaluation import Drive, load_drive
-from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor, session_text
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.preflight import preflight
@@ -35,6 +35,7 @@ from mount_bringup.summary import (
     summarise_snapshots,
     write_json,
 )
+from mount_control.diagnosis import fault_sentence
 from mount_models.quantity import with_flattened
 from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation import Excitation
@@ -172,6 +173,7 @@ def _drive_graph(
             _watch_drive(order, supervisor, limit, console)
             figures = supervisor.figures(SIM)
             complaints += _beyond_range(int(figures['beyond_range']), float(figures['first_beyond_range_s']))
+            complaints += _control_faults(int(supervisor.figures(CONTROL).get('faults', 0)))
             if supervisor.figures(RECORDER).get('failed') == 'True':
                 supervisor.notes.append(supervisor.figures(RECORDER)['sentence'])
         finally:
@@ -226,6 +228,7 @@ def _drive_in_core(
             split=split_of(_recorder_parameters(order)),
         )
     complaints += _beyond_range(outcome.beyond_range.samples, outcome.beyond_range.first)
+    complaints += _control_faults(outcome.control_faults)
     return {
         'scenario': order.scenario,
         'mode': order.mode,
@@ -239,6 +242,10 @@ def _drive_in_core(
 
 def _beyond_range(samples: int, first: float) -> list[str]:
     return [beyond_range_sentence(samples, first)] if samples else []
+
+
+def _control_faults(faults: int) -> list[str]:
+    return [fault_sentence(faults)] if faults else []
 
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:

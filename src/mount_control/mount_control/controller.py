@@ -1,5 +1,6 @@
 """From a displacement sample to a coil current: the control of Fig. 12 in reading order."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +47,7 @@ _STATE = np.dtype(
         ('displacement', 'f8'),
         ('deflection', 'f8'),
         ('normal_force', 'f8'),
+        ('faults', 'i8'),
     ]
 )
 
@@ -125,17 +127,22 @@ class Controller:
         """The intermediates of the last step as little-endian float64 numbers."""
         return self._trace.tobytes()
 
+    @property
+    def faults(self) -> int:
+        """How often the memory was found to hold something that is no finite number, and was cleared."""
+        return int(self._state.view(_STATE)['faults'][0])
+
     def restart(self, displacement: float) -> None:
         """Forget the past: a mount at rest at `displacement` (m), damping off."""
-        self._state[:] = 0
-        self._window[:] = 0.0
-        start(self._law, self._state, displacement)
+        start(self._law, self._state, self._window, displacement)
 
     def step(self, displacement: float, bridged_samples: int = 0) -> float:
         """Take one displacement sample in m and return the current setpoint in A.
 
         `bridged_samples` samples missing before it are replaced by a straight line. NaN and what lies
-        beyond `FARTHEST_DISPLACEMENT` are answered with 0 A and leave no trace in the memory.
+        beyond `FARTHEST_DISPLACEMENT` are answered with 0 A and leave no trace in the memory. Where the
+        memory itself holds what is no finite number, the answer is 0 A, it is cleared as by `restart`, and
+        that is counted in `faults`.
         """
         return step(
             self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
@@ -167,11 +174,18 @@ def load_compiled_law(
 
 
 @compiled
-def start(law, state, displacement):
-    """Set a cleared state to a mount at rest at `displacement` (m); arguments as for `step`."""
-    current_state = state.view(_STATE)[0]
-    band_pass.settle(law.view(_LAW)[0].band, current_state.band, displacement)
-    current_state.displacement = displacement
+def start(law, state, window, displacement):
+    """Set the memory to a mount at rest at `displacement` (m), damping off; arguments as for `step`."""
+    _rest(law.view(_LAW)[0], state.view(_STATE)[0], window, displacement)
+
+
+@compiled
+def _rest(law, state, window, displacement):
+    band_pass.settle(law.band, state.band, displacement)
+    switching.rest(state.switching, window)
+    state.displacement = displacement
+    state.deflection = 0.0
+    state.normal_force = 0.0
 
 
 @compiled
@@ -203,11 +217,32 @@ def run(law, tables, state, window, traces, displacements):
 def _step(law, tables, state, window, trace, displacement, bridged_samples):
     if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
         return _refuse(trace, displacement)
+    if not math.isfinite(_sum_of_memory(state)):
+        return _clear(law, state, window, trace, displacement)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
         _advance(law, tables, state, window, trace, state.displacement + rise)
     trace.bridged_samples = bridged_samples
-    return _advance(law, tables, state, window, trace, displacement)
+    current = _advance(law, tables, state, window, trace, displacement)
+    if not math.isfinite(_sum_of_memory(state) + trace.predicted_velocity + trace.desired_force + current):
+        return _clear(law, state, window, trace, displacement)
+    return current
+
+
+@compiled
+def _sum_of_memory(state):
+    """Return a sum that is a finite number only where all numbers of the memory are."""
+    band, magnitude = state.band, state.switching.magnitude
+    filters = band.z1 + band.z2 + band.displacement + state.displacement
+    return filters + magnitude + state.deflection + state.normal_force
+
+
+@compiled
+def _clear(law, state, window, trace, displacement):
+    """Begin afresh with a memory that was spoiled: whatever has done it, no current is made of it."""
+    _rest(law, state, window, displacement)
+    state.faults += 1
+    return _refuse(trace, displacement)
 
 
 @compiled

@@ -46,6 +46,7 @@ class MountControl(SafeLifecycleNode):
         self._stream = MeasurementStream()
         self._last_message: bytes | None = None
         self._table_refusal = ''
+        self._faults, self._last_fault = 0, 0  # of the controller, and the stamp (ns) of the last
         self._last_setpoint = (0, _OFF)  # stamp ns, A
         self._answering = threading.Lock()
 
@@ -85,6 +86,7 @@ class MountControl(SafeLifecycleNode):
         self._latency = LatencyHistogram()
         self._activation = gap_stamp
         self._table_refusal = ''
+        self._faults, self._last_fault = 0, 0
         self._heard = time.monotonic()
         self._controller = controller  # from here on samples are answered
         if self.lockstep and self._last_message is not None:
@@ -114,6 +116,8 @@ class MountControl(SafeLifecycleNode):
                 step_median=self._latency.quantile(0.5),
                 step_p99=self._latency.quantile(0.99),
                 last_stamp=self._stream.last,
+                faults=self._faults,
+                last_fault=self._last_fault,
             )
         )
 
@@ -165,6 +169,8 @@ class MountControl(SafeLifecycleNode):
         if judgement is Judgement.RESTART:
             controller.restart(displacement)
         self._publish_setpoint(stamp, controller.step(displacement, missing))
+        if controller.faults != self._faults:
+            self._faults, self._last_fault = controller.faults, stamp
         self._send_trace(self._trace.pack_record(stamp, controller.trace_bytes))
 
     def _table_is_outdated(self) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_control.controller import FARTHEST_DISPLACEMENT, TRACE, Controller
+from mount_control.controller import _STATE, FARTHEST_DISPLACEMENT, TRACE, Controller
 from mount_control.force_to_current import resample
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
@@ -211,3 +211,81 @@ def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, 
     assert int(traces['damping_active'].argmax()) == exceeded + 99
     assert ControlParameters(eigenfrequency=10.0).period_samples == 100
     assert damper_curve('viscous_2000').force(0.104) == pytest.approx(200.0)
+
+
+# What is no finite number inside the controller, however it came there.
+
+POISON = [
+    'band.z1',
+    'band.z2',
+    'band.displacement',
+    'switching.magnitude',
+    'displacement',
+    'deflection',
+    'normal_force',
+]
+
+
+def _poisoned(controller, name, value):
+    """Put `value` into a number of the memory, or into the whole window of the magnitude."""
+    memory = controller.memory
+    if name == 'window':
+        memory.window[:] = value
+        return
+    numbers = memory.state.view(_STATE)
+    for part in name.split('.'):
+        record, numbers = numbers, numbers[part]
+    record[part] = value
+
+
+def test_every_number_of_the_memory_is_among_those_that_are_poisoned():
+    def names(kind, prefix=''):
+        for name in kind.names:
+            yield from names(kind[name], f'{prefix}{name}.') if kind[name].names else [prefix + name]
+
+    whole = {'switching.place', 'switching.samples_above', 'switching.samples_below', 'switching.active'}
+    assert set(names(_STATE)) - whole - {'faults'} == set(POISON)
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize('bridged', [0, 3])
+@pytest.mark.parametrize('name', [*POISON, 'window'])
+def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(
+    make_controller, sine, name, value, bridged
+):
+    displacement = sine(8.0, 1e-3, 1.2)
+    controller, fresh = make_controller(), make_controller()
+    before = controller.run(displacement[:507])[-1]
+    assert before['damping_active'] == 1.0
+    assert before['current'] > 0.4935
+    _poisoned(controller, name, value)
+    assert controller.step(displacement[507], bridged) == 0.0
+    assert controller.faults == 1
+    assert controller.trace['damping_active'] == 0.0
+    assert controller.trace['current'] == controller.trace['normal_force'] == 0.0
+    assert math.isnan(controller.trace['magnitude'])
+    # from here on as a controller that has just begun
+    fresh.restart(displacement[507])
+    after = controller.run(displacement[508:])
+    assert _equal(after, fresh.run(displacement[508:]))
+    assert after[-1]['damping_active'] == 1.0
+    assert controller.faults == 1
+
+
+def test_what_leaves_the_window_is_noticed_where_it_is_no_number(make_controller, sine):
+    controller = make_controller()
+    controller.run(sine(8.0, 1e-3, 0.5))
+    state = controller.memory.state.view(_STATE)
+    controller.memory.window[state['switching']['place'][0]] = math.nan
+    assert controller.step(0.0) == 0.0
+    assert controller.faults == 1
+
+
+def test_a_table_or_a_law_that_is_no_number_never_becomes_a_current(make_controller, sine):
+    controller = make_controller()
+    controller.run(sine(8.0, 1e-3, 0.5))
+    controller.memory.tables.current[:] = math.nan
+    traces = controller.run(sine(8.0, 1e-3, 0.5))
+    assert (traces['current'] == 0.0).all()
+    assert (traces['damping_active'] == 0.0).all()
+    assert controller.faults > 0

@@ -10,7 +10,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from mount_control.controller import Controller
+from mount_control.controller import _STATE, Controller
 from mount_control.force_to_current import resample
 from mount_control.identified import identified
 from mount_control.node import MountControl
@@ -415,3 +415,38 @@ def test_missing_samples_are_bridged_and_counted(active, around, sine):
     verdict = control.judge()
     assert (verdict.figures['bridged'], verdict.level) == (199, Level.WARN)
     assert verdict.sentence.startswith('199 of 200 samples were missing and bridged')
+
+
+@pytest.mark.parametrize('name', ['band', 'deflection', 'normal_force'])
+def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(active, around, sine, name):
+    control = active()
+    assert _shake(around, sine)[-1][1] > 0.4
+    state = control._controller.memory.state.view(_STATE)
+    if name == 'band':
+        state['band']['z1'] = math.nan
+    else:
+        state[name] = math.nan
+    around.send(401, 0.0)
+    assert _answers(around, 401)[-1] == (401.0, 0.0)
+    wait_until(lambda: len(around.traces) == 401, 'the trace')
+    assert (around.traces[-1][1]['damping_active'], around.traces[-1][1]['current']) == (0.0, 0.0)
+    verdict = control.judge()
+    assert verdict.level is Level.ERROR
+    assert verdict.sentence.startswith(
+        'the controller held what is no finite number, once: damping'
+    )
+    assert verdict.figures['last_fault'] == ACTIVATION + 401 * MS
+    assert not verdict.figures['damping_active']
+    # and it works on
+    around.send(402, 0.0)
+    assert _answers(around, 402)[-1] == (402.0, 0.0)
+    assert control.judge().figures['faults'] == 1
+
+
+def test_a_table_that_asks_for_all_memory_is_refused_at_activation(configured, around):
+    control = configured()
+    around.send(0.0)
+    around.send_air_gap()
+    around.send_table(rows=[[0.47, 3.0], [0.0, 1e9]])
+    assert control.trigger_activate() == FAILURE
+    assert 'current_force_table ends at 1e+09 N (limit 10000 N)' in control._refusal

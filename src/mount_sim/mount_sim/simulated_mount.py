@@ -13,7 +13,6 @@ from mount_sim.electronics import Noise, Reading
 from mount_sim.excitation import Excitation
 from mount_sim.plant import Memory, Plant, PlantSimulation
 
-
 FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
 """Range of the displacement sensor to either side, m: that of its signal on the bus."""
 

@@ -61,7 +61,7 @@ def test_a_mount_beyond_the_range_of_its_sensor_is_a_warning_with_the_first_mome
     judged = _judged(beyond_range=BeyondRange(3, 3.25), lockstep=True)
     assert judged.level is Level.WARN
     assert judged.sentence == (
-        'the simulated mount moved beyond the 50 mm of its displacement sensor in 3 samples, first at 3.250 s; '
-        'they were sent as not valid and answered with 0 A: excite it less'
+        'the simulated mount moved beyond the 50 mm of its displacement sensor in 3 samples, first at '
+        '3.250 s; they were sent as not valid and answered with 0 A: excite it less'
     )
     assert (judged.figures['beyond_range'], judged.figures['first_beyond_range_s']) == (3, '3.250')

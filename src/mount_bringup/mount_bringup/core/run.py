@@ -34,6 +34,7 @@ class CoreOutcome:
     wall_time: float
     result: InitialisationResult | None
     beyond_range: BeyondRange
+    control_faults: int = 0  # times that the controller found its memory spoiled
 
 
 class Sink(Protocol):
@@ -101,6 +102,7 @@ def run_core_into(
         wall_time=time.monotonic() - begin,
         result=chain.result,
         beyond_range=mount.beyond_range,
+        control_faults=chain.controller.faults if chain.controller is not None else 0,
     )
 
 
