@@ -11,6 +11,7 @@ from mount_control.parameters import ControlParameters, checked_parameters
 from mount_models.compiled import compiled
 from mount_models.damper import DamperCurve, damper_force
 from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.coefficient_check import check_friction
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
 from mount_models.record import record_bytes, record_dtype
@@ -94,6 +95,7 @@ class Controller:
         table: force_to_current.CurrentTable,
     ):
         parameters = checked_parameters(parameters)
+        check_friction(friction, contact)
         law = Law(
             band_pass.design(
                 parameters.eigenfrequency, parameters.quality, parameters.lead_time, SAMPLE_TIME

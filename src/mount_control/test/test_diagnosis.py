@@ -79,6 +79,4 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
 def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
     judged = verdict(replace(GOOD, faults=2, damping_active=True))
     assert judged.level is Level.ERROR
-    assert judged.sentence.startswith(
-        'the controller held what is no finite number, 2 times: damping'
-    )
+    assert judged.sentence.startswith('the controller held what is no finite number, 2 times: damping')

@@ -432,9 +432,7 @@ def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(act
     assert (around.traces[-1][1]['damping_active'], around.traces[-1][1]['current']) == (0.0, 0.0)
     verdict = control.judge()
     assert verdict.level is Level.ERROR
-    assert verdict.sentence.startswith(
-        'the controller held what is no finite number, once: damping'
-    )
+    assert verdict.sentence.startswith('the controller held what is no finite number, once: damping')
     assert verdict.figures['last_fault'] == ACTIVATION + 401 * MS
     assert not verdict.figures['damping_active']
     # and it works on

@@ -46,7 +46,7 @@ class Plant(NamedTuple):
 
 _PLANT = record_dtype(Plant)
 
-_STATE = np.dtype(
+STATE = np.dtype(
     [
         ('vehicle', VEHICLE_STATE),
         ('engine', ENGINE_STATE),
@@ -73,6 +73,7 @@ _STATE = np.dtype(
         ),
     ]
 )
+"""What the plant remembers from step to step, SI."""
 
 TRUTH = np.dtype(
     [
@@ -120,10 +121,10 @@ class PlantSimulation:
         self._plant = record_bytes(plant)
         self._seat = int(seat)
         self._step_time = step_time
-        self._state = np.zeros(1, _STATE).view(np.uint8)
+        self._state = np.zeros(1, STATE).view(np.uint8)
         self._truth = np.zeros(1, TRUTH).view(np.uint8)
         self._truth_record = self._truth.view(TRUTH)[0]
-        self._state.view(_STATE)['gap'] = plant.mechanics.rest_gap
+        self._state.view(STATE)['gap'] = plant.mechanics.rest_gap
         self._account = new_account().view(np.uint8)
 
     @property
@@ -179,7 +180,7 @@ def read(plant, state, truth, noise):
 
     The displacement is NaN where anything of the state is no finite number.
     """
-    law, now, seen = plant.view(_PLANT)[0], state.view(_STATE)[0], truth.view(TRUTH)[0]
+    law, now, seen = plant.view(_PLANT)[0], state.view(STATE)[0], truth.view(TRUTH)[0]
     seen.displacement = now.displacement
     seen.velocity = now.velocity
     seen.coil_current = now.current
@@ -210,7 +211,7 @@ def _finite(now):
 @compiled
 def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
     """Advance the state by one step of `dt` s for each excitation value; see `PlantSimulation.advance`."""
-    law, now = plant.view(_PLANT)[0], state.view(_STATE)[0]
+    law, now = plant.view(_PLANT)[0], state.view(STATE)[0]
     now.wanted_current = wanted_current
     for index in range(len(values)):
         _advance_magnet(law, now, dt)
@@ -240,8 +241,8 @@ def advance_with_books(plant, state, account, values, engine_forces, wanted_curr
             law.vehicle,
             law.hydromount,
             law.contact,
-            before.view(_STATE)[0],
-            state.view(_STATE)[0],
+            before.view(STATE)[0],
+            state.view(STATE)[0],
             values[k],
             engine_forces[k],
             dt,

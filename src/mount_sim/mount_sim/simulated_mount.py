@@ -12,6 +12,7 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics import Noise, Reading
 from mount_sim.excitation import Excitation
 from mount_sim.plant import Memory, Plant, PlantSimulation
+from mount_sim.plant_check import checked_plant
 
 FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
 """Range of the displacement sensor to either side, m: that of its signal on the bus."""
@@ -66,6 +67,7 @@ class SimulatedMount:
 
     def __init__(self, plant: Plant, excitation: Excitation, seed: int):
         self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
+        checked_plant(plant, excitation.seat, excitation.step_time)
         self._noise = Noise(seed)
         self._steps = round(SAMPLE_TIME / excitation.step_time)
         self._patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
