@@ -1,42 +1,9 @@
-"""Marks in a recording: "here is something worth finding again", one YAML text each on the topic `event`."""
-
-from typing import NamedTuple
-
-import yaml
+"""The marks in a recording, and what "now" is where they are set."""
 
 from mount_bags.series import Series
+from mount_ros.event_message import Mark, read_mark
 
-BY_HAND = 'mark'  # kind of a mark that a person set
 _HOUR = 3_600_000_000_000  # ns
-
-
-class Mark(NamedTuple):
-    """What happened when: `time` in ns on the clock of the stamps, one word, one sentence."""
-
-    time: int
-    kind: str
-    text: str = ''
-
-
-def mark_text(mark: Mark) -> str:
-    """Return the text of the message."""
-    return yaml.safe_dump(mark._asdict(), sort_keys=False, allow_unicode=True, width=1 << 20)
-
-
-def read_mark(text: str, received: int) -> Mark:
-    """Return the mark that a message holds; what is not told is `received` (ns), `mark` and the whole text.
-
-    So anybody may publish a plain sentence on `event`.
-    """
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError:
-        content = None
-    if not isinstance(content, dict):
-        return Mark(received, BY_HAND, text.strip())
-    told = content.get('time')
-    time = told if isinstance(told, int) and not isinstance(told, bool) else received
-    return Mark(time, str(content.get('kind', BY_HAND)), str(content.get('text', '')))
 
 
 def read_marks(events: Series) -> list[Mark]:

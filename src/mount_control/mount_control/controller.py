@@ -17,6 +17,9 @@ from mount_models.friction.simplified import normal_force_for, simplified_step
 from mount_models.record import record_bytes, record_dtype
 from mount_models.sampling import SAMPLE_TIME
 
+FADE_SAMPLES = 50
+"""Samples (chosen, 50 ms) in which the current goes over to a new law: first it stands for a sample, and its
+distance from what the new law asks for then falls evenly to zero."""
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 
 TRACE = np.dtype(
@@ -48,6 +51,9 @@ _STATE = np.dtype(
         ('displacement', 'f8'),
         ('deflection', 'f8'),
         ('normal_force', 'f8'),
+        ('current', 'f8'),
+        ('distance', 'f8'),
+        ('fading', 'i8'),
         ('faults', 'i8'),
     ]
 )
@@ -83,8 +89,8 @@ class Memory(NamedTuple):
     window: NDArray[np.float64]
 
 
-class Controller:
-    """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
+class ControlLaw:
+    """All that a control step needs and does not change, checked: made beforehand, taken between steps."""
 
     def __init__(
         self,
@@ -106,12 +112,27 @@ class Controller:
             contact,
             table.limits,
         )
-        self._law = record_bytes(law)
-        self._tables = Tables(damper.table, table.currents)
+        self.record = record_bytes(law)
+        self.tables = Tables(damper.table, table.currents)
+        self.window = np.zeros(parameters.period_samples)
+
+
+class Controller:
+    """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
+
+    def __init__(
+        self,
+        parameters: ControlParameters,
+        damper: DamperCurve,
+        friction: FrictionCoefficients,
+        contact: FrictionContact,
+        table: force_to_current.CurrentTable,
+    ):
+        law = ControlLaw(parameters, damper, friction, contact, table)
+        self._law, self._tables, self._window = law.record, law.tables, law.window
         self._state = np.zeros(1, _STATE).view(np.uint8)
         self._trace = np.zeros(1, TRACE).view(np.uint8)
         self._trace_record = self._trace.view(TRACE)[0]
-        self._window = np.zeros(parameters.period_samples)
         self.restart(0.0)
 
     @property
@@ -137,6 +158,15 @@ class Controller:
     def restart(self, displacement: float) -> None:
         """Forget the past: a mount at rest at `displacement` (m), damping off."""
         start(self._law, self._state, self._window, displacement)
+
+    def change(self, law: ControlLaw) -> None:
+        """Go on with another law, from the next sample on and without a jump; a law is taken once.
+
+        The band-pass goes on from the same last samples, magnitude and switching keep their past, and where
+        damping is on the current goes over to what the new law asks for within `FADE_SAMPLES`.
+        """
+        transfer(self._law, law.record, self._state, self._window, law.window)
+        self._law, self._tables, self._window = law.record, law.tables, law.window
 
     def step(self, displacement: float, bridged_samples: int = 0) -> float:
         """Take one displacement sample in m and return the current setpoint in A.
@@ -172,7 +202,18 @@ def load_compiled_law(
 ) -> None:
     """Run the compiled law once, so that the first sample need not wait for the compiler."""
     table = force_to_current.resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
-    Controller(parameters, damper, friction, contact, table).step(0.0)
+    controller = Controller(parameters, damper, friction, contact, table)
+    controller.step(0.0)
+    controller.change(ControlLaw(parameters, damper, friction, contact, table))
+
+
+@compiled
+def transfer(law, new_law, state, window, new_window):
+    """Make the memory of one law that of a new one; arguments are the bytes of records and two windows."""
+    memory = state.view(_STATE)[0]
+    band_pass.transfer(law.view(_LAW)[0].band, new_law.view(_LAW)[0].band, memory.band)
+    switching.transfer(memory.switching, window, new_window)
+    memory.fading = FADE_SAMPLES if memory.switching.active == 1 else 0
 
 
 @compiled
@@ -188,6 +229,9 @@ def _rest(law, state, window, displacement):
     state.displacement = displacement
     state.deflection = 0.0
     state.normal_force = 0.0
+    state.current = 0.0
+    state.fading = 0
+    state.distance = 0.0
 
 
 @compiled
@@ -235,8 +279,9 @@ def _step(law, tables, state, window, trace, displacement, bridged_samples):
 def _sum_of_memory(state):
     """Return a sum that is a finite number only where all numbers of the memory are."""
     band, magnitude = state.band, state.switching.magnitude
-    filters = band.z1 + band.z2 + band.displacement + state.displacement
-    return filters + magnitude + state.deflection + state.normal_force
+    filters = band.z1 + band.z2 + band.displacement + band.earlier + state.displacement
+    answer = state.normal_force + state.current + state.distance
+    return filters + magnitude + state.deflection + answer
 
 
 @compiled
@@ -278,9 +323,11 @@ def _advance(law, tables, state, window, trace, displacement):
     if active == 1:
         desired = damper_force(tables.damper, law.damper_step, predicted)
         force, coefficient = _normal_force(law, tables, state, desired, predicted)
-        current = force_to_current.current_for(tables.current, law.limits, force)
+        current = _faded(law, state, force_to_current.current_for(tables.current, law.limits, force))
     else:
         force = 0.0
+        state.fading = 0
+    state.current = current
     _, state.deflection, _ = simplified_step(
         law.contact, law.friction, state.deflection, predicted, force, law.band.sample_time
     )
@@ -297,6 +344,18 @@ def _advance(law, tables, state, window, trace, displacement):
     trace.normal_force = force
     trace.current = current
     return current
+
+
+@compiled
+def _faded(law, state, wanted):
+    """Return the current (A) instead of the `wanted` one, beside it for a while after a change of the law."""
+    if state.fading == 0:
+        return wanted
+    if state.fading == FADE_SAMPLES:
+        state.distance = state.current - wanted
+    current = wanted + state.distance * state.fading / FADE_SAMPLES
+    state.fading -= 1
+    return min(max(current, law.limits.offset_current), law.limits.highest_current)
 
 
 @compiled

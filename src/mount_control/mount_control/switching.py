@@ -49,6 +49,18 @@ def rest(state, window):
 
 
 @compiled
+def transfer(state, window, new_window):
+    """Carry the newest of the `window` over to the `new_window` of another period; damping stays as it is."""
+    period, new_period = len(window), len(new_window)
+    kept = min(period, new_period)
+    new_window[:] = 0.0
+    for age in range(1, kept + 1):
+        new_window[kept - age] = window[(state.place - age) % period]
+    state.place = kept % new_period
+    state.magnitude = new_window.max()
+
+
+@compiled
 def step(switching, state, window, band_displacement):
     """Take one sample; return (magnitude m, damping active 0 or 1).
 

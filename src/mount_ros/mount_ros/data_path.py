@@ -79,7 +79,8 @@ class DataPath:
     def publisher(self, topic: Topic) -> Publisher:
         """Create a publisher of `topic`."""
         publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
-        self._publishers.append(publisher)
+        if topic.delivery is not Delivery.MARK:  # a mark that nobody hears is no loss
+            self._publishers.append(publisher)
         return publisher
 
     def sender(self, topic: Topic) -> Callable[[bytes], None]:

@@ -1,13 +1,15 @@
 """A lifecycle node that fails closed: every error ends in the safe state, with a sentence that says why."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mount_ros.collector import Collector
 from mount_ros.data_path import DataPath, DataThread
 from mount_ros.diagnostics import Diagnostics, Level, Verdict
+from mount_ros.parameter_gate import Change, ParameterGate
 from mount_ros.scheduling import calm_resending
 
 
@@ -17,10 +19,16 @@ class SafeLifecycleNode(LifecycleNode):
     A node overrides `configure`, `activate`, `deactivate`, `cleanup` and `judge`; it raises an
     exception with a clear sentence where a step cannot be done. `deactivate` must leave the coil at
     0 A and is called on every way out of the active state.
+
+    Once it is configured its parameters stand still, except those in `run_time_parameters`.
     """
+
+    run_time_parameters: frozenset[str] = frozenset()
+    """Names of the parameters that can be set on the configured node: `check_parameters`, `take_changes`."""
 
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
+        self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
         self._lockstep = bool(self.declare_parameter('lockstep', False).value)
         self.data_path: DataPath | Collector | None = None
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
@@ -45,6 +53,12 @@ class SafeLifecycleNode(LifecycleNode):
 
     def cleanup(self) -> None:
         """Release what `configure` made."""
+
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        """Raise a `ValueError` if the configured node could not go on with these values, {name: value}."""
+
+    def take_changes(self, changes: Mapping[str, Change]) -> None:
+        """Go on with the parameters as they are now; `changes` were set while the node was configured."""
 
     def judge(self) -> Verdict:
         """Return the verdict on the active node; must be quick and must not block."""
@@ -99,6 +113,8 @@ class SafeLifecycleNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._lockstep = bool(self.get_parameter('lockstep').value)
         outcome = self._attempt('configure', self.configure, undo=self._release)
+        if outcome == TransitionCallbackReturn.SUCCESS:
+            self._gate.close()
         self.after_configure()
         return outcome
 
@@ -153,6 +169,7 @@ class SafeLifecycleNode(LifecycleNode):
         self._make_safe(self.deactivate)
 
     def _release(self) -> None:
+        self._gate.open()
         self._make_safe(self.cleanup)
         path, self.data_path = self.data_path, None
         if path is not None:

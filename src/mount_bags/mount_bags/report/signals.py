@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.event_marks import Mark, read_marks
+from mount_bags.event_marks import read_marks
 from mount_bags.origin import short_name
 from mount_bags.reading import ReadingError, Recording
 from mount_bags.report.chart import Array
 from mount_bags.series import Series, SeriesError
 from mount_bags.session_differences import session_text
 from mount_bags.switching_changes import switching_times
+from mount_ros.event_message import Mark
 from mount_ros.topics import (
     COIL_RIPPLE,
     CONTROL_TRACE,

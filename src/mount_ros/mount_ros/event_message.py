@@ -1,0 +1,72 @@
+"""The text of a message on `event`: "here is something worth finding again", in YAML."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import yaml
+
+BY_HAND = 'mark'  # kind of a mark that a person set
+PARAMETER = 'parameter'  # kind of a mark where parameters of a node at work were changed
+
+
+class Mark(NamedTuple):
+    """What happened when: `time` in ns on the clock of the stamps, one word, one sentence."""
+
+    time: int
+    kind: str
+    text: str = ''
+
+
+class ParametersChanged(NamedTuple):
+    """From the sample of `time` (ns) on `node` works with `values`, {parameter: value}."""
+
+    time: int
+    node: str
+    values: Mapping[str, Any]
+
+
+def mark_text(mark: Mark) -> str:
+    """Return the text of the message."""
+    return _text(mark._asdict())
+
+
+def read_mark(text: str, received: int) -> Mark:
+    """Return the mark that a message holds; what is not told is `received` (ns), `mark` and the whole text.
+
+    So anybody may publish a plain sentence on `event`.
+    """
+    content = _content(text)
+    if content is None:
+        return Mark(received, BY_HAND, text.strip())
+    told = content.get('time')
+    time = told if type(told) is int else received
+    return Mark(time, str(content.get('kind', BY_HAND)), str(content.get('text', '')))
+
+
+def change_text(time: int, node: str, changes: Mapping[str, tuple[Any, Any]]) -> str:
+    """Return the text on parameters {name: (old, new)} that `node` works with from stamp `time` (ns) on."""
+    told = ', '.join(f'{name} from {old} to {new}' for name, (old, new) in changes.items())
+    values = {name: new for name, (_, new) in changes.items()}
+    mark = Mark(time, PARAMETER, f'{node}: {told}')
+    return _text({**mark._asdict(), 'node': node, 'values': values})
+
+
+def read_change(text: str) -> ParametersChanged | None:
+    """Return the change of parameters that a message tells of, or None."""
+    content = _content(text) or {}
+    time, node, values = content.get('time'), content.get('node'), content.get('values')
+    if content.get('kind') != PARAMETER or not isinstance(values, dict) or not isinstance(node, str):
+        return None
+    return ParametersChanged(time, node, values) if type(time) is int else None
+
+
+def _text(content: Mapping[str, Any]) -> str:
+    return yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True, width=1 << 20)
+
+
+def _content(text: str) -> dict[str, Any] | None:
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError:
+        content = None
+    return content if isinstance(content, dict) else None
