@@ -21,6 +21,8 @@ class ControlFigures:
     last_stamp: int | None  # ns
     faults: int = 0  # times that the controller's memory held what is no finite number
     last_fault: int = 0  # stamp of the last such sample, ns
+    damper: str = ''
+    parameter_changes: int = 0  # since the node was configured
 
 
 def verdict(figures: ControlFigures) -> Verdict:
@@ -38,6 +40,8 @@ def verdict(figures: ControlFigures) -> Verdict:
         'step_median_us': f'{1e6 * figures.step_median:.0f}',
         'step_p99_us': f'{1e6 * figures.step_p99:.0f}',
         'last_stamp': figures.last_stamp,
+        'damper': figures.damper,
+        'parameter_changes': figures.parameter_changes,
     }
     level, sentence = _judgement(figures)
     return Verdict(level, sentence, values)
