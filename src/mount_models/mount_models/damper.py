@@ -154,7 +154,7 @@ DAMPERS: dict[str, Any] = {
 
 _KNOWN = (
     f'{", ".join(DAMPERS)}, viscous_<N s/m>, a law such as {{law: viscous, dead_zone: 0.002}}, points '
-    f'{{{COLUMNS[0]}: [m/s ...], {COLUMNS[1]}: [N ...]}}, or a file of points ({", ".join(FILE_ENDINGS)})'
+    f'{{{COLUMNS[0]}: [0, 0.1], {COLUMNS[1]}: [0, 200]}}, or a file of points ({", ".join(FILE_ENDINGS)})'
 )
 
 
