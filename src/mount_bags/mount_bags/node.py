@@ -40,6 +40,8 @@ _PLACES = {
 class MountRecorder(SafeLifecycleNode):
     """Receives from `configure` on, records from `activate` to `deactivate`."""
 
+    run_time_parameters = frozenset({'mark_text'})
+
     def __init__(self, name: str = NAME, **arguments):
         super().__init__(name, **arguments)
         for parameter, (default, meaning) in _PLACES.items():

@@ -131,6 +131,7 @@ class Controller:
         law = ControlLaw(parameters, damper, friction, contact, table)
         self._law, self._tables, self._window = law.record, law.tables, law.window
         self._state = np.zeros(1, _STATE).view(np.uint8)
+        self._state_record = self._state.view(_STATE)[0]
         self._trace = np.zeros(1, TRACE).view(np.uint8)
         self._trace_record = self._trace.view(TRACE)[0]
         self.restart(0.0)
@@ -153,7 +154,7 @@ class Controller:
     @property
     def faults(self) -> int:
         """How often the memory was found to hold something that is no finite number, and was cleared."""
-        return int(self._state.view(_STATE)['faults'][0])
+        return int(self._state_record['faults'])
 
     def restart(self, displacement: float) -> None:
         """Forget the past: a mount at rest at `displacement` (m), damping off."""

@@ -1,5 +1,6 @@
 """ROS 2 node of the controller: a displacement message arrives, a setpoint leaves."""
 
+import contextlib
 import threading
 import time
 from collections import deque
@@ -16,7 +17,7 @@ from mount_control.force_to_current import ForceTableError, resample
 from mount_control.identified import check_fits
 from mount_control.parameters import RUN_TIME, ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
-from mount_models.damper import DamperCurve, damper_curve, damper_text
+from mount_models.damper import DamperError, damper_curve, damper_text
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import with_flattened
@@ -51,6 +52,7 @@ class MountControl(SafeLifecycleNode):
         self.declare_parameter('damper', 'viscous_2000')
         self.declare_parameter('parameters_file', '')
         self.declare_parameter('specimen', '')
+        self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)
         self._controller: Controller | None = None
         self._table: ForceTable | None = None
@@ -74,10 +76,9 @@ class MountControl(SafeLifecycleNode):
         self._of_specimen.give(FrictionContact(), 'contact', specimen.friction)
         self._friction = read(self, FrictionCoefficients(), 'friction')
         self._contact = read(self, FrictionContact(), 'contact')
-        self._damper = self._chosen_damper()
+        self.set_parameters([self.get_parameter('damper')])  # with the points of a file, see _spelled_out
+        self._damper = damper_curve(self.get_parameter('damper').value)
         self._parameter_changes = 0
-        if self._damper_text != self.get_parameter('damper').value:  # then the session keeps the points
-            self.set_parameters([Parameter('damper', value=self._damper_text)])
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._trace = ScalarsLayout(topics.CONTROL_TRACE)
@@ -130,9 +131,7 @@ class MountControl(SafeLifecycleNode):
 
     def take_changes(self, changes: Mapping[str, Change]) -> None:
         self._settings = checked_parameters(read(self, ControlParameters()))
-        self._damper = self._chosen_damper()
-        if 'damper' in changes:  # told as what it is, also where it came from a file
-            changes = {**changes, 'damper': Change(changes['damper'].old, self._damper_text)}
+        self._damper = damper_curve(self.get_parameter('damper').value)
         self._parameter_changes += len(changes)
         text = change_text(self.get_name(), changes)
         if self._controller is None:
@@ -156,7 +155,7 @@ class MountControl(SafeLifecycleNode):
                 last_stamp=self._stream.last,
                 faults=self._faults,
                 last_fault=self._last_fault,
-                damper=self._damper_text,
+                damper=self.get_parameter('damper').value,
                 parameter_changes=self._parameter_changes,
             )
         )
@@ -228,11 +227,6 @@ class MountControl(SafeLifecycleNode):
     def _tell(self, stamp: int, text: str) -> None:
         self._send_event(serialised(String(data=dated(stamp, text))))
 
-    def _chosen_damper(self) -> DamperCurve:
-        """Return the characteristic; a file is read once, and its points are what is told from then on."""
-        self._damper_text = damper_text(str(self.get_parameter('damper').value))
-        return damper_curve(self._damper_text)
-
     def _table_is_outdated(self) -> bool:
         if not self._table_refusal and not self._stream.holds(self._activation):
             self._table_refusal = (
@@ -261,6 +255,20 @@ class MountControl(SafeLifecycleNode):
         except ForceTableMessageError as error:
             self._table = None
             self.get_logger().error(str(error))
+
+
+def _spelled_out(parameters: list[Parameter]) -> list[Parameter]:
+    """Return parameters about to be set with the points of a damper's file instead of its path.
+
+    So it is read once, and event and session hold what it said. What cannot be read is refused afterwards.
+    """
+    spelled = []
+    for parameter in parameters:
+        if parameter.name == 'damper' and isinstance(parameter.value, str):
+            with contextlib.suppress(DamperError):
+                parameter = Parameter('damper', value=damper_text(parameter.value))
+        spelled.append(parameter)
+    return spelled
 
 
 def main() -> None:

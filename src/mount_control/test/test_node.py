@@ -576,3 +576,11 @@ def test_a_damper_file_is_in_the_parameters_with_its_points(make_control, tmp_pa
     kept = control.get_parameter('damper').value
     assert kept == '{velocity: [0.0, 0.004, 0.1], force: [0.0, 0.0, 200.0]}'
     np.testing.assert_array_equal(control._damper.table, damper_curve(str(file)).table)
+    # at run time too, and the file is not asked for again
+    assert _set(control, damper='viscous_1000') == []
+    file.write_text('velocity,force\n0,0\n0.1,100\n')
+    assert _set(control, damper=str(file)) == []
+    assert control.get_parameter('damper').value == '{velocity: [0.0, 0.1], force: [0.0, 100.0]}'
+    file.unlink()
+    assert _set(control, quality=0.8) == []
+    assert control._damper.force(0.1) == pytest.approx(100.0)

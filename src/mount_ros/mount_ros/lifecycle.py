@@ -185,7 +185,7 @@ class SafeLifecycleNode(LifecycleNode):
         path = self.data_path
         verdict = self._verdict_without_path()
         if path is not None and path.failure:
-            verdict = Verdict(Level.ERROR, f'0 A: {path.failure}', {**verdict.figures, 'fatal': True})
+            verdict = Verdict(Level.ERROR, path.failure, {**verdict.figures, 'fatal': True})
         elif path is not None and path.refused and verdict.level is Level.OK:
             sentence = f'errors in the data path ({path.refused}), the last: {path.refusal}'
             verdict = Verdict(Level.WARN, sentence, verdict.figures)

@@ -261,7 +261,7 @@ def test_a_data_thread_that_has_ended_is_an_error_whatever_the_node_thinks_of_it
     probe.data_path.attend(collapse)
     assert told.wait(LIMIT)
     sentence = 'the data thread has ended: SystemExit: out of order'
-    wait_until(lambda: operator.heard(Level.ERROR, f'0 A: {sentence}'), 'the sentence in the diagnostics')
+    wait_until(lambda: operator.heard(Level.ERROR, sentence), 'the sentence in the diagnostics')
     assert sentence in capfd.readouterr().err
     assert any(value.key == 'fatal' and value.value == 'True' for value in operator.said[-1].values)
     assert operator.change(DEACTIVATE)
