@@ -12,14 +12,18 @@ import pytest
 from numpy.typing import NDArray
 
 from mount_bringup.core import chain as core_chain
+from mount_bringup.core import run as core_run
 from mount_bringup.core.chain import chosen_damper, control_parameters
 from mount_bringup.core.run import CoreOutcome, run_core
 from mount_bringup.evaluation import Drive, switching, tracking_error
 from mount_bringup.mount_choice import with_control_of_mount
+from mount_control.controller import _STATE
 from mount_models.specimen import default_specimen
 from mount_ros import topics
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import Topic
+from mount_sim.scenario import build_excitation
+from mount_sim.simulated_mount import DivergedError
 
 PERIOD = 0.125  # s, of 8 Hz
 BENCH = {
@@ -264,3 +268,47 @@ def test_with_noise_the_gaps_of_20_seeds_stay_within_their_targets():
     results = [_initialisation(electronics__ripple_noise=0.01, seed=seed) for seed in range(20)]
     assert max(abs(result.rest_gap - 508e-6) for result in results) <= 4e-6
     assert max(abs(result.contact_gap - 349e-6) for result in results) <= 2e-6
+
+
+def test_a_mount_beyond_the_range_of_its_sensor_is_told_and_answered_with_0_ampere():
+    """An engine that shakes at its eigenfrequency; the sensor reaches 50 mm to either side."""
+    shaking = {'idle.amplitude': 2000.0, 'idle.frequency': 8.0, 'electronics.displacement_noise': 0.0}
+    sim = {**BENCH, 'scenario': 'motorway', 'timeline.duration': 3.0, **shaking}
+    recorded = _run(sim, {'displacement_range': 0.1, **UNREACHABLE})
+    displacement, setpoint = recorded[topics.DISPLACEMENT]['mount'], recorded[topics.CURRENT_SETPOINT]
+    invalid = np.isnan(displacement)
+    first = recorded.stamps(topics.DISPLACEMENT)[invalid][0] / 1e9
+    assert 0 < recorded.outcome.beyond_range.samples == invalid.sum() < len(invalid)
+    assert recorded.outcome.beyond_range.first == pytest.approx(first)
+    assert (setpoint['coil_current'][: len(invalid)][invalid] == 0.0).all()
+    beyond = np.abs(recorded[topics.SIM_TRUTH]['displacement']) > 0.05
+    np.testing.assert_array_equal(beyond, invalid)
+
+
+def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
+    def poisoned(parameters):
+        excitation = build_excitation(parameters)
+        excitation.values[21_000] = np.nan
+        return excitation
+
+    monkeypatch.setattr(core_run, 'build_excitation', poisoned)
+    with pytest.raises(DivergedError, match=r'has diverged: at 3\.851 s not all of its state is a finite'):
+        run_core({'mount_sim': BENCH}, lambda topic, raw, stamp: None)
+
+
+def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(monkeypatch):
+    take_many, poisoned = core_run._take_many, []
+
+    def take_many_and_poison(mount, chain, controller, samples, pending):
+        if mount.time > 5.0 and not poisoned:
+            controller.memory.state.view(_STATE)['band']['z1'] = np.nan
+            poisoned.append(mount.sample)
+        return take_many(mount, chain, controller, samples, pending)
+
+    monkeypatch.setattr(core_run, '_take_many', take_many_and_poison)
+    recorded = _run(BENCH)
+    trace = recorded[topics.CONTROL_TRACE]
+    place = recorded.stamps(topics.CONTROL_TRACE).tolist().index(poisoned[0] * 1_000_000)
+    assert recorded.outcome.control_faults == 1
+    assert trace['damping_active'][place - 1] == trace['damping_active'][-1] == 1.0
+    assert trace['damping_active'][place] == trace['current'][place] == 0.0

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable
 from enum import Enum
 from typing import Any
 
-from mount_bags.event_marks import Mark
 from mount_bags.stamps import StampWatch
+from mount_ros.event_message import Mark
 
 BURST = 10  # marks, chosen: so many of a kind in a row ...
 REFILL = 2.0  # s, chosen: ... and then one in this time, so that a broken stream does not flood

@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 
 from mount_bags.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
 from mount_bags.diagnosis import OnFull, RecorderState, judge, unobserved_sentence
-from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time
+from mount_bags.event_marks import present_time
 from mount_bags.offered_qos import OfferedQos
 from mount_bags.recorder_parameters import RecorderParameters, split_of
 from mount_bags.recording import Recorder
@@ -23,6 +23,7 @@ from mount_bags.writer import BagWriter, RecordingError
 from mount_ros.cdr import serialised
 from mount_ros.collector import Collector
 from mount_ros.diagnostics import Verdict
+from mount_ros.event_message import BY_HAND, Mark, mark_text
 from mount_ros.lifecycle import SafeLifecycleNode
 from mount_ros.parameters import declare, read
 from mount_ros.process import run_node
@@ -38,6 +39,8 @@ _PLACES = {
 
 class MountRecorder(SafeLifecycleNode):
     """Receives from `configure` on, records from `activate` to `deactivate`."""
+
+    run_time_parameters = frozenset({'mark_text'})
 
     def __init__(self, name: str = NAME, **arguments):
         super().__init__(name, **arguments)

@@ -18,7 +18,7 @@ from mount_bags.automatic_marks import (
     mark_kinds,
 )
 from mount_bags.diagnosis import OnFull, RecorderState, judge
-from mount_bags.event_marks import BY_HAND, Mark, mark_text, present_time, read_mark
+from mount_bags.event_marks import present_time
 from mount_bags.reading import open_recording
 from mount_bags.recording import Recorder
 from mount_bags.stamps import StampWatch
@@ -26,6 +26,7 @@ from mount_bags.watching import watch_topic
 from mount_bags.writer import BagWriter
 from mount_ros.cdr import serialised
 from mount_ros.diagnostics import Level
+from mount_ros.event_message import BY_HAND, Mark, mark_text, read_mark
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS
 

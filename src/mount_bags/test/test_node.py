@@ -230,9 +230,11 @@ def marks_of(folder):
 def test_marks_by_service_by_others_and_by_itself_are_recorded(make_recorder, source, context, tmp_path):
     publisher = source.publisher(DISPLACEMENT)
     others = source.node.create_publisher(String, EVENT.name, publisher_qos(EVENT))
-    recorder = make_recorder(topics=['displacement', 'event'], mark_text='a bump')
+    recorder = make_recorder(topics=['displacement', 'event'], mark_text='a dent')
     recorder.trigger_configure()
     recorder.trigger_activate()
+    assert recorder.set_parameters([Parameter('mark_text', value='a bump')])[0].successful
+    assert not recorder.set_parameters([Parameter('uri', value='elsewhere')])[0].successful
     wait_until(lambda: publisher.get_subscription_count() and others.get_subscription_count(), 'matched')
     wait_until(lambda: recorder.judge().figures['publishers./event'] == 2, 'matched by recorder')
     executor = SingleThreadedExecutor(context=context)

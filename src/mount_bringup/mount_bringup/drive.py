@@ -23,7 +23,7 @@ from mount_bringup.core.recording import record_core
 from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
 from mount_bringup.ending_signals import ending_signals
 from mount_bringup.evaluation import Drive, load_drive, samples_at_the_ends
-from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor, session_text
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.preflight import preflight
@@ -39,8 +39,9 @@ from mount_bringup.summary import (
 )
 from mount_bringup.terminal import note
 from mount_bringup.versions import versions
+from mount_control.diagnosis import fault_sentence
 from mount_models.quantity import with_flattened
-from mount_sim.diagnosis import FINISHED
+from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation import Excitation
 
 _FIRST_PORT = 43113  # UDP port of domain 0 without a namespace
@@ -100,7 +101,7 @@ def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[s
     folder = make_run_folder(order.out, order.scenario)
     complaints: list[str] = []
     if order.mode == 'core':
-        return folder, _drive_in_core(order, excitation, folder, console), complaints
+        return folder, _drive_in_core(order, excitation, folder, console, complaints), complaints
     return folder, _drive_graph(order, excitation, folder, console, complaints), complaints
 
 
@@ -191,6 +192,8 @@ def _drive_graph(
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
             _watch_drive(order, supervisor, limit, console)
             figures = supervisor.figures(SIM)
+            complaints += _beyond_range(int(figures['beyond_range']), float(figures['first_beyond_range_s']))
+            complaints += _control_faults(int(supervisor.figures(CONTROL).get('faults', 0)))
         finally:
             recorder = supervisor.figures(RECORDER)
             if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
@@ -230,7 +233,7 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
 
 
 def _drive_in_core(
-    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
 ) -> dict[str, Any]:
     with progress_bar(console) as progress:
         task = progress.add_task(f'driving ({order.scenario})', total=1.0)
@@ -243,6 +246,8 @@ def _drive_in_core(
             namespace=order.namespace,
             split=split_of(_recorder_parameters(order)),
         )
+    complaints += _beyond_range(outcome.beyond_range.samples, outcome.beyond_range.first)
+    complaints += _control_faults(outcome.control_faults)
     return {
         'scenario': order.scenario,
         'mode': order.mode,
@@ -252,6 +257,14 @@ def _drive_in_core(
         'latency_median_s': float('nan'),
         'latency_p99_s': float('nan'),
     }
+
+
+def _beyond_range(samples: int, first: float) -> list[str]:
+    return [beyond_range_sentence(samples, first)] if samples else []
+
+
+def _control_faults(faults: int) -> list[str]:
+    return [fault_sentence(faults)] if faults else []
 
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:

@@ -9,8 +9,8 @@ from mount_models.closing import checked_closing
 from mount_models.quantity import with_flattened
 from mount_sim.excitation import Excitation
 from mount_sim.faults import Fault
-from mount_sim.mounts import seated_mount
 from mount_sim.parameters import SimParameters
+from mount_sim.plant_check import checked_plant
 from mount_sim.scenario import build_excitation
 
 
@@ -19,9 +19,9 @@ def preflight(parameters: Parameters) -> Excitation:
     sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
     excitation = build_excitation(sim)
     Fault(sim.fault)
-    seated_mount(sim.mount)
     check_control_of_mount(parameters)
     checked_closing(sim.mechanics, sim.actuator)
+    checked_plant(sim.plant, excitation.seat, excitation.step_time)
     with_flattened(DriverParameters(), parameters.get('mount_driver', {}))
     checked_recorder(RecorderParameters(), parameters.get('mount_recorder', {}))
     CoreChain(parameters)

@@ -11,6 +11,7 @@ from mount_bags.recorder_parameters import RecorderParameters
 from mount_control.parameters import ControlParameters
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
+from mount_models.damper import damper_text
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, flattened
@@ -82,9 +83,17 @@ def checked_settings(
             raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
         checked[node] = {
             name: _typed(f'{node}.{name}', value, known[node][_known_name(node, name, known[node])])
-            for name, value in values.items()
+            for name, value in _with_damper_text(node, values).items()
         }
     return checked
+
+
+def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return `values` with the damper as one text that needs no file, as a session can keep it."""
+    damper = values.get('damper')
+    if node != 'mount_control' or not isinstance(damper, (str, Mapping)):
+        return values
+    return {**values, 'damper': damper_text(damper)}
 
 
 def _known_name(node: str, name: str, known: Mapping[str, Any]) -> str:

@@ -24,7 +24,8 @@ class BandPass(NamedTuple):
     from_displacement: float
 
 
-STATE = np.dtype([('z1', 'f8'), ('z2', 'f8'), ('displacement', 'f8')])
+STATE = np.dtype([('z1', 'f8'), ('z2', 'f8'), ('displacement', 'f8'), ('earlier', 'f8')])
+"""Memory of the filter, band displacement (m) of the last sample and of the one before."""
 
 
 def design(eigenfrequency: float, quality: float, lead_time: float, sample_time: float) -> BandPass:
@@ -57,6 +58,24 @@ def settle(band_pass, state, displacement):
     state.z1 = -band_pass.gain * displacement
     state.z2 = -band_pass.gain * displacement
     state.displacement = 0.0
+    state.earlier = 0.0
+
+
+@compiled
+def transfer(old, new, state):
+    """Turn the state of the band-pass `old` into one of `new` with the same last samples, in and out.
+
+    So the new difference equation goes on from the old curve: band displacement and velocity have no jump.
+    """
+    if old.gain == new.gain and old.a1 == new.a1 and old.a2 == new.a2:
+        return  # to the bit as it is
+    now, before = state.displacement, state.earlier
+    # what z1 and z2 hold of the displacement before and now, each times the gain
+    share = new.gain / old.gain
+    before_in = -share * (state.z1 + old.a1 * now + old.a2 * before)
+    now_in = -share * (state.z2 + old.a2 * now)
+    state.z1 = -before_in - new.a1 * now - new.a2 * before
+    state.z2 = -now_in - new.a2 * now
 
 
 @compiled
@@ -76,6 +95,7 @@ def step(band_pass, state, displacement):
     before = state.displacement
     banded, state.z1, state.z2 = _filter(band_pass, state.z1, state.z2, displacement)
     state.displacement = banded
+    state.earlier = before
     velocity = (banded - before) / band_pass.sample_time
     predicted = band_pass.from_velocity * velocity + band_pass.from_displacement * banded
     return banded, velocity, predicted

@@ -1,5 +1,6 @@
 """From a displacement sample to a coil current: the control of Fig. 12 in reading order."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,11 +11,15 @@ from mount_control.parameters import ControlParameters, checked_parameters
 from mount_models.compiled import compiled
 from mount_models.damper import DamperCurve, damper_force
 from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.coefficient_check import check_friction
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
 from mount_models.record import record_bytes, record_dtype
 from mount_models.sampling import SAMPLE_TIME
 
+FADE_SAMPLES = 50
+"""Samples (chosen, 50 ms) in which the current goes over to a new law: first it stands for a sample, and its
+distance from what the new law asks for then falls evenly to zero."""
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 
 TRACE = np.dtype(
@@ -46,6 +51,10 @@ _STATE = np.dtype(
         ('displacement', 'f8'),
         ('deflection', 'f8'),
         ('normal_force', 'f8'),
+        ('current', 'f8'),
+        ('distance', 'f8'),
+        ('fading', 'i8'),
+        ('faults', 'i8'),
     ]
 )
 
@@ -80,6 +89,34 @@ class Memory(NamedTuple):
     window: NDArray[np.float64]
 
 
+class ControlLaw:
+    """All that a control step needs and does not change, checked: made beforehand, taken between steps."""
+
+    def __init__(
+        self,
+        parameters: ControlParameters,
+        damper: DamperCurve,
+        friction: FrictionCoefficients,
+        contact: FrictionContact,
+        table: force_to_current.CurrentTable,
+    ):
+        parameters = checked_parameters(parameters)
+        check_friction(friction, contact)
+        law = Law(
+            band_pass.design(
+                parameters.eigenfrequency, parameters.quality, parameters.lead_time, SAMPLE_TIME
+            ),
+            switching.chosen_switching(parameters),
+            damper.velocity_step,
+            friction,
+            contact,
+            table.limits,
+        )
+        self.record = record_bytes(law)
+        self.tables = Tables(damper.table, table.currents)
+        self.window = np.zeros(parameters.period_samples)
+
+
 class Controller:
     """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
 
@@ -91,23 +128,12 @@ class Controller:
         contact: FrictionContact,
         table: force_to_current.CurrentTable,
     ):
-        parameters = checked_parameters(parameters)
-        law = Law(
-            band_pass.design(
-                parameters.eigenfrequency, parameters.quality, parameters.lead_time, SAMPLE_TIME
-            ),
-            switching.chosen_switching(parameters),
-            damper.velocity_step,
-            friction,
-            contact,
-            table.limits,
-        )
-        self._law = record_bytes(law)
-        self._tables = Tables(damper.table, table.currents)
+        law = ControlLaw(parameters, damper, friction, contact, table)
+        self._law, self._tables, self._window = law.record, law.tables, law.window
         self._state = np.zeros(1, _STATE).view(np.uint8)
+        self._state_record = self._state.view(_STATE)[0]
         self._trace = np.zeros(1, TRACE).view(np.uint8)
         self._trace_record = self._trace.view(TRACE)[0]
-        self._window = np.zeros(parameters.period_samples)
         self.restart(0.0)
 
     @property
@@ -125,17 +151,31 @@ class Controller:
         """The intermediates of the last step as little-endian float64 numbers."""
         return self._trace.tobytes()
 
+    @property
+    def faults(self) -> int:
+        """How often the memory was found to hold something that is no finite number, and was cleared."""
+        return int(self._state_record['faults'])
+
     def restart(self, displacement: float) -> None:
         """Forget the past: a mount at rest at `displacement` (m), damping off."""
-        self._state[:] = 0
-        self._window[:] = 0.0
-        start(self._law, self._state, displacement)
+        start(self._law, self._state, self._window, displacement)
+
+    def change(self, law: ControlLaw) -> None:
+        """Go on with another law, from the next sample on and without a jump; a law is taken once.
+
+        The band-pass goes on from the same last samples, magnitude and switching keep their past, and where
+        damping is on the current goes over to what the new law asks for within `FADE_SAMPLES`.
+        """
+        transfer(self._law, law.record, self._state, self._window, law.window)
+        self._law, self._tables, self._window = law.record, law.tables, law.window
 
     def step(self, displacement: float, bridged_samples: int = 0) -> float:
         """Take one displacement sample in m and return the current setpoint in A.
 
         `bridged_samples` samples missing before it are replaced by a straight line. NaN and what lies
-        beyond `FARTHEST_DISPLACEMENT` are answered with 0 A and leave no trace in the memory.
+        beyond `FARTHEST_DISPLACEMENT` are answered with 0 A and leave no trace in the memory. Where the
+        memory itself holds what is no finite number, the answer is 0 A, it is cleared as by `restart`, and
+        that is counted in `faults`.
         """
         return step(
             self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
@@ -163,15 +203,36 @@ def load_compiled_law(
 ) -> None:
     """Run the compiled law once, so that the first sample need not wait for the compiler."""
     table = force_to_current.resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
-    Controller(parameters, damper, friction, contact, table).step(0.0)
+    controller = Controller(parameters, damper, friction, contact, table)
+    controller.step(0.0)
+    controller.change(ControlLaw(parameters, damper, friction, contact, table))
 
 
 @compiled
-def start(law, state, displacement):
-    """Set a cleared state to a mount at rest at `displacement` (m); arguments as for `step`."""
-    current_state = state.view(_STATE)[0]
-    band_pass.settle(law.view(_LAW)[0].band, current_state.band, displacement)
-    current_state.displacement = displacement
+def transfer(law, new_law, state, window, new_window):
+    """Make the memory of one law that of a new one; arguments are the bytes of records and two windows."""
+    memory = state.view(_STATE)[0]
+    band_pass.transfer(law.view(_LAW)[0].band, new_law.view(_LAW)[0].band, memory.band)
+    switching.transfer(memory.switching, window, new_window)
+    memory.fading = FADE_SAMPLES if memory.switching.active == 1 else 0
+
+
+@compiled
+def start(law, state, window, displacement):
+    """Set the memory to a mount at rest at `displacement` (m), damping off; arguments as for `step`."""
+    _rest(law.view(_LAW)[0], state.view(_STATE)[0], window, displacement)
+
+
+@compiled
+def _rest(law, state, window, displacement):
+    band_pass.settle(law.band, state.band, displacement)
+    switching.rest(state.switching, window)
+    state.displacement = displacement
+    state.deflection = 0.0
+    state.normal_force = 0.0
+    state.current = 0.0
+    state.fading = 0
+    state.distance = 0.0
 
 
 @compiled
@@ -203,11 +264,33 @@ def run(law, tables, state, window, traces, displacements):
 def _step(law, tables, state, window, trace, displacement, bridged_samples):
     if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
         return _refuse(trace, displacement)
+    if not math.isfinite(_sum_of_memory(state)):
+        return _clear(law, state, window, trace, displacement)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
         _advance(law, tables, state, window, trace, state.displacement + rise)
     trace.bridged_samples = bridged_samples
-    return _advance(law, tables, state, window, trace, displacement)
+    current = _advance(law, tables, state, window, trace, displacement)
+    if not math.isfinite(_sum_of_memory(state) + trace.predicted_velocity + trace.desired_force + current):
+        return _clear(law, state, window, trace, displacement)
+    return current
+
+
+@compiled
+def _sum_of_memory(state):
+    """Return a sum that is a finite number only where all numbers of the memory are."""
+    band, magnitude = state.band, state.switching.magnitude
+    filters = band.z1 + band.z2 + band.displacement + band.earlier + state.displacement
+    answer = state.normal_force + state.current + state.distance
+    return filters + magnitude + state.deflection + answer
+
+
+@compiled
+def _clear(law, state, window, trace, displacement):
+    """Begin afresh with a memory that was spoiled: whatever has done it, no current is made of it."""
+    _rest(law, state, window, displacement)
+    state.faults += 1
+    return _refuse(trace, displacement)
 
 
 @compiled
@@ -241,9 +324,11 @@ def _advance(law, tables, state, window, trace, displacement):
     if active == 1:
         desired = damper_force(tables.damper, law.damper_step, predicted)
         force, coefficient = _normal_force(law, tables, state, desired, predicted)
-        current = force_to_current.current_for(tables.current, law.limits, force)
+        current = _faded(law, state, force_to_current.current_for(tables.current, law.limits, force))
     else:
         force = 0.0
+        state.fading = 0
+    state.current = current
     _, state.deflection, _ = simplified_step(
         law.contact, law.friction, state.deflection, predicted, force, law.band.sample_time
     )
@@ -260,6 +345,18 @@ def _advance(law, tables, state, window, trace, displacement):
     trace.normal_force = force
     trace.current = current
     return current
+
+
+@compiled
+def _faded(law, state, wanted):
+    """Return the current (A) instead of the `wanted` one, beside it for a while after a change of the law."""
+    if state.fading == 0:
+        return wanted
+    if state.fading == FADE_SAMPLES:
+        state.distance = state.current - wanted
+    current = wanted + state.distance * state.fading / FADE_SAMPLES
+    state.fading -= 1
+    return min(max(current, law.limits.offset_current), law.limits.highest_current)
 
 
 @compiled

@@ -19,6 +19,10 @@ class ControlFigures:
     step_median: float  # s, sample received to setpoint published
     step_p99: float  # s
     last_stamp: int | None  # ns
+    faults: int = 0  # times that the controller's memory held what is no finite number
+    last_fault: int = 0  # stamp of the last such sample, ns
+    damper: str = ''
+    parameter_changes: int = 0  # since the node was configured
 
 
 def verdict(figures: ControlFigures) -> Verdict:
@@ -29,11 +33,15 @@ def verdict(figures: ControlFigures) -> Verdict:
         'restarts': figures.counts.restarts,
         'ignored': figures.counts.ignored,
         'invalid': figures.counts.invalid,
+        'faults': figures.faults,
+        'last_fault': figures.last_fault,
         'damping_active': figures.damping_active,
         'current_a': f'{figures.current:.4f}',
         'step_median_us': f'{1e6 * figures.step_median:.0f}',
         'step_p99_us': f'{1e6 * figures.step_p99:.0f}',
         'last_stamp': figures.last_stamp,
+        'damper': figures.damper,
+        'parameter_changes': figures.parameter_changes,
     }
     level, sentence = _judgement(figures)
     return Verdict(level, sentence, values)
@@ -47,6 +55,8 @@ def _judgement(figures: ControlFigures) -> tuple[Level, str]:
             f'0 A: no displacement for {figures.silence:.2f} s (limit {figures.longest_silence:g} s); '
             'is mount_driver active and the electronics powered?'
         )
+    if figures.faults:
+        return Level.ERROR, fault_sentence(figures.faults)
     counts = figures.counts
     if counts.invalid:
         return Level.WARN, (
@@ -59,3 +69,12 @@ def _judgement(figures: ControlFigures) -> tuple[Level, str]:
             "look at mount_driver's counts of lost frames"
         )
     return Level.OK, 'damping on' if figures.damping_active else 'damping off'
+
+
+def fault_sentence(faults: int) -> str:
+    """Return what is to be told of a controller that found its memory spoiled so many times."""
+    times = 'once' if faults == 1 else f'{faults} times'
+    return (
+        f'the controller held what is no finite number, {times}: damping was ended at 0 A and began afresh; '
+        'set friction.* and contact.* of mount_control closer to their defaults'
+    )

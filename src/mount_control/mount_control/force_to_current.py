@@ -1,5 +1,6 @@
 """Normal force to coil current through the table of this activation."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from mount_models.interpolation import each_interpolated
 
 FORCE_STEP = 0.5  # N, chosen: the table's own step
 _FIRST_TOUCH = 1.0  # N, chosen
+_HIGHEST_FORCE = 1e4  # N, chosen: far beyond any magnet of this size; the table has a place for every 0.5 N
 
 
 class ForceTableError(ValueError):
@@ -38,12 +40,23 @@ def resample(
 ) -> CurrentTable:
     """Return the table of `current` (A) over `normal_force` (N), (n,) and rising, on an even grid of forces.
 
-    Raises `ForceTableError` where it does not start at the first touch or the offset current lies outside.
+    Raises `ForceTableError` where it does not rise from the first touch, reaches beyond any magnet, or the
+    offset current lies outside.
     """
     if not 0.0 <= normal_force[0] <= _FIRST_TOUCH:
         raise ForceTableError(
             f'current_force_table starts at {normal_force[0]:.2f} N (limit {_FIRST_TOUCH:g} N), '
             'not at the first touch of the pads; activate mount_init again'
+        )
+    if not (np.all(np.diff(normal_force) > 0.0) and np.all(np.diff(current) > 0.0)):
+        raise ForceTableError(
+            'current and normal force of the current_force_table must rise strictly; '
+            'activate mount_init again'
+        )
+    if not normal_force[-1] <= _HIGHEST_FORCE:
+        raise ForceTableError(
+            f'current_force_table ends at {normal_force[-1]:g} N (limit {_HIGHEST_FORCE:g} N), more than '
+            'the magnet can pull; activate mount_init again'
         )
     if not 0.0 < offset_current < highest_current:
         raise ForceTableError(
@@ -65,7 +78,9 @@ def highest_force(currents):
 
 @compiled
 def current_for(currents, limits, normal_force):
-    """Return the current in A for a normal force in N, within `limits`."""
+    """Return the current in A for a normal force in N, within `limits`; 0 A where it is not a number."""
+    if math.isnan(normal_force):
+        return 0.0  # as a place in the table it would be anywhere in memory
     place = max(normal_force, 0.0) / FORCE_STEP
     last = len(currents) - 1
     if place >= last:

@@ -1,24 +1,35 @@
 """ROS 2 node of the controller: a displacement message arrives, a setpoint leaves."""
 
+import contextlib
 import threading
 import time
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from rclpy.parameter import Parameter
+from std_msgs.msg import String
 
 from mount_control.activation import MeasurementStream, check_belongs
-from mount_control.controller import TRACE, Controller, load_compiled_law
+from mount_control.controller import TRACE, ControlLaw, Controller, load_compiled_law
 from mount_control.diagnosis import ControlFigures, verdict
 from mount_control.force_to_current import ForceTableError, resample
 from mount_control.identified import check_fits
-from mount_control.parameters import ControlParameters, checked_parameters
+from mount_control.parameters import RUN_TIME, ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
-from mount_models.damper import damper_curve
+from mount_models.damper import DamperError, damper_curve, damper_text
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
+from mount_ros.cdr import serialised
 from mount_ros.diagnostics import Verdict
+from mount_ros.event_message import change_text, dated
 from mount_ros.force_table_message import ForceTable, ForceTableMessageError, from_bytes
 from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.parameter_gate import Change
 from mount_ros.parameters import SpecimenValues, declare, read
 from mount_ros.process import run_node
 from mount_ros.scalars import ScalarsLayout
@@ -31,6 +42,8 @@ _TABLE_PATIENCE = 1.0  # s, chosen: latched messages may still be under way when
 class MountControl(SafeLifecycleNode):
     """Answers each displacement sample with a current setpoint, while active."""
 
+    run_time_parameters = RUN_TIME
+
     def __init__(self, **arguments):
         super().__init__('mount_control', **arguments)
         declare(self, ControlParameters())
@@ -39,6 +52,7 @@ class MountControl(SafeLifecycleNode):
         self.declare_parameter('damper', 'viscous_2000')
         self.declare_parameter('parameters_file', '')
         self.declare_parameter('specimen', '')
+        self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)
         self._controller: Controller | None = None
         self._table: ForceTable | None = None
@@ -46,8 +60,11 @@ class MountControl(SafeLifecycleNode):
         self._stream = MeasurementStream()
         self._last_message: bytes | None = None
         self._table_refusal = ''
+        self._parameter_changes = 0  # since it was configured
+        self._faults, self._last_fault = 0, 0  # of the controller, and the stamp (ns) of the last
         self._last_setpoint = (0, _OFF)  # stamp ns, A
         self._answering = threading.Lock()
+        self._laws: deque[tuple[ControlLaw, str]] = deque()  # for the next sample, and what is told of them
 
     def configure(self) -> None:
         self._settings = checked_parameters(read(self, ControlParameters()))
@@ -59,7 +76,9 @@ class MountControl(SafeLifecycleNode):
         self._of_specimen.give(FrictionContact(), 'contact', specimen.friction)
         self._friction = read(self, FrictionCoefficients(), 'friction')
         self._contact = read(self, FrictionContact(), 'contact')
+        self.set_parameters([self.get_parameter('damper')])  # with the points of a file, see _spelled_out
         self._damper = damper_curve(self.get_parameter('damper').value)
+        self._parameter_changes = 0
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._trace = ScalarsLayout(topics.CONTROL_TRACE)
@@ -70,6 +89,7 @@ class MountControl(SafeLifecycleNode):
         path = self.open_data_path()
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
         self._send_trace = path.sender(topics.CONTROL_TRACE)
+        self._send_event = path.sender(topics.EVENT)
         path.subscribe(topics.DISPLACEMENT, self._on_displacement)
         path.subscribe(topics.AIR_GAP, self._on_air_gap)
         path.subscribe(topics.CURRENT_FORCE_TABLE, self._on_table)
@@ -77,14 +97,18 @@ class MountControl(SafeLifecycleNode):
 
     def activate(self) -> None:
         table, gap_stamp, offset_current = self._wait_for_table()
-        currents = resample(table.current, table.normal_force, offset_current, self._settings.highest_current)
-        controller = Controller(self._settings, self._damper, self._friction, self._contact, currents)
+        self._currents = resample(
+            table.current, table.normal_force, offset_current, self._settings.highest_current
+        )
+        controller = Controller(self._settings, self._damper, self._friction, self._contact, self._currents)
         self._watch = SampleWatch(
             SAMPLE_TIME, self._settings.longest_bridge, self._settings.displacement_range
         )
         self._latency = LatencyHistogram()
         self._activation = gap_stamp
         self._table_refusal = ''
+        self._faults, self._last_fault = 0, 0
+        self._laws.clear()
         self._heard = time.monotonic()
         self._controller = controller  # from here on samples are answered
         if self.lockstep and self._last_message is not None:
@@ -101,6 +125,21 @@ class MountControl(SafeLifecycleNode):
         self._stream = MeasurementStream()
         self._last_message = None
 
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        checked_parameters(with_flattened(ControlParameters(), values))
+        damper_curve(values['damper'])
+
+    def take_changes(self, changes: Mapping[str, Change]) -> None:
+        self._settings = checked_parameters(read(self, ControlParameters()))
+        self._damper = damper_curve(self.get_parameter('damper').value)
+        self._parameter_changes += len(changes)
+        text = change_text(self.get_name(), changes)
+        if self._controller is None:
+            self._tell(self._stream.last or self.get_clock().now().nanoseconds, text)
+            return
+        law = ControlLaw(self._settings, self._damper, self._friction, self._contact, self._currents)
+        self._laws.append((law, text))  # taken in the thread of the data, at the next sample
+
     def judge(self) -> Verdict:
         trace = self._controller.trace if self._controller else None
         return verdict(
@@ -114,6 +153,10 @@ class MountControl(SafeLifecycleNode):
                 step_median=self._latency.quantile(0.5),
                 step_p99=self._latency.quantile(0.99),
                 last_stamp=self._stream.last,
+                faults=self._faults,
+                last_fault=self._last_fault,
+                damper=self.get_parameter('damper').value,
+                parameter_changes=self._parameter_changes,
             )
         )
 
@@ -162,10 +205,27 @@ class MountControl(SafeLifecycleNode):
         if judgement is Judgement.INVALID:
             self._publish_setpoint(stamp, _OFF)
             return
+        told = self._take_laws(controller) if self._laws else ()
         if judgement is Judgement.RESTART:
             controller.restart(displacement)
         self._publish_setpoint(stamp, controller.step(displacement, missing))
+        if controller.faults != self._faults:
+            self._faults, self._last_fault = controller.faults, stamp
         self._send_trace(self._trace.pack_record(stamp, controller.trace_bytes))
+        for text in told:
+            self._tell(stamp, text)
+
+    def _take_laws(self, controller: Controller) -> list[str]:
+        """Go on with the newest law from this sample on; return what is to be told."""
+        told = []
+        while self._laws:
+            law, text = self._laws.popleft()
+            controller.change(law)
+            told.append(text)
+        return told
+
+    def _tell(self, stamp: int, text: str) -> None:
+        self._send_event(serialised(String(data=dated(stamp, text))))
 
     def _table_is_outdated(self) -> bool:
         if not self._table_refusal and not self._stream.holds(self._activation):
@@ -195,6 +255,20 @@ class MountControl(SafeLifecycleNode):
         except ForceTableMessageError as error:
             self._table = None
             self.get_logger().error(str(error))
+
+
+def _spelled_out(parameters: list[Parameter]) -> list[Parameter]:
+    """Return parameters about to be set with the points of a damper's file instead of its path.
+
+    So it is read once, and event and session hold what it said. What cannot be read is refused afterwards.
+    """
+    spelled = []
+    for parameter in parameters:
+        if parameter.name == 'damper' and isinstance(parameter.value, str):
+            with contextlib.suppress(DamperError):
+                parameter = Parameter('damper', value=damper_text(parameter.value))
+        spelled.append(parameter)
+    return spelled
 
 
 def main() -> None:

@@ -68,6 +68,20 @@ SWITCHING = {
 """Values of `switching`, and what they mean."""
 
 
+RUN_TIME = frozenset(
+    {
+        'switching',
+        'eigenfrequency',
+        'quality',
+        'lead_time',
+        'switch_on_level',
+        'switch_off_level',
+        'damper',
+    }
+)
+"""Parameters that the configured controller takes, active from the next sample on."""
+
+
 def checked_parameters(parameters: ControlParameters) -> ControlParameters:
     """Return the parameters checked one by one and against each other, or raise `ParameterError`."""
     parameters = checked(parameters)

@@ -38,6 +38,29 @@ def chosen_switching(parameters: ControlParameters) -> Switching:
 
 
 @compiled
+def rest(state, window):
+    """Set state and window to a mount at rest, damping off."""
+    state.place = 0
+    state.magnitude = 0.0
+    state.samples_above = 0
+    state.samples_below = 0
+    state.active = 0
+    window[:] = 0.0
+
+
+@compiled
+def transfer(state, window, new_window):
+    """Carry the newest of the `window` over to the `new_window` of another period; damping stays as it is."""
+    period, new_period = len(window), len(new_window)
+    kept = min(period, new_period)
+    new_window[:] = 0.0
+    for age in range(1, kept + 1):
+        new_window[kept - age] = window[(state.place - age) % period]
+    state.place = kept % new_period
+    state.magnitude = new_window.max()
+
+
+@compiled
 def step(switching, state, window, band_displacement):
     """Take one sample; return (magnitude m, damping active 0 or 1).
 
@@ -49,7 +72,9 @@ def step(switching, state, window, band_displacement):
     leaving = window[state.place]
     window[state.place] = distance
     state.place = (state.place + 1) % switching.period
-    if distance >= state.magnitude:
+    if not 0.0 <= leaving <= state.magnitude:  # spoiled, so the highest value is not known
+        state.magnitude = np.nan
+    elif distance >= state.magnitude:
         state.magnitude = distance
     elif leaving == state.magnitude:  # only then the others have to be looked at
         state.magnitude = window[: switching.period].max()

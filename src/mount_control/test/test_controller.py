@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_control.controller import FARTHEST_DISPLACEMENT, TRACE, Controller
+from mount_control.controller import (
+    _STATE,
+    FADE_SAMPLES,
+    FARTHEST_DISPLACEMENT,
+    TRACE,
+    ControlLaw,
+    Controller,
+)
 from mount_control.force_to_current import resample
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
@@ -211,3 +218,183 @@ def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, 
     assert int(traces['damping_active'].argmax()) == exceeded + 99
     assert ControlParameters(eigenfrequency=10.0).period_samples == 100
     assert damper_curve('viscous_2000').force(0.104) == pytest.approx(200.0)
+
+
+# What is no finite number inside the controller, however it came there.
+
+POISON = [
+    'band.z1',
+    'band.z2',
+    'band.displacement',
+    'band.earlier',
+    'switching.magnitude',
+    'displacement',
+    'deflection',
+    'normal_force',
+    'current',
+    'distance',
+]
+
+
+def _poisoned(controller, name, value):
+    """Put `value` into a number of the memory, or into the whole window of the magnitude."""
+    memory = controller.memory
+    if name == 'window':
+        memory.window[:] = value
+        return
+    numbers = memory.state.view(_STATE)
+    for part in name.split('.'):
+        record, numbers = numbers, numbers[part]
+    record[part] = value
+
+
+def test_every_number_of_the_memory_is_among_those_that_are_poisoned():
+    def names(kind, prefix=''):
+        for name in kind.names:
+            yield from names(kind[name], f'{prefix}{name}.') if kind[name].names else [prefix + name]
+
+    def kind_of(path):
+        kind = _STATE
+        for part in path.split('.'):
+            kind = kind[part]
+        return kind
+
+    counts = {name for name in names(_STATE) if kind_of(name) == np.int64}
+    assert set(names(_STATE)) - counts == set(POISON)
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize('bridged', [0, 3])
+@pytest.mark.parametrize('name', [*POISON, 'window'])
+def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(
+    make_controller, sine, name, value, bridged
+):
+    displacement = sine(8.0, 1e-3, 1.2)
+    controller, fresh = make_controller(), make_controller()
+    before = controller.run(displacement[:507])[-1]
+    assert before['damping_active'] == 1.0
+    assert before['current'] > 0.4935
+    _poisoned(controller, name, value)
+    assert controller.step(displacement[507], bridged) == 0.0
+    assert controller.faults == 1
+    assert controller.trace['damping_active'] == 0.0
+    assert controller.trace['current'] == controller.trace['normal_force'] == 0.0
+    assert math.isnan(controller.trace['magnitude'])
+    # from here on as a controller that has just begun
+    fresh.restart(displacement[507])
+    after = controller.run(displacement[508:])
+    assert _equal(after, fresh.run(displacement[508:]))
+    assert after[-1]['damping_active'] == 1.0
+    assert controller.faults == 1
+
+
+def test_what_leaves_the_window_is_noticed_where_it_is_no_number(make_controller, sine):
+    controller = make_controller()
+    controller.run(sine(8.0, 1e-3, 0.5))
+    state = controller.memory.state.view(_STATE)
+    controller.memory.window[state['switching']['place'][0]] = math.nan
+    assert controller.step(0.0) == 0.0
+    assert controller.faults == 1
+
+
+def test_a_table_or_a_law_that_is_no_number_never_becomes_a_current(make_controller, sine):
+    controller = make_controller()
+    controller.run(sine(8.0, 1e-3, 0.5))
+    controller.memory.tables.current[:] = math.nan
+    traces = controller.run(sine(8.0, 1e-3, 0.5))
+    assert (traces['current'] == 0.0).all()
+    assert (traces['damping_active'] == 0.0).all()
+    assert controller.faults > 0
+
+
+# Another law while the controller works.
+
+CHANGES = {
+    'stronger damper': {'damper': 'viscous_4000'},
+    'weaker damper': {'damper': 'viscous_1000'},
+    'no damper at all but its end': {'damper': '{velocity: [0, 0.9, 1.0], force: [0, 0, 10]}'},
+    'later': {'lead_time': 0.008},
+    'lower eigenfrequency': {'eigenfrequency': 6.0},
+    'higher eigenfrequency': {'eigenfrequency': 11.0},
+    'wider band': {'quality': 0.5},
+    'narrower band': {'quality': 3.0},
+    'levels': {'switch_on_level': 0.0006, 'switch_off_level': 0.0002},
+    'always': {'switching': 'always'},
+    'all at once': {'damper': 'progressive', 'eigenfrequency': 7.0, 'quality': 2.0, 'lead_time': 0.0},
+}
+
+
+def _law(table_rows, damper='viscous_2000', **changes):
+    currents, forces, offset = table_rows
+    table = resample(currents, forces, offset, 3.0)
+    pads = FrictionCoefficients(), FrictionContact()
+    return ControlLaw(ControlParameters(**changes), damper_curve(damper), *pads, table)
+
+
+@pytest.mark.parametrize('moment', range(700, 825, 11))  # everywhere in a period
+@pytest.mark.parametrize('change', CHANGES)
+def test_a_change_of_the_law_makes_no_jump(make_controller, table_rows, sine, change, moment):
+    displacement = sine(8.0, 1e-3, 1.4)
+    controller, stayed = make_controller(), make_controller()
+    before = controller.run(displacement[:moment])
+    controller.change(_law(table_rows, **CHANGES[change]))
+    after = controller.run(displacement[moment:])
+    undisturbed = stayed.run(displacement)
+    assert before['damping_active'][-1] == after['damping_active'][0] == 1.0
+    # the current stands still for one sample, and goes over within 50 ms
+    assert after['current'][0] == before['current'][-1]
+    free = make_controller(**CHANGES[change]).run(displacement)
+    natural = max(np.abs(np.diff(run['current'][500:])).max() for run in (undisturbed, free))
+    farthest = np.abs(free['current'][moment:] - undisturbed['current'][moment:]).max() + natural
+    # a filter of a higher frequency accelerates more from the same place, by the square of the ratio
+    stiffer = max(1.0, (CHANGES[change].get('eigenfrequency', 8.0) / 8.0) ** 2)
+    assert np.abs(np.diff(after['current'][:60])).max() <= stiffer * natural + farthest / FADE_SAMPLES
+    # displacement and velocity in the band have no jump either
+    for name, share in (('band_displacement', 1.02), ('band_velocity', 1.2 * stiffer)):
+        steps = np.abs(np.diff(np.r_[before[name], after[name]]))
+        natural = max(np.abs(np.diff(run[name][500:])).max() for run in (undisturbed, free))
+        assert steps[moment - 2 : moment + 2].max() <= share * natural
+    # and in the end it does what a controller does that never knew anything else
+    settled = after[-125:]
+    np.testing.assert_allclose(settled['current'], free['current'][-125:], atol=2e-2)
+    assert controller.faults == 0
+
+
+def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit(
+    make_controller, table_rows, sine
+):
+    displacement = sine(8.0, 1e-3, 1.0)
+    controller, stayed = make_controller(), make_controller()
+    controller.run(displacement[:700])
+    controller.change(_law(table_rows, 'viscous_4000'))
+    after, undisturbed = controller.run(displacement[700:]), stayed.run(displacement)[700:]
+    for name in ('band_displacement', 'band_velocity', 'predicted_velocity', 'magnitude', 'damping_active'):
+        np.testing.assert_array_equal(after[name], undisturbed[name])
+    np.testing.assert_array_equal(after['desired_force'], 2.0 * undisturbed['desired_force'])
+
+
+def test_a_change_while_damping_is_off_is_there_at_once(make_controller, table_rows, sine):
+    displacement = np.r_[sine(8.0, 0.1e-3, 0.5), sine(8.0, 1e-3, 1.0)]
+    controller = make_controller()
+    controller.run(displacement[:400])
+    controller.change(_law(table_rows, 'viscous_4000'))
+    after = controller.run(displacement[400:])
+    expected = make_controller('viscous_4000').run(displacement)[400:]
+    assert _equal(after, expected)
+
+
+@pytest.mark.parametrize('eigenfrequency', [5.0, 8.0, 13.0])
+def test_the_magnitude_stays_the_highest_of_the_last_period_over_a_change_of_it(
+    make_controller, table_rows, sine, eigenfrequency
+):
+    displacement = sine(8.0, 1e-3, 0.6) * np.linspace(0.2, 1.0, 600)
+    controller = make_controller()
+    before = controller.run(displacement[:333])
+    controller.change(_law(table_rows, eigenfrequency=eigenfrequency))
+    after = controller.run(displacement[333:])
+    distances = np.abs(np.r_[before['band_displacement'], after['band_displacement']])
+    period = ControlParameters(eigenfrequency=eigenfrequency).period_samples
+    seen_from = max(0, 333 - 125)  # what the window of the old period held
+    for number in range(333, 600):
+        begin = max(number + 1 - period, seen_from)
+        assert after['magnitude'][number - 333] == distances[begin : number + 1].max()

@@ -18,6 +18,7 @@ GOOD = ControlFigures(
     step_median=80e-6,
     step_p99=210e-6,
     last_stamp=123_000_000,
+    damper='viscous_2000',
 )
 
 
@@ -66,9 +67,19 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'restarts': 3,
         'ignored': 2,
         'invalid': 1,
+        'faults': 0,
+        'last_fault': 0,
         'damping_active': False,
         'current_a': '1.2346',
         'step_median_us': '80',
         'step_p99_us': '210',
         'last_stamp': 123_000_000,
+        'damper': 'viscous_2000',
+        'parameter_changes': 0,
     }
+
+
+def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
+    judged = verdict(replace(GOOD, faults=2, damping_active=True))
+    assert judged.level is Level.ERROR
+    assert judged.sentence.startswith('the controller held what is no finite number, 2 times: damping')

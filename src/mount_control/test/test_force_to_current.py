@@ -76,3 +76,23 @@ def test_an_offset_current_outside_its_limits_is_refused(table_rows, offset):
 def test_a_limit_below_the_offset_current_is_refused_with_the_remedy(table_rows):
     with pytest.raises(ForceTableError, match=r'within 0 \.\. 0\.4 A; .*raise highest_current'):
         resample(*table_rows, 0.4)
+
+
+def test_a_force_that_is_not_a_number_gives_0_ampere(table):
+    assert current_for(table.currents, table.limits, float('nan')) == 0.0
+
+
+@pytest.mark.parametrize('highest', [1e9, float('inf')])
+def test_a_table_beyond_any_magnet_is_refused_before_its_places_are_made(table_rows, highest):
+    currents, forces, offset = table_rows
+    with pytest.raises(ForceTableError, match=r'ends at (1e\+09|inf) N \(limit 10000 N\).*mount_init again'):
+        resample(currents, np.r_[forces[:-1], highest], offset, 3.0)
+
+
+def test_a_table_that_does_not_rise_is_refused(table_rows):
+    currents, forces, offset = table_rows
+    for row in (currents[::-1], np.r_[currents[:-1], np.nan]):
+        with pytest.raises(ForceTableError, match='must rise strictly'):
+            resample(row, forces, offset, 3.0)
+    with pytest.raises(ForceTableError, match='must rise strictly'):
+        resample(currents, np.r_[forces[:3], np.nan, forces[4:]], offset, 3.0)

@@ -9,8 +9,10 @@ from lifecycle_msgs.msg import State, Transition
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import String
 
-from mount_control.controller import Controller
+from mount_control.controller import _STATE, ControlLaw, Controller
 from mount_control.force_to_current import resample
 from mount_control.identified import identified
 from mount_control.node import MountControl
@@ -23,6 +25,7 @@ from mount_ros import topics
 from mount_ros.cdr import serialised
 from mount_ros.data_path import DataPath
 from mount_ros.diagnostics import Level
+from mount_ros.event_message import Mark, ParametersChanged, read_change, read_mark
 from mount_ros.force_table_message import to_message
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.testing import wait_until
@@ -49,12 +52,15 @@ class Surroundings:
                 topics.CONTROL_TRACE,
             )
         }
-        self.setpoints, self.traces = [], []
+        self.setpoints, self.traces, self.events = [], [], []
         self._displacement = self.path.publisher(topics.DISPLACEMENT)
         self._air_gap = self.path.publisher(topics.AIR_GAP)
         self._table = self.path.publisher(topics.CURRENT_FORCE_TABLE)
         self.path.subscribe(topics.CURRENT_SETPOINT, lambda raw: self.setpoints.append(self._setpoint(raw)))
         self.path.subscribe(topics.CONTROL_TRACE, lambda raw: self.traces.append(self._trace(raw)))
+        self.path.subscribe(
+            topics.EVENT, lambda raw: self.events.append(deserialize_message(raw, String).data)
+        )
         self.path.start()
 
     def send(self, milliseconds, displacement=0.0):
@@ -129,6 +135,7 @@ def configured(make_control, around):
         assert control.trigger_configure() == SUCCESS
         wait_until(lambda: not around.path.unmatched(), 'matched by the surroundings')
         wait_until(lambda: not control.data_path.unmatched(), 'matched by the controller')
+        wait_until(lambda: control.data_path.node.count_subscribers('event'), 'who hears events')
         return control
 
     return make
@@ -415,3 +422,165 @@ def test_missing_samples_are_bridged_and_counted(active, around, sine):
     verdict = control.judge()
     assert (verdict.figures['bridged'], verdict.level) == (199, Level.WARN)
     assert verdict.sentence.startswith('199 of 200 samples were missing and bridged')
+
+
+@pytest.mark.parametrize('name', ['band', 'deflection', 'normal_force'])
+def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(active, around, sine, name):
+    control = active()
+    assert _shake(around, sine)[-1][1] > 0.4
+    state = control._controller.memory.state.view(_STATE)
+    if name == 'band':
+        state['band']['z1'] = math.nan
+    else:
+        state[name] = math.nan
+    around.send(401, 0.0)
+    assert _answers(around, 401)[-1] == (401.0, 0.0)
+    wait_until(lambda: len(around.traces) == 401, 'the trace')
+    assert (around.traces[-1][1]['damping_active'], around.traces[-1][1]['current']) == (0.0, 0.0)
+    verdict = control.judge()
+    assert verdict.level is Level.ERROR
+    assert verdict.sentence.startswith('the controller held what is no finite number, once: damping')
+    assert verdict.figures['last_fault'] == ACTIVATION + 401 * MS
+    assert not verdict.figures['damping_active']
+    # and it works on
+    around.send(402, 0.0)
+    assert _answers(around, 402)[-1] == (402.0, 0.0)
+    assert control.judge().figures['faults'] == 1
+
+
+def test_a_table_that_asks_for_all_memory_is_refused_at_activation(configured, around):
+    control = configured()
+    around.send(0.0)
+    around.send_air_gap()
+    around.send_table(rows=[[0.47, 3.0], [0.0, 1e9]])
+    assert control.trigger_activate() == FAILURE
+    assert 'current_force_table ends at 1e+09 N (limit 10000 N)' in control._refusal
+
+
+# Parameters of a node at work.
+
+
+def _set(control, **values):
+    """Set parameters one after the other, as `ros2 param set` does; return the reasons of those refused."""
+    results = [control.set_parameters([Parameter(name, value=v)])[0] for name, v in values.items()]
+    return [result.reason for result in results if not result.successful]
+
+
+@pytest.mark.parametrize(
+    'values',
+    [
+        {'damper': 'viscous_2500'},
+        {'damper': '{velocity: [0, 0.004, 0.1], force: [0, 0, 200]}'},
+        {'switch_off_level': 0.0002, 'switch_on_level': 0.0006},
+        {'eigenfrequency': 10.0},
+        {'lead_time': 0.005},
+        {'quality': 0.6},
+        {'switching': 'always'},
+    ],
+)
+def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(
+    active, around, sine, table_rows, values
+):
+    control = active()
+    displacement = sine(8.0, 1e-3, 0.6)
+    _shake(around, sine)
+    before = {name: control.get_parameter(name).value for name in values}
+    assert _set(control, **values) == []
+    for number in range(401, 600):
+        around.send(number, displacement[number - 1])
+        _answers(around, number)
+    pads = (
+        identified(default_specimen(), FrictionCoefficients(), {}, 'friction'),
+        identified(default_specimen(), FrictionContact(), {}, 'contact'),
+    )
+    table = resample(*table_rows, 3.0)
+    core = Controller(ControlParameters(), damper_curve('viscous_2000'), *pads, table)
+    core.restart(displacement[0])
+    expected = core.run(displacement[:400])['current'].tolist()
+    known = {name: value for name, value in values.items() if name != 'damper'}
+    for count in range(len(values)):  # each by itself, as it was set
+        settings = ControlParameters(**dict(list(known.items())[: count + 1]))
+        core.change(ControlLaw(settings, damper_curve(values.get('damper', 'viscous_2000')), *pads, table))
+    expected += core.run(displacement[400:599])['current'].tolist()
+    assert [current for _, current in around.setpoints] == expected
+    assert around.setpoints[400][1] == around.setpoints[399][1]  # no jump
+    wait_until(lambda: len(around.events) == len(values), 'the events')
+    stamp = ACTIVATION + 401 * MS
+    for text, (name, value) in zip(around.events, values.items(), strict=True):
+        assert read_change(text) == ParametersChanged(stamp, 'mount_control', {name: value})
+        told = f'mount_control: {name} from {before[name]} to {value}'
+        assert read_mark(text, 0) == Mark(stamp, 'parameter', told)
+    figures = control.judge().figures
+    assert figures['parameter_changes'] == len(values)
+    assert figures['damper'] == values.get('damper', 'viscous_2000')
+
+
+@pytest.mark.parametrize('at_work', [False, True])
+@pytest.mark.parametrize(
+    ('name', 'value', 'reason'),
+    [
+        ('switching', 'nonsense', "switching 'nonsense' is unknown; known are enabled, always"),
+        ('damper', 'nonsense', "no damper curve is called 'nonsense'; known are viscous_1000"),
+        ('damper', 'nowhere.csv', 'damper file nowhere.csv cannot be read'),
+        ('switch_off_level', 0.005, 'switch_off_level (5 mm) must lie below switch_on_level (0.8 mm)'),
+        ('eigenfrequency', 20.0, 'lead_time (7 ms) must stay below an eighth of a period (6.25 ms at 20 Hz)'),
+        (
+            'displacement_range',
+            0.01,
+            'displacement_range can be set before configure: deactivate and clean up',
+        ),
+        ('friction.scale', 1.1, 'friction.scale can be set before configure: deactivate and clean up first'),
+        ('parameters_file', 'x.yaml', 'parameters_file can be set before configure'),
+        ('lockstep', False, 'lockstep can be set before configure'),
+    ],
+)
+def test_what_cannot_be_set_is_refused_with_the_reason_and_changes_nothing(
+    configured, around, at_work, name, value, reason
+):
+    control = configured(lead_time=0.007)
+    if at_work:
+        around.initialise()
+        assert control.trigger_activate() == SUCCESS
+    before = control.get_parameter(name).value
+    (told,) = _set(control, **{name: value})
+    assert reason in told
+    assert control.get_parameter(name).value == before
+
+
+def test_what_is_set_on_an_inactive_node_acts_at_its_activation(configured, around, sine):
+    control = configured()
+    assert _set(control, damper='viscous_4000') == []
+    wait_until(lambda: around.events, 'the event')
+    around.initialise()
+    assert control.trigger_activate() == SUCCESS
+    _shake(around, sine)
+    wait_until(lambda: len(around.traces) == 400, 'the traces')
+    wanted = max(abs(trace['desired_force']) for _, trace in around.traces)
+    assert wanted == pytest.approx(4000.0 * (0.05027 - 0.004), rel=0.05)
+
+
+def test_before_it_is_configured_and_after_cleanup_everything_can_be_set(make_control):
+    control = make_control()
+    assert _set(control, displacement_range=0.01, switch_off_level=0.005, switch_on_level=0.006) == []
+    assert control.trigger_configure() == SUCCESS
+    assert len(_set(control, displacement_range=0.02)) == 1
+    assert control.trigger_cleanup() == SUCCESS
+    assert _set(control, displacement_range=0.02) == []
+
+
+def test_a_damper_file_is_in_the_parameters_with_its_points(make_control, tmp_path):
+    file = tmp_path / 'own.csv'
+    file.write_text('velocity,force\n0,0\n0.004,0\n0.1,200\n')
+    control = make_control(damper=str(file))
+    assert control.trigger_configure() == SUCCESS
+    kept = control.get_parameter('damper').value
+    assert kept == '{velocity: [0.0, 0.004, 0.1], force: [0.0, 0.0, 200.0]}'
+    np.testing.assert_array_equal(control._damper.table, damper_curve(str(file)).table)
+    # at run time too, and the file is not asked for again
+    assert _set(control, damper='viscous_1000') == []
+    file.write_text('velocity,force\n0,0\n0.1,100\n')
+    assert _set(control, damper=str(file)) == []
+    assert control.get_parameter('damper').value == '{velocity: [0.0, 0.1], force: [0.0, 100.0]}'
+    file.unlink()
+    assert _set(control, quality=0.8) == []
+    assert control._damper.force(0.1) == pytest.approx(100.0)

@@ -5,6 +5,7 @@ kHz. So the positions, lengths, signs, scales and limits are read from its datab
 call of a compiled bit field does the work. A test holds the result against cantools.
 """
 
+import math
 from collections.abc import Sequence
 from decimal import Decimal
 from operator import itemgetter
@@ -51,6 +52,10 @@ class Scaling:
             f'{self.name} ({value:g} {self.unit}) must lie within {self.low:g} .. {self.high:g} {self.unit}; '
             f'send a reading outside as not valid (NaN)'
         )
+
+    def within(self, value: float) -> float:
+        """Return `value`, or NaN where it lies outside the limits."""
+        return value if self.raw_low <= value * self.steps <= self.raw_high else math.nan
 
     def to_si(self, raw: int) -> float:
         """Return the SI value of a raw number: the nearest float64, because `steps` is a whole number."""

@@ -1,33 +1,42 @@
 """Damper characteristics: the friction force that control asks for, as a table over speed.
 
 Each law is one class: it gives the force magnitude above a dead zone, in which no force is asked for, so that
-the pads do not stick (Sec. 5). `damper_curve` turns a name or a law into a table with a uniform grid.
+the pads do not stick (Sec. 5). `damper_curve` turns a name, a law or points of one's own into a table with a
+uniform grid; what a parameter says, it says as a text, and here alone texts are understood.
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
+import yaml
 
 from mount_models.compiled import compiled
+from mount_models.damper_points import (
+    COLUMNS,
+    FILE_ENDINGS,
+    HIGHEST_VELOCITY,
+    DamperError,
+    checked_points,
+    points_in,
+)
 from mount_models.elementary import expm1
 from mount_models.quantity import ParameterError, Quantity, checked
 
 FloatArray = npt.NDArray[np.float64]
 
-HIGHEST_VELOCITY = 1.0
-"""The table ends here (m/s, chosen): twenty times the peak velocity of 8 Hz with 1 mm."""
 SMALLEST_DEAD_ZONE = 0.0001
 """A dead zone is none at all or at least this wide (m/s, chosen), because it sets the grid of the table."""
 LONGEST_VELOCITY_STEP = 0.0005
 """Grid of the table (m/s, chosen), so that bent laws are met within 0.01 N."""
-
-
-class DamperError(ValueError):
-    """A damper characteristic cannot be built; the text says why and the remedy."""
+STEP_OF_POINTS = 0.0001
+"""Grid of the table of an own characteristic (m/s, chosen), whose corners lie anywhere."""
+_VISCOUS = re.compile(r'viscous_(\d+(\.\d*)?([eE][+-]?\d+)?)')
 
 
 @dataclass(frozen=True)
@@ -143,28 +152,75 @@ DAMPERS: dict[str, Any] = {
     'degressive': DegressiveDamper(),
     'progressive': ProgressiveDamper(),
 }
-"""The characteristics that can be chosen by name."""
+"""The characteristics with a name of their own."""
+
+_KNOWN = (
+    f'{", ".join(DAMPERS)}, viscous_<N s/m>, a law such as {{law: viscous, dead_zone: 0.002}}, points '
+    f'{{{COLUMNS[0]}: [0, 0.1], {COLUMNS[1]}: [0, 200]}}, or a file of points ({", ".join(FILE_ENDINGS)})'
+)
 
 
 def damper_curve(choice: str | Mapping[str, Any] | DamperLaw) -> DamperCurve:
-    """Return the curve of a name in `DAMPERS`, of a law, or of a mapping that names law and parameters.
+    """Return the curve of a text, a law, or a mapping: of a law and its parameters, or of points.
 
-    A mapping is such as {'law': 'viscous', 'dead_zone': 0.002}; what it leaves out has its default.
-    Raises `DamperError` if name or law is unknown, `ParameterError` for a value outside its range.
+    A text is a name in `DAMPERS`, `viscous_<N s/m>`, a mapping in YAML, or the path of a file of points.
+    A mapping is such as {'law': 'viscous', 'dead_zone': 0.002}; what it leaves out has its default; or
+    {'velocity': [...], 'force': [...]} in m/s and N, joined by straight lines and constant behind the last.
+    Raises `DamperError` if it is unknown or unusable, `ParameterError` for a value outside its range.
     """
     if isinstance(choice, str):
-        if choice not in DAMPERS:
-            raise DamperError(f'no damper curve is called {choice!r}; known are {", ".join(DAMPERS)}')
-        return _tabulated(choice, DAMPERS[choice])
+        return _curve_of_text(choice)
     if isinstance(choice, Mapping):
+        if 'law' not in choice and set(choice) & set(COLUMNS):
+            return _curve_of_points('points', choice)
         return _tabulated(str(choice.get('law')), _law_of(choice))
     return _tabulated(type(choice).__name__, choice)
+
+
+def damper_text(choice: str | Mapping[str, Any]) -> str:
+    """Return a text that means what `choice` means, also where a file that it names is not there."""
+    if isinstance(choice, str) and _is_file(choice):
+        choice = points_in(Path(choice).expanduser())
+    if isinstance(choice, Mapping):
+        return yaml.safe_dump(dict(choice), default_flow_style=True, sort_keys=False, width=1 << 30).strip()
+    return choice
 
 
 def viscous(damping_coefficient: float, dead_zone: float = 0.004, force_limit: float = 300.0) -> DamperCurve:
     """Return the curve c_d max(|v| - dead zone, 0), c_d in N s/m, dead zone in m/s, limited in N."""
     law = ViscousDamper(damping_coefficient, dead_zone, force_limit)
     return _tabulated(f'viscous_{damping_coefficient:g}', law)
+
+
+def _curve_of_text(text: str) -> DamperCurve:
+    if text in DAMPERS:
+        return _tabulated(text, DAMPERS[text])
+    if viscous_text := _VISCOUS.fullmatch(text):
+        return _tabulated(text, ViscousDamper(float(viscous_text[1])))
+    if _is_file(text):
+        path = Path(text).expanduser()
+        return _curve_of_points(path.stem, points_in(path))
+    try:
+        mapping = yaml.safe_load(text)
+    except yaml.YAMLError:
+        mapping = None
+    if isinstance(mapping, Mapping):
+        return damper_curve(mapping)
+    raise DamperError(f'no damper curve is called {text!r:.60}; known are {_KNOWN}')
+
+
+def _is_file(text: str) -> bool:
+    return text.endswith(FILE_ENDINGS)
+
+
+def _curve_of_points(name: str, columns: Mapping[str, Any]) -> DamperCurve:
+    velocity, force = checked_points(columns)
+    grid = np.arange(math.floor(velocity[-1] / STEP_OF_POINTS * (1.0 + 1e-12)) + 1) * STEP_OF_POINTS
+    table = np.interp(grid, velocity, force)
+    if not table.max() > 0.0:
+        raise DamperError(f'the points of the damper {name} must reach beyond {STEP_OF_POINTS:g} m/s')
+    table.flags.writeable = False
+    return DamperCurve(name, table, STEP_OF_POINTS)
 
 
 def _law_of(values: Mapping[str, Any]) -> Any:

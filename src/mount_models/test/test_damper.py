@@ -13,9 +13,12 @@ from mount_models.damper import (
     ViscousDamper,
     damper_curve,
     damper_force,
+    damper_text,
     viscous,
 )
 from mount_models.quantity import ParameterError
+
+POINTS = {'velocity': [0.0, 0.004, 0.05, 0.2], 'force': [0.0, 0.0, 90.0, 150.0]}
 
 
 @given(
@@ -81,6 +84,66 @@ def test_mapping_chooses_law_and_parameters():
     assert np.array_equal(curve.table, damper_curve(ViscousDamper(2500.0, 0.002)).table)
 
 
+@pytest.mark.parametrize('damping_coefficient', ['1', '2500', '2500.5', '1e3', '1e5'])
+def test_any_viscous_damper_within_its_limits_has_a_name(damping_coefficient):
+    curve = damper_curve(f'viscous_{damping_coefficient}')
+    assert np.array_equal(curve.table, damper_curve(ViscousDamper(float(damping_coefficient))).table)
+
+
+def test_a_text_says_what_a_mapping_says():
+    for mapping in ({'law': 'viscous', 'damping_coefficient': 2500.0, 'dead_zone': 0.002}, POINTS):
+        text = damper_text(mapping)
+        assert '\n' not in text
+        assert np.array_equal(damper_curve(text).table, damper_curve(mapping).table)
+    assert damper_text('viscous_2500') == 'viscous_2500'
+
+
+def test_points_are_joined_by_straight_lines_and_constant_behind_the_last():
+    curve = damper_curve(POINTS)
+    assert curve.force([0.0, 0.002, 0.004]) == pytest.approx([0.0, 0.0, 0.0])
+    assert curve.force([0.027, 0.05, 0.1, 0.2, 3.0]) == pytest.approx([45.0, 90.0, 110.0, 150.0, 150.0])
+    assert curve.force(-0.05) == pytest.approx(-90.0)
+
+
+@pytest.mark.parametrize(
+    ('name', 'text'),
+    [
+        ('own.csv', '# measured\nvelocity, force\n0, 0\n0.004, 0\n0.05, 90\n\n0.2, 150\n'),
+        ('own.csv', '\ufeffforce,velocity\r\n0,0\r\n0,0.004\r\n90,0.05\r\n150,0.2\r\n'),
+        ('own.yaml', 'velocity: [0, 4e-3, 0.05, 0.2]\nforce: [0, 0, 90, 150]\n'),
+    ],
+)
+def test_a_file_holds_the_same_points(tmp_path, name, text):
+    file = tmp_path / name
+    file.write_text(text, encoding='utf-8')
+    curve = damper_curve(str(file))
+    assert np.array_equal(curve.table, damper_curve(POINTS).table)
+    assert curve.name == 'own'
+    kept = damper_text(str(file))
+    file.unlink()
+    assert np.array_equal(damper_curve(kept).table, curve.table)
+
+
+@pytest.mark.parametrize(
+    ('name', 'text', 'reason'),
+    [
+        ('own.csv', '', 'its first line must be velocity,force'),
+        ('own.csv', 'v,F\n0,0\n', "its first line must be velocity,force; instead it is 'v,F'"),
+        ('own.csv', 'velocity,force\n0,0\n0.1,ten\n', "'0.1,ten' is not a line of two numbers"),
+        ('own.csv', 'velocity,force\n0,0\n0.1\n', "'0.1' is not a line of two numbers"),
+        ('own.csv', 'velocity,force\n0,0\n0.1,nan\n', 'force must be finite; number 2 is nan'),
+        ('own.yaml', 'velocity: [0', 'damper file'),
+        ('own.yaml', '- 3', 'must have the columns velocity and force'),
+    ],
+)
+def test_a_file_that_holds_no_points_is_refused_and_named(tmp_path, name, text, reason):
+    file = tmp_path / name
+    file.write_text(text)
+    with pytest.raises(DamperError, match=reason) as refused:
+        damper_curve(str(file))
+    assert f'damper file {file}' in str(refused.value)
+
+
 def test_unknown_velocity_gives_unknown_force():
     curve = damper_curve('viscous_2000')
     assert np.isnan(damper_force(curve.table, curve.velocity_step, np.nan))
@@ -94,7 +157,32 @@ def test_table_cannot_be_changed_behind_the_curve():
 @pytest.mark.parametrize(
     ('choice', 'error', 'sentence'),
     [
-        ('viscous_5', DamperError, "no damper curve is called 'viscous_5'; known are viscous_1000"),
+        ('soft', DamperError, "no damper curve is called 'soft'; known are viscous_1000"),
+        ('viscous_5x', DamperError, 'known are .* viscous_<N s/m>, a law such as .*, points .*, or a file'),
+        ('{law: viscous', DamperError, "no damper curve is called '{law: viscous'"),
+        ('viscous_0.5', ParameterError, r'damping_coefficient \(0.5 N s/m\) must lie within 1 \.\. 100000'),
+        ('{velocity: [0, 1]}', DamperError, 'must have the columns velocity and force, m/s and N'),
+        (
+            {'velocity': [0, 1], 'force': 3},
+            DamperError,
+            'force must be a list of numbers; instead received 3',
+        ),
+        ({'velocity': [0, 1], 'force': [0, 'x']}, DamperError, 'force must be a list of numbers'),
+        ({'velocity': [0, 1, 2], 'force': [0, 1]}, DamperError, r'\(3 numbers\) and force \(2 numbers\)'),
+        ({'velocity': [0], 'force': [0]}, DamperError, 'needs 2 to 10000 points; instead received 1'),
+        ({'velocity': [0, np.nan], 'force': [0, 1]}, DamperError, 'velocity must be finite; number 2 is nan'),
+        (
+            {'velocity': [0, 0.1, 0.1], 'force': [0, 1, 2]},
+            DamperError,
+            'must rise strictly within 0 .. 1 m/s',
+        ),
+        ({'velocity': [-0.1, 0.1], 'force': [0, 1]}, DamperError, 'give magnitudes'),
+        ({'velocity': [0, 2], 'force': [0, 1]}, DamperError, r'velocity \(0 \.\. 2 m/s\)'),
+        ({'velocity': [0, 1], 'force': [5, 9]}, DamperError, r'force \(5 N at first.* must begin at 0 N'),
+        ({'velocity': [0, 0.5, 1], 'force': [0, -1, 9]}, DamperError, 'friction only opposes motion'),
+        ({'velocity': [0, 1], 'force': [0, 1e5]}, DamperError, r'within 0 \.\. 10000 N'),
+        ({'velocity': [0, 1], 'force': [0, 0]}, DamperError, 'must be greater than 0 N somewhere'),
+        ('nowhere.csv', DamperError, r'damper file nowhere.csv cannot be read \(No such file or directory\)'),
         ({'law': 'magic'}, DamperError, "no damper law is called 'magic'; known are viscous"),
         ({'damping_coefficient': 5.0}, DamperError, 'no damper law is called None'),
         ({'law': 'viscous', 'slope': 5.0}, ParameterError, 'slope is no parameter of the viscous damper'),

@@ -8,6 +8,7 @@ message was sent and when it arrived.
 import operator
 import threading
 import time
+import traceback
 from collections.abc import Callable
 
 from rclpy.node import Node
@@ -29,18 +30,35 @@ class Collector:
     """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first.
 
     The thread is its own, or (`thread`) the one that also serves the publishers: two that take turns in one
-    process cost more than the work. Only that one can `attend` to other work too.
+    process cost more than the work. Only that one can `attend` to other work too. `on_failure` takes the
+    sentence on the exception that has ended a thread of its own.
     """
 
-    def __init__(self, owner: Node, *, thread: DataThread | None = None):
+    def __init__(
+        self,
+        owner: Node,
+        *,
+        thread: DataThread | None = None,
+        on_failure: Callable[[str], None] = lambda sentence: None,
+    ):
         self.node = io_node(owner)
+        self.refused = 0
+        """Messages whose receiver raised an exception; `refusal` says what the last one was."""
+        self.refusal = ''
         self._shared_thread = thread
+        self._on_failure = on_failure
+        self._failure = ''
         self._taken_at = 0.0
         self._works: list[Work] = [self._take_when_due]
         self._attended: list[Work] = []
         self._receivers: list[tuple[Subscription, Receive]] = []
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
+
+    @property
+    def failure(self) -> str:
+        """Why the thread that takes the messages has ended by itself; empty while it serves."""
+        return self._failure if self._shared_thread is None else self._shared_thread.failure
 
     def collect(self, topic: Topic, receive: Receive) -> Subscription:
         """Hand every message of `topic` to `receive`."""
@@ -88,9 +106,15 @@ class Collector:
         self.node.destroy_node()
 
     def _serve(self) -> None:
-        while not self._ending.wait(_PERIOD):
+        try:
+            while not self._ending.wait(_PERIOD):
+                self._take_batch()
             self._take_batch()
-        self._take_batch()
+        except BaseException as error:
+            # The border of the thread: unheard, its end would leave a recording without its messages.
+            traceback.print_exc()
+            self._failure = f'the thread that takes the messages has ended: {type(error).__name__}: {error}'
+            self._on_failure(self._failure)
 
     def _take_when_due(self) -> bool:
         now = time.monotonic()
@@ -113,8 +137,9 @@ class Collector:
                 receive(raw, received, sent)
             except Exception as error:
                 # The border of the thread: what one message does must not cost all others.
-                text = f'a message was not taken: {type(error).__name__}: {error}'
-                self.node.get_logger().error(text, throttle_duration_sec=1.0)
+                self.refused += 1
+                self.refusal = f'a message was not taken: {type(error).__name__}: {error}'
+                self.node.get_logger().error(self.refusal, throttle_duration_sec=1.0)
 
 
 def _never_called(_: bytes) -> None:

@@ -6,8 +6,10 @@ share the thread too: a message from one to the other then wakes nobody, and a t
 between the messages takes them itself, which costs less than to have an executor tell of each.
 """
 
+import contextlib
 import threading
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,9 +29,18 @@ _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
 _IDLE_PERIOD = 1e-4  # s, chosen: how long it sleeps when there is neither message nor work,
 _LONGEST_IDLE_PERIOD = 2e-3  # s, chosen: and how long when it has been so for a while
 _RARE_PERIOD = 0.05  # s, chosen: how often it looks at what nobody waits for
+_PATIENCE = 10.0  # s, chosen: for a change in what the thread serves; it takes less than a millisecond
 
 Work = Callable[[], bool]
 """Does what there is to do without waiting; returns whether there was anything."""
+
+
+class DataThreadError(RuntimeError):
+    """The data thread does not do what it is asked to; the text says why."""
+
+
+class DataThreadEndedError(DataThreadError):
+    """The data thread has ended by an exception; it serves nothing any more."""
 
 
 def io_node(owner: Node) -> Node:
@@ -56,11 +67,20 @@ class DataPath:
         self._inlets = _Inlets()
         self._works: list[Work] = []
         self._stopped = False
+        self.refused = 0
+        """Messages and pieces of work that ended with an exception; `refusal` says what the last one was."""
+        self.refusal = ''
+
+    @property
+    def failure(self) -> str:
+        """Why the thread that serves this path has ended by itself; empty while it serves."""
+        return self._thread.failure
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create a publisher of `topic`."""
         publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
-        self._publishers.append(publisher)
+        if topic.delivery is not Delivery.MARK:  # a mark that nobody hears is no loss
+            self._publishers.append(publisher)
         return publisher
 
     def sender(self, topic: Topic) -> Callable[[bytes], None]:
@@ -70,7 +90,7 @@ class DataPath:
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`.
 
-        An exception costs the message that it came with, and is logged; later ones are served.
+        An exception costs the message that it came with, is logged and counted; later ones are served.
         """
         subscription = self.node.create_subscription(
             message_class(topic.type),
@@ -152,7 +172,9 @@ class DataPath:
             try:
                 return callback(*arguments)
             except Exception as error:
-                logger.error(f'{trouble}: {type(error).__name__}: {error}', throttle_duration_sec=1.0)
+                self.refused += 1
+                self.refusal = f'{trouble}: {type(error).__name__}: {error}'
+                logger.error(self.refusal, throttle_duration_sec=1.0)
                 return False
 
         return guarded
@@ -176,21 +198,42 @@ class _Inlets:
         return dropped
 
 
+@dataclass
+class _Change:
+    """A change in what a thread serves, and what came of it for the one who waits for it."""
+
+    make: Callable[[], Any]
+    done: threading.Event = field(default_factory=threading.Event)
+    error: Exception | None = None
+
+    def attempt(self) -> None:
+        """Make the change; what it raises is a matter of the one who asked, not of the thread."""
+        try:
+            self.make()
+        except Exception as error:
+            self.error = error
+
+
 class DataThread:
     """A thread that serves nodes and does attended work; it lives as long as there is one or the other.
 
     Without work it sleeps in an EventsExecutor. With work it looks after messages by itself too: the last
     node and the last work come first, so that a sample passes through the whole chain in one round where
     those who listen were there before those who speak.
+
+    An exception ends it: `failure` says which, `on_failure` takes the same sentence in this thread, and
+    whoever waits or asks for a change gets `DataThreadEndedError`. To leave it is done then.
     """
 
-    def __init__(self, context: Context):
+    def __init__(self, context: Context, on_failure: Callable[[str], None] = lambda sentence: None):
+        self.failure = ''
         self._context = context
+        self._on_failure = on_failure
         self._executor: Executor | None = None
         self._thread: threading.Thread | None = None
         self._nodes: dict[Node, _Inlets] = {}
         self._works: list[Work] = []
-        self._changes: list[tuple[Callable[[], Any], threading.Event]] = []
+        self._changes: list[_Change] = []
         self._guard = threading.Lock()
 
     def add(self, node: Node, inlets: _Inlets) -> None:
@@ -199,7 +242,8 @@ class DataThread:
 
     def remove(self, node: Node) -> None:
         """Return when `node` is served no more and none of its callbacks runs."""
-        self._change(lambda: self._nodes.pop(node))
+        with contextlib.suppress(DataThreadEndedError):
+            self._change(lambda: self._nodes.pop(node))
 
     def attend(self, work: Work) -> None:
         """Do `work` between the messages from now on, again and again."""
@@ -207,22 +251,56 @@ class DataThread:
 
     def leave(self, work: Work) -> None:
         """Return when `work` is done no more and does not run."""
-        self._change(lambda: self._works.remove(work))
+        with contextlib.suppress(DataThreadEndedError):
+            self._change(lambda: self._works.remove(work))
 
-    def _change(self, change: Callable[[], Any]) -> None:
-        done = threading.Event()
+    def _change(self, make: Callable[[], Any]) -> None:
+        """Return when the change is made, or raise what prevents it; never waits for ever."""
+        if threading.current_thread() is self._thread:
+            raise DataThreadError('a callback of the data thread cannot wait for the data thread')
+        change = _Change(make)
         with self._guard:
-            self._changes.append((change, done))
-            if self._executor is None:
-                self._executor = EventsExecutor(context=self._context)
-                arguments = (self._executor,)
-                self._thread = threading.Thread(target=self._serve, args=arguments, name='data', daemon=True)
-                self._thread.start()
-            self._executor.wake()
+            if not self.failure:
+                self._changes.append(change)
+                self._wake()
             thread = self._thread
-        done.wait()
+        if not self.failure and not change.done.wait(_PATIENCE):
+            raise DataThreadError(
+                f'the data thread has not answered for {_PATIENCE:g} s: one of its callbacks does not return'
+            )
         if self._executor is None and thread is not None:
             thread.join()  # an executor that outlives its context ends the process with an abort
+        if self.failure and not change.done.is_set():
+            raise DataThreadEndedError(self.failure)
+        if change.error is not None:
+            raise change.error
+
+    def _wake(self) -> None:
+        """Let the thread look at the changes; begin it where there is none."""
+        if self._executor is None:
+            self._executor = EventsExecutor(context=self._context)
+            arguments = (self._executor,)
+            self._thread = threading.Thread(target=self._run, args=arguments, name='data', daemon=True)
+            self._thread.start()
+        self._executor.wake()
+
+    def _run(self, executor: Executor) -> None:
+        try:
+            self._serve(executor)
+        except BaseException as error:
+            # The border of the thread: unheard, its end would leave the callers waiting for ever.
+            traceback.print_exc()
+            self._fail(f'the data thread has ended: {type(error).__name__}: {error}')
+
+    def _fail(self, sentence: str) -> None:
+        with self._guard:
+            self.failure = sentence
+            self._executor = None
+            waiting, self._changes = self._changes, []
+        for change in waiting:
+            change.error = DataThreadEndedError(sentence)
+            change.done.set()
+        self._on_failure(sentence)
 
     def _serve(self, executor: Executor) -> None:
         while self._apply_changes(executor):
@@ -236,9 +314,8 @@ class DataThread:
     def _apply_changes(self, executor: Executor) -> bool:
         """Return whether there is anything left to serve or to do."""
         with self._guard:
-            changes, self._changes = self._changes, []
-            for change, _ in changes:
-                change()
+            for change in self._changes:
+                change.attempt()
             waking = {node for node, inlets in self._nodes.items() if not inlets.resting}
             wanted = set() if self._works else waking
             served = set(executor.get_nodes())
@@ -251,8 +328,9 @@ class DataThread:
             serving = bool(self._nodes) or bool(self._works)
             if not serving:
                 self._executor = None
-            for _, done in changes:
-                done.set()
+            changes, self._changes = self._changes, []
+            for change in changes:
+                change.done.set()
             return serving
 
     def _wait_for_events(self, executor: Executor, nodes: Sequence[_Inlets]) -> None:

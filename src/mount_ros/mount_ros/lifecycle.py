@@ -1,13 +1,15 @@
 """A lifecycle node that fails closed: every error ends in the safe state, with a sentence that says why."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mount_ros.collector import Collector
 from mount_ros.data_path import DataPath, DataThread
 from mount_ros.diagnostics import Diagnostics, Level, Verdict
+from mount_ros.parameter_gate import Change, ParameterGate
 from mount_ros.scheduling import calm_resending
 
 
@@ -17,14 +19,21 @@ class SafeLifecycleNode(LifecycleNode):
     A node overrides `configure`, `activate`, `deactivate`, `cleanup` and `judge`; it raises an
     exception with a clear sentence where a step cannot be done. `deactivate` must leave the coil at
     0 A and is called on every way out of the active state.
+
+    Once it is configured its parameters stand still, except those in `run_time_parameters`.
     """
+
+    run_time_parameters: frozenset[str] = frozenset()
+    """Names of the parameters that can be set on the configured node: `check_parameters`, `take_changes`."""
 
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
+        self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
         self._lockstep = bool(self.declare_parameter('lockstep', False).value)
         self.data_path: DataPath | Collector | None = None
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
         self.after_configure: Callable[[], None] = _nothing  # what a process wants done then
+        self.after_failure: Callable[[], None] = _nothing  # and when a thread of the node has ended by itself
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
@@ -45,6 +54,12 @@ class SafeLifecycleNode(LifecycleNode):
     def cleanup(self) -> None:
         """Release what `configure` made."""
 
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        """Raise a `ValueError` if the configured node could not go on with these values, {name: value}."""
+
+    def take_changes(self, changes: Mapping[str, Change]) -> None:
+        """Go on with the parameters as they are now; `changes` were set while the node was configured."""
+
     def judge(self) -> Verdict:
         """Return the verdict on the active node; must be quick and must not block."""
         return Verdict(Level.OK, 'active')
@@ -63,15 +78,22 @@ class SafeLifecycleNode(LifecycleNode):
 
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
-        path = DataPath(self, lockstep=self.lockstep, thread=self.data_thread)
+        thread = self.data_thread or DataThread(self.context, self.tell_failure)
+        path = DataPath(self, lockstep=self.lockstep, thread=thread)
         self.data_path = path
         return path
 
     def open_collector(self) -> Collector:
         """Create the data path of a node that takes all messages but answers none."""
-        collector = Collector(self, thread=self.data_thread if self.lockstep else None)
+        thread = self.data_thread if self.lockstep else None
+        collector = Collector(self, thread=thread, on_failure=self.tell_failure)
         self.data_path = collector
         return collector
+
+    def tell_failure(self, sentence: str) -> None:
+        """Say that a thread of the node has ended by itself; the process ends the node then."""
+        self.get_logger().fatal(sentence)
+        self.after_failure()
 
     def close(self) -> None:
         """Leave the active state and release everything; called once at the end of the process."""
@@ -91,6 +113,8 @@ class SafeLifecycleNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._lockstep = bool(self.get_parameter('lockstep').value)
         outcome = self._attempt('configure', self.configure, undo=self._release)
+        if outcome == TransitionCallbackReturn.SUCCESS:
+            self._gate.close()
         self.after_configure()
         return outcome
 
@@ -145,10 +169,11 @@ class SafeLifecycleNode(LifecycleNode):
         self._make_safe(self.deactivate)
 
     def _release(self) -> None:
+        self._gate.open()
         self._make_safe(self.cleanup)
-        if self.data_path is not None:
-            self.data_path.stop()
-            self.data_path = None
+        path, self.data_path = self.data_path, None
+        if path is not None:
+            self._make_safe(path.stop)
 
     def _make_safe(self, step) -> None:
         try:
@@ -157,13 +182,19 @@ class SafeLifecycleNode(LifecycleNode):
             self.get_logger().error(f'{step.__name__} failed: {type(error).__name__}: {error}')
 
     def _present_verdict(self) -> Verdict:
-        verdict = self._verdict_without_matches()
-        unmatched = ', '.join(self.data_path.unmatched()) if self.data_path is not None else 'not configured'
+        path = self.data_path
+        verdict = self._verdict_without_path()
+        if path is not None and path.failure:
+            verdict = Verdict(Level.ERROR, path.failure, {**verdict.figures, 'fatal': True})
+        elif path is not None and path.refused and verdict.level is Level.OK:
+            sentence = f'errors in the data path ({path.refused}), the last: {path.refusal}'
+            verdict = Verdict(Level.WARN, sentence, verdict.figures)
+        unmatched = ', '.join(path.unmatched()) if path is not None else 'not configured'
         state = 'active' if self._active else 'inactive'
         figures = {**verdict.figures, 'state': state, 'unmatched': unmatched}
         return Verdict(verdict.level, verdict.sentence, figures)
 
-    def _verdict_without_matches(self) -> Verdict:
+    def _verdict_without_path(self) -> Verdict:
         if self._refusal:
             return Verdict(Level.ERROR, self._refusal)
         if not self._active:

@@ -32,17 +32,18 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's rest.
 
     At the end they are closed in reverse order, so that who sends setpoints ends before who carries them.
-    An exception in one of them ends all in the same way, with exit code 1.
+    An exception in one of them or in a thread of its data ends all in the same way, with exit code 1.
     """
     prepare_environment()
     # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     nodes = [create() for create in creates]
-    data_thread = DataThread(nodes[0].context)
+    data_thread = DataThread(nodes[0].context, nodes[0].tell_failure)
+    over = _Ending()
     for node in nodes:
         node.data_thread = data_thread
         node.after_configure = _freeze
-    over = _Ending()
+        node.after_failure = over.tell_failure
     over.listen(signal.SIGINT, signal.SIGTERM)
     _freeze()
     services = [_Service(node, over) for node in nodes]
@@ -54,7 +55,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         service.end()
     for node in reversed(nodes):
         node.close()
-    code = 1 if any(service.failed for service in services) else 0
+    code = 1 if over.failed else 0
     if not leave_middleware(partial(_take_down, nodes)) or code:
         end_process(code)
 
@@ -94,6 +95,7 @@ class _Ending:
     def __init__(self) -> None:
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
+        self.failed = False
 
     def listen(self, *signals: int) -> None:
         """Wake the main thread by these signals too."""
@@ -104,6 +106,10 @@ class _Ending:
     def tell(self) -> None:
         with contextlib.suppress(BlockingIOError):  # full: it has been told often enough
             os.write(self._write, b'.')
+
+    def tell_failure(self) -> None:
+        self.failed = True
+        self.tell()
 
     def wait(self) -> None:
         os.read(self._read, 1)
@@ -116,7 +122,6 @@ class _Service:
     """
 
     def __init__(self, node: SafeLifecycleNode, over: _Ending):
-        self.failed = False
         self._node = node
         self._over = over
         self._executor = SingleThreadedExecutor()
@@ -138,7 +143,6 @@ class _Service:
         except Exception as error:
             # The border of the process: nobody would close the nodes, and the others would live on alone.
             traceback.print_exc()
-            self._node.get_logger().fatal(f'{type(error).__name__}: {error}')
-            self.failed = True
+            self._node.tell_failure(f'{type(error).__name__}: {error}')
         finally:
             self._over.tell()

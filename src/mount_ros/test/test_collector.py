@@ -184,3 +184,23 @@ def test_in_a_shared_thread_everything_is_taken_up_to_the_end(context, owner, se
     assert received == list(range(200))
     assert threads == {'data'}
     assert not [thread for thread in threading.enumerate() if thread.name == 'data']
+
+
+def test_the_end_of_the_thread_is_told(owner):
+    """A receiver that fails past every border, as no exception of the middleware's own calls would."""
+    told = []
+    collector = Collector(owner, on_failure=told.append)
+
+    def collapse(raw, received, sent):
+        raise SystemExit('out of order')
+
+    collector.collect(DISPLACEMENT, collapse)
+    sender = Sender(owner)
+    end = sender.open(DISPLACEMENT)
+    wait_until(lambda: not collector.unmatched() and end.get_subscription_count(), 'connection')
+    collector.start()
+    sender.send(DISPLACEMENT, 1)
+    wait_until(lambda: told, 'the failure')
+    sentence = 'the thread that takes the messages has ended: SystemExit: out of order'
+    assert told == [collector.failure] == [sentence]
+    collector.stop()

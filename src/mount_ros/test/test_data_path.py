@@ -5,7 +5,8 @@ import threading
 import pytest
 from rclpy.node import Node
 
-from mount_ros.data_path import DataPath, DataThread
+import mount_ros.data_path
+from mount_ros.data_path import DataPath, DataThread, DataThreadEndedError, DataThreadError
 from mount_ros.scalars import ScalarsLayout
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
@@ -300,3 +301,99 @@ def test_work_that_raises_ends_neither_the_thread_nor_the_service(pair, capfd):
     wait_until(lambda: receiver.stamps == [1], 'arrival')
     receiver.path.stop()
     assert 'work not done: ValueError: too hard' in capfd.readouterr().err
+
+
+# What happens when the thread itself fails. Whoever would wait for ever does so in a thread of the test.
+
+
+class CollapseError(BaseException):
+    """What no border of a callback keeps from the thread."""
+
+
+def _collapse():
+    raise CollapseError('out of order')
+
+
+def _outcome(call, *arguments):
+    """Return what `call` raised, None if nothing; it must come to an end."""
+    outcome = []
+
+    def attempt():
+        try:
+            outcome.append(call(*arguments))
+        except Exception as error:
+            outcome.append(error)
+
+    calling = threading.Thread(target=attempt, daemon=True)
+    calling.start()
+    calling.join(LIMIT)
+    assert outcome, 'the call does not return'
+    return outcome[0]
+
+
+def test_a_change_that_fails_is_told_to_its_caller_and_the_thread_goes_on(pair):
+    receiver, send = pair
+    assert isinstance(_outcome(receiver.path._thread.remove, Node), KeyError)
+    assert isinstance(_outcome(receiver.path._thread.leave, _collapse), ValueError)
+    send(1)
+    wait_until(lambda: receiver.stamps == [1], 'arrival')
+    assert receiver.path.failure == ''
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
+def test_the_end_of_the_thread_is_told_and_nobody_waits_for_it(context, make_end):
+    told = []
+    thread = DataThread(context, told.append)
+    end, other = make_end('end', thread), make_end('other', thread)
+    end.path.start()
+    assert _outcome(end.path.attend, _collapse) is None
+    wait_until(lambda: told, 'the failure')
+    assert told == ['the data thread has ended: CollapseError: out of order']
+    assert end.path.failure == other.path.failure == told[0]
+    refusal = _outcome(other.path.start)
+    assert isinstance(refusal, DataThreadEndedError)
+    assert str(refusal) == told[0]
+    assert not _data_threads()
+    # to be served no more is what has happened already
+    assert _outcome(end.path.leave_work) is None
+    assert _outcome(end.path.stop) is None
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
+def test_who_waits_when_the_thread_ends_gets_the_reason(pair, monkeypatch):
+    receiver, _ = pair
+
+    def fail(executor):
+        raise RuntimeError('the executor is broken')
+
+    monkeypatch.setattr(mount_ros.data_path, '_take_effect', fail)
+    refusal = _outcome(receiver.path.attend, lambda: False)
+    assert isinstance(refusal, DataThreadEndedError)
+    assert 'RuntimeError: the executor is broken' in str(refusal)
+
+
+def test_a_thread_that_does_not_answer_is_not_waited_for_for_ever(pair, monkeypatch):
+    receiver, _ = pair
+    blocked, release = threading.Event(), threading.Event()
+
+    def block():
+        blocked.set()
+        return release.wait(LIMIT)
+
+    receiver.path.attend(block)
+    assert blocked.wait(LIMIT)
+    monkeypatch.setattr(mount_ros.data_path, '_PATIENCE', 0.05)
+    refusal = _outcome(receiver.path.leave_work)
+    release.set()
+    monkeypatch.undo()
+    assert isinstance(refusal, DataThreadError)
+    assert 'has not answered for 0.05 s' in str(refusal)
+
+
+def test_a_callback_that_would_wait_for_its_own_thread_is_refused(pair):
+    receiver, send = pair
+    receiver.path.attend(lambda: receiver.path.leave_work() is not None)
+    wait_until(lambda: receiver.path.refused, 'the refusal')
+    assert 'cannot wait for the data thread' in receiver.path.refusal
+    send(1)
+    wait_until(lambda: receiver.stamps == [1], 'arrival')

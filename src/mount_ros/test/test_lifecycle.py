@@ -246,3 +246,39 @@ def test_lockstep_is_a_parameter_of_every_node(context):
     assert other.lockstep
     for node in (one, other):
         node.destroy_node()
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
+def test_a_data_thread_that_has_ended_is_an_error_whatever_the_node_thinks_of_itself(probe, operator, capfd):
+    told = threading.Event()
+    probe.after_failure = told.set
+
+    def collapse():
+        raise SystemExit('out of order')
+
+    operator.change(CONFIGURE)
+    operator.change(ACTIVATE)
+    probe.data_path.attend(collapse)
+    assert told.wait(LIMIT)
+    sentence = 'the data thread has ended: SystemExit: out of order'
+    wait_until(lambda: operator.heard(Level.ERROR, sentence), 'the sentence in the diagnostics')
+    assert sentence in capfd.readouterr().err
+    assert any(value.key == 'fatal' and value.value == 'True' for value in operator.said[-1].values)
+    assert operator.change(DEACTIVATE)
+    assert operator.change(CLEANUP)
+
+
+def test_errors_in_the_data_path_are_a_warning_where_the_node_knows_of_none(probe, operator):
+    operator.change(CONFIGURE)
+    operator.change(ACTIVATE)
+    fails = [True]
+
+    def work():
+        if fails:
+            fails.clear()
+            raise ValueError('too hard')
+        return False
+
+    probe.data_path.attend(work)
+    sentence = 'errors in the data path (1), the last: work not done: ValueError: too hard'
+    wait_until(lambda: operator.heard(Level.WARN, sentence), 'the sentence in the diagnostics')

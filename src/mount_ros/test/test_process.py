@@ -149,6 +149,17 @@ def test_an_exception_in_a_node_ends_all_nodes_of_its_process_with_code_1(start,
     assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup']
 
 
+def test_the_end_of_the_data_thread_ends_the_process_with_the_reason_and_code_1(start):
+    """It is attended work that fails past every border; the nodes are closed as at a signal."""
+    collapse = "(lambda: (_ for _ in ()).throw(SystemExit('out of order')))"
+    process = start(2, in_service=f"if self.get_name() == 'two': self.data_path.attend({collapse})")
+    code, errors = process.end()
+    assert code == 1
+    assert '[FATAL] [two]: the data thread has ended: SystemExit: out of order' in errors
+    said = [line for line in process.lines if 'served' not in line]
+    assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup']
+
+
 SLEEPER = """
 import signal, threading
 from mount_ros.process import _Ending

@@ -54,9 +54,19 @@ class CanEnd:
     def measurement_frame(
         self, number: int, microseconds: int, reading: Reading, enabled: bool
     ) -> can.Message:
-        """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock."""
+        """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock.
+
+        What lies beyond the limits of its signal, and so of its sensor, is sent as not valid.
+        """
+        codec = self._codec
         measurement = Measurement(
-            number & _COUNTER_MASK, microseconds & _MICROSECOND_MASK, *reading, enabled=enabled
+            number & _COUNTER_MASK,
+            microseconds & _MICROSECOND_MASK,
+            codec.displacement.within(reading.displacement),
+            codec.coil_current.within(reading.coil_current),
+            codec.current_rate.within(reading.current_rate),
+            codec.flux_rate.within(reading.flux_rate),
+            enabled=enabled,
         )
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
         return Frame(self._codec.measurement.frame_id, data)

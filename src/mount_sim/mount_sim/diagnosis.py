@@ -3,7 +3,7 @@
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.diagnostics import Level, Verdict
 from mount_sim.loop import LoopFigures
-from mount_sim.simulated_mount import Run
+from mount_sim.simulated_mount import FARTHEST_DISPLACEMENT, Run
 
 DRIVING, FINISHED = 'driving', 'finished'
 LATE_SHARE = 0.05  # chosen: of the samples; beyond it the machine is too busy for real time
@@ -23,6 +23,8 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
         'overruns': figures.overruns,
         'latency_median_s': f'{figures.latency.quantile(0.5):.7f}',
         'latency_p99_s': f'{figures.latency.quantile(0.99):.7f}',
+        'beyond_range': figures.beyond_range.samples,
+        'first_beyond_range_s': f'{figures.beyond_range.first:.3f}',
         'fatal': bool(figures.failure),
     }
     if figures.failure:
@@ -30,6 +32,9 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
         return Verdict(Level.ERROR, figures.failure, values)
     if samples >= run.samples:
         return Verdict(Level.OK, FINISHED, values)
+    if figures.beyond_range.samples:
+        sentence = beyond_range_sentence(figures.beyond_range.samples, figures.beyond_range.first)
+        return Verdict(Level.WARN, sentence, values)
     if not lockstep and figures.overruns > LATE_SHARE * max(samples, 1000):
         return Verdict(
             Level.WARN,
@@ -38,3 +43,12 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
             values,
         )
     return Verdict(Level.OK, DRIVING, values)
+
+
+def beyond_range_sentence(samples: int, first: float) -> str:
+    """Return what is to be told of displacements beyond the sensor's range, the first at `first` s."""
+    limit = 1e3 * FARTHEST_DISPLACEMENT
+    return (
+        f'the simulated mount moved beyond the {limit:g} mm of its displacement sensor in {samples} samples, '
+        f'first at {first:.3f} s; they were sent as not valid and answered with 0 A: excite it less'
+    )

@@ -11,7 +11,7 @@ from mount_ros.timing import LatencyHistogram
 from mount_sim.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics import STATUS_EVERY, ElectronicsParameters
 from mount_sim.faults import Fault
-from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
+from mount_sim.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
 
 _LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
 _REMEMBERED = 1024  # samples whose sending time is kept
@@ -32,6 +32,7 @@ class LoopFigures:
     wall_time: float = 0.0
     latency: LatencyHistogram = field(default_factory=LatencyHistogram)
     failure: str = ''
+    beyond_range: BeyondRange = field(default_factory=BeyondRange)
 
 
 class ElectronicsLoop:
@@ -56,7 +57,8 @@ class ElectronicsLoop:
         self._asked_at = 0.0
         self._answered_first = math.nan
         self._failed_told = 0  # setpoint frames that had failed their check by the last status
-        self.figures = LoopFigures()
+        self._beyond_told = 0  # samples beyond the sensor's range, when the last status was sent
+        self.figures = LoopFigures(beyond_range=mount.beyond_range)
         self.last_latency = math.nan
 
     def run_in_real_time(self, ending: threading.Event) -> None:
@@ -161,10 +163,12 @@ class ElectronicsLoop:
             )
 
     def _status(self) -> Status:
-        told, self._failed_told = self._failed_told, self._can_end.failed_setpoints
+        failed, self._failed_told = self._failed_told, self._can_end.failed_setpoints
+        beyond, self._beyond_told = self._beyond_told, self._mount.beyond_range.samples
         return Status(
+            displacement_sensor=self._beyond_told > beyond,
             supply_voltage=self._electronics.supply_voltage,
             coil_temperature_celsius=self._electronics.coil_temperature,
             setpoint_timeout=not self._mount.enabled,
-            e2e_error=self._failed_told > told,
+            e2e_error=self._failed_told > failed,
         )

@@ -22,7 +22,7 @@ from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
 from mount_sim.plant import TRUTH
 from mount_sim.scenario import build_excitation
-from mount_sim.simulated_mount import SimulatedMount
+from mount_sim.simulated_mount import DivergedError, SimulatedMount
 
 _SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
 _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
@@ -110,7 +110,7 @@ class MountSim(SafeLifecycleNode):
                 self._loop.run_in_lockstep(self._ending, self._patience)
             else:
                 self._loop.run_in_real_time(self._ending)
-        except (NoAnswerError, OSError, can.CanError) as error:
+        except Exception as error:  # the border of the thread, whatever the reason
             self._fail(error)
 
     def _step(self) -> bool:
@@ -119,14 +119,16 @@ class MountSim(SafeLifecycleNode):
             return False
         try:
             return loop.step_in_lockstep(self._patience)
-        except (NoAnswerError, OSError, can.CanError) as error:
+        except Exception as error:  # the same
             self._fail(error)
             return False
 
     def _fail(self, error: Exception) -> None:
         assert self._loop is not None
-        self._loop.figures.failure = str(error)
-        self.get_logger().error(str(error))
+        known = isinstance(error, (NoAnswerError, DivergedError, OSError, can.CanError))
+        sentence = str(error) if known else f'the run has ended: {type(error).__name__}: {error}'
+        self._loop.figures.failure = sentence
+        self.get_logger().error(sentence)
 
     def _publish(self, number: int) -> None:
         stamp = self._time_zero + number * _SAMPLE_NANOSECONDS

@@ -46,7 +46,7 @@ class Plant(NamedTuple):
 
 _PLANT = record_dtype(Plant)
 
-_STATE = np.dtype(
+STATE = np.dtype(
     [
         ('vehicle', VEHICLE_STATE),
         ('engine', ENGINE_STATE),
@@ -73,6 +73,7 @@ _STATE = np.dtype(
         ),
     ]
 )
+"""What the plant remembers from step to step, SI."""
 
 TRUTH = np.dtype(
     [
@@ -120,10 +121,10 @@ class PlantSimulation:
         self._plant = record_bytes(plant)
         self._seat = int(seat)
         self._step_time = step_time
-        self._state = np.zeros(1, _STATE).view(np.uint8)
+        self._state = np.zeros(1, STATE).view(np.uint8)
         self._truth = np.zeros(1, TRUTH).view(np.uint8)
         self._truth_record = self._truth.view(TRUTH)[0]
-        self._state.view(_STATE)['gap'] = plant.mechanics.rest_gap
+        self._state.view(STATE)['gap'] = plant.mechanics.rest_gap
         self._account = new_account().view(np.uint8)
 
     @property
@@ -175,8 +176,11 @@ class PlantSimulation:
 
 @compiled
 def read(plant, state, truth, noise):
-    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` four numbers."""
-    law, now, seen = plant.view(_PLANT)[0], state.view(_STATE)[0], truth.view(TRUTH)[0]
+    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` four numbers.
+
+    The displacement is NaN where anything of the state is no finite number.
+    """
+    law, now, seen = plant.view(_PLANT)[0], state.view(STATE)[0], truth.view(TRUTH)[0]
     seen.displacement = now.displacement
     seen.velocity = now.velocity
     seen.coil_current = now.current
@@ -193,15 +197,21 @@ def read(plant, state, truth, noise):
     seen.rest_gap = law.mechanics.rest_gap
     seen.contact_gap = law.mechanics.contact_gap
     seen.setpoint_latency = np.nan
-    return read_sensors(
-        law.electronics, law.coil, law.actuator, now.displacement, now.current, now.gap, noise
-    )
+    displacement = now.displacement if _finite(now) else np.nan
+    return read_sensors(law.electronics, law.coil, law.actuator, displacement, now.current, now.gap, noise)
+
+
+@compiled
+def _finite(now):
+    motion = now.displacement + now.velocity + now.chassis_acceleration + now.vehicle.wheel_height
+    forces = now.mount_force + now.friction_force + now.normal_force + now.deflection
+    return np.isfinite(motion + forces + now.current + now.gap)
 
 
 @compiled
 def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
     """Advance the state by one step of `dt` s for each excitation value; see `PlantSimulation.advance`."""
-    law, now = plant.view(_PLANT)[0], state.view(_STATE)[0]
+    law, now = plant.view(_PLANT)[0], state.view(STATE)[0]
     now.wanted_current = wanted_current
     for index in range(len(values)):
         _advance_magnet(law, now, dt)
@@ -231,8 +241,8 @@ def advance_with_books(plant, state, account, values, engine_forces, wanted_curr
             law.vehicle,
             law.hydromount,
             law.contact,
-            before.view(_STATE)[0],
-            state.view(_STATE)[0],
+            before.view(STATE)[0],
+            state.view(STATE)[0],
             values[k],
             engine_forces[k],
             dt,

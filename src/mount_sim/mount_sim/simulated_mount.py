@@ -1,15 +1,39 @@
 """Electronics and plant together, sample by sample, without bus or clock."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics import Noise, Reading
 from mount_sim.excitation import Excitation, Seat
 from mount_sim.plant import Memory, Plant, PlantSimulation
+from mount_sim.plant_check import checked_plant
+
+FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
+"""Range of the displacement sensor to either side, m: that of its signal on the bus."""
+
+
+class DivergedError(ValueError):
+    """The simulated plant has no finite state any more; the text says since when and the remedy."""
+
+
+@dataclass
+class BeyondRange:
+    """Samples whose displacement lay beyond the sensor's range: sent as not valid, answered with 0 A."""
+
+    samples: int = 0
+    first: float = math.nan  # s
+
+    def note(self, time: float) -> None:
+        """Take one more, at `time` s."""
+        if not self.samples:
+            self.first = time
+        self.samples += 1
 
 
 @dataclass(frozen=True)
@@ -44,6 +68,7 @@ class SimulatedMount:
 
     def __init__(self, plant: Plant, excitation: Excitation, seed: int):
         self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
+        checked_plant(plant, excitation.seat, excitation.step_time)
         self._noise = Noise(seed)
         self._steps = round(SAMPLE_TIME / excitation.step_time)
         self.patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
@@ -58,6 +83,7 @@ class SimulatedMount:
         self._driver_opens = plant.mount.driver_opens
         self.run = Run(len(self._values), start)
         self.sample = 0
+        self.beyond_range = BeyondRange()
         self._silent = 0
         self._current = 0.0
 
@@ -87,8 +113,11 @@ class SimulatedMount:
         return self._plant.truth_bytes
 
     def measure(self) -> Reading:
-        """Return what the sensors read now."""
-        return Reading(*self._plant.read(self._noise.next()))
+        """Return what the sensors read now; raises `DivergedError` where the plant has blown up."""
+        reading = Reading(*self._plant.read(self._noise.next()))
+        if not abs(reading.displacement) <= FARTHEST_DISPLACEMENT:
+            self._doubt(reading.displacement)
+        return reading
 
     def advance(self, setpoint: float | None, late: int = 0) -> None:
         """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
@@ -126,6 +155,14 @@ class SimulatedMount:
         self._noise.skip(count)
         self._silent, self._current = 0, setpoint
         self.sample += count
+
+    def _doubt(self, displacement: float) -> None:
+        if not math.isfinite(displacement):
+            raise DivergedError(
+                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
+                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
+            )
+        self.beyond_range.note(self.time)
 
     @property
     def _driver_open(self) -> bool:

@@ -3,7 +3,7 @@
 from mount_ros.diagnostics import Level
 from mount_sim.diagnosis import DRIVING, FINISHED, verdict
 from mount_sim.loop import LoopFigures
-from mount_sim.simulated_mount import Run
+from mount_sim.simulated_mount import BeyondRange, Run
 
 RUN = Run(samples=20_000, excitation_start=5000)
 
@@ -30,6 +30,8 @@ def test_figures_tell_the_progress():
         'overruns': 0,
         'latency_median_s': 'nan',
         'latency_p99_s': 'nan',
+        'beyond_range': 0,
+        'first_beyond_range_s': 'nan',
         'fatal': False,
     }
     assert _judged(wall_time=0.0).figures['real_time_factor'] == 'nan'
@@ -53,3 +55,13 @@ def test_a_machine_too_busy_for_real_time_is_a_warning():
 def test_the_first_second_is_not_judged_by_a_few_samples():
     assert _judged(samples=100, overruns=50).level is Level.OK
     assert _judged(samples=100, overruns=51).level is Level.WARN
+
+
+def test_a_mount_beyond_the_range_of_its_sensor_is_a_warning_with_the_first_moment():
+    judged = _judged(beyond_range=BeyondRange(3, 3.25), lockstep=True)
+    assert judged.level is Level.WARN
+    assert judged.sentence == (
+        'the simulated mount moved beyond the 50 mm of its displacement sensor in 3 samples, first at '
+        '3.250 s; they were sent as not valid and answered with 0 A: excite it less'
+    )
+    assert (judged.figures['beyond_range'], judged.figures['first_beyond_range_s']) == (3, '3.250')

@@ -6,15 +6,18 @@ import threading
 import time
 
 import can
+import numpy as np
 import pytest
 
 from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
 from mount_sim.can_end import CanEnd
 from mount_sim.electronics import ElectronicsParameters, Reading
 from mount_sim.faults import Fault, FaultParameters
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
+from mount_sim.simulated_mount import DivergedError
 
 CODEC = MountCodec()
 _channels = itertools.count()
@@ -100,6 +103,20 @@ def test_a_measurement_arrives_as_it_was_sent(ends):
     assert (sample.sample_counter, sample.microseconds, sample.enabled) == (70_000 - 65_536, 5, False)
     assert sample.displacement == pytest.approx(1.5e-3)
     assert math.isnan(sample.flux_rate)
+
+
+@pytest.mark.parametrize('displacement', [0.05, -0.05, 0.05001, -0.05001, 1e3, math.inf])
+def test_readings_arrive_over_the_bus_as_in_core_whatever_they_are(ends, displacement):
+    """What has no place in the message is not valid; it neither ends the electronics nor is cut to fit."""
+    end, host = ends
+    reading = Reading(displacement, 7.0, 1e6, 0.5)
+    end.send_frame(end.measurement_frame(1, 1000, reading, enabled=True))
+    sample = host.receive()
+    np.testing.assert_array_equal(sample.displacement, quantised_displacement(displacement))
+    assert math.isnan(sample.displacement) == (abs(displacement) > 0.05)
+    assert math.isnan(sample.coil_current)
+    assert math.isnan(sample.current_rate)
+    assert math.isnan(sample.flux_rate)  # shares its validity with the slope of the current
 
 
 def test_only_the_answer_to_the_asked_sample_ends_the_wait(ends):
@@ -253,6 +270,35 @@ def test_step_by_step_the_loop_never_waits(ends, make_mount):
         steps += loop.step_in_lockstep(LIMIT)
     assert (steps, loop.figures.samples, loop.figures.answered) == (300, 300, 300)
     assert not loop.step_in_lockstep(LIMIT)
+
+
+def test_a_mount_beyond_the_range_of_its_sensor_goes_on_and_is_told(ends, make_mount):
+    """The rack is told to move farther than the sensor reaches, as a rough road can."""
+    end, host = ends
+    mount = make_mount()
+    mount._values[:] *= 80.0  # to 80 mm
+    loop = _loop(mount, end)
+    answering = _in_thread(host.answer_each, 300, lambda sample: 0.0)
+    loop.run_in_lockstep(threading.Event(), LIMIT)
+    answering.join()
+    assert loop.figures.samples == 300
+    invalid = [sample.sample_counter for sample in host.samples if math.isnan(sample.displacement)]
+    assert 0 < len(invalid) < 300
+    assert loop.figures.beyond_range.samples == len(invalid)
+    assert loop.figures.beyond_range.first == pytest.approx(invalid[0] * 1e-3)
+    beyond = [any(begin <= k < begin + 100 for k in invalid) for begin in (0, 100)]
+    assert [status.displacement_sensor for status in host.statuses] == [False, *beyond]
+
+
+def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(ends, make_mount):
+    end, host = ends
+    mount = make_mount()
+    mount._values[20, 3] = math.nan
+    loop = _loop(mount, end)
+    answering = _in_thread(host.answer_each, 21, lambda sample: 0.0)
+    with pytest.raises(DivergedError, match=r'has diverged: at 0\.021 s not all of its state is a finite'):
+        loop.run_in_lockstep(threading.Event(), LIMIT)
+    answering.join()
 
 
 # Doubtful setpoints

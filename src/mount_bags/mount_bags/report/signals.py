@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.event_marks import Mark
 from mount_bags.origin import short_name
 from mount_bags.reading import ReadingError, Recording
 from mount_bags.recorded_events import recorded_marks
@@ -14,6 +13,7 @@ from mount_bags.series import Series, SeriesError
 from mount_bags.session_differences import session_text
 from mount_bags.switching_changes import switching_times
 from mount_bags.time_axis import time_axis
+from mount_ros.event_message import Mark
 from mount_ros.topics import (
     COIL_RIPPLE,
     CONTROL_TRACE,

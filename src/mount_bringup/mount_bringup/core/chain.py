@@ -18,6 +18,7 @@ from mount_init.initialisation import OFF, Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.damper import DamperCurve, damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.coefficient_check import check_friction
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
@@ -48,13 +49,13 @@ def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specime
 
 
 def friction_model(parameters: Parameters) -> tuple[FrictionCoefficients, FrictionContact]:
-    """Return what the controller of a run assumes of the friction; raises `SpecimenError`."""
+    """Return what the controller of a run assumes of the friction; a `ValueError` says what cannot be."""
     specimen, control = chosen_specimen(parameters, 'mount_control'), parameters.get('mount_control', {})
     check_fits(control_parameters(parameters), specimen)
-    return (
-        identified(specimen, FrictionCoefficients(), control, 'friction'),
-        identified(specimen, FrictionContact(), control, 'contact'),
-    )
+    friction = identified(specimen, FrictionCoefficients(), control, 'friction')
+    contact = identified(specimen, FrictionContact(), control, 'contact')
+    check_friction(friction, contact)
+    return friction, contact
 
 
 class CoreChain:

@@ -18,7 +18,7 @@ from mount_sim.electronics import STATUS_EVERY, Reading
 from mount_sim.excitation import Excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.scenario import build_excitation
-from mount_sim.simulated_mount import SAMPLE_TIME, SimulatedMount
+from mount_sim.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
 
 _SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
 _BLOCK = 1000  # samples, chosen: packed and written together
@@ -33,6 +33,8 @@ class CoreOutcome:
     simulated: float
     wall_time: float
     result: InitialisationResult | None
+    beyond_range: BeyondRange
+    control_faults: int = 0  # times that the controller found its memory spoiled
 
 
 class Sink(Protocol):
@@ -99,6 +101,8 @@ def run_core_into(
         simulated=mount.time,
         wall_time=time.monotonic() - begin,
         result=chain.result,
+        beyond_range=mount.beyond_range,
+        control_faults=chain.controller.faults if chain.controller is not None else 0,
     )
 
 

@@ -1,7 +1,7 @@
 """Replay without middleware: recorded samples through the same cores as in the nodes, as function calls."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,14 +9,19 @@ from numpy.typing import NDArray
 
 from mount_bringup.core.chain import Parameters, chosen_damper, control_parameters, friction_model
 from mount_bringup.replay.input import Column, ControlRun, ReplayError, ReplayInput, Times
+from mount_bringup.replay.parameter_changes import changed
 from mount_bringup.replay.ramps import MeasuredGap, Ramp, initialisation
 from mount_control.activation import MeasurementStream
-from mount_control.controller import TRACE, Controller
-from mount_control.force_to_current import resample
+from mount_control.controller import TRACE, ControlLaw, Controller
+from mount_control.force_to_current import CurrentTable, resample
 from mount_control.parameters import SAMPLE_TIME, ControlParameters
 from mount_control.sample_watch import Judgement, SampleCounts, SampleWatch
 from mount_init.errors import InitialisationError
+from mount_models.damper import DamperCurve
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
 from mount_ros import topics
+from mount_ros.event_message import ParametersChanged
 from mount_ros.force_table_message import ForceTable
 
 OFF = 0.0  # A
@@ -79,7 +84,7 @@ def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
             continue
         gap = result if result is not None and result.stamp == part.gap.stamp else part.gap
         part_begin = time.perf_counter()
-        replayed.parts.append(run_control(part, gap, parameters))
+        replayed.parts.append(run_control(part, gap, parameters, given.changes))
         replayed.control_time += time.perf_counter() - part_begin
         replayed.gaps.append(gap)
     replayed.wall_time = time.perf_counter() - begin
@@ -100,21 +105,25 @@ def run_ramp(ramp: Ramp, parameters: Parameters) -> RampAnswers:
     return RampAnswers(ramp.stamps, setpoints, MeasuredGap(core.last_stamp, numbers, table))
 
 
-def run_control(run: ControlRun, gap: MeasuredGap, parameters: Parameters) -> ControlAnswers:
+def run_control(
+    run: ControlRun, gap: MeasuredGap, parameters: Parameters, changes: Sequence[ParametersChanged] = ()
+) -> ControlAnswers:
     """Return what mount_control answers to the samples of a run, activated with `gap`.
 
     Samples that follow each other without a doubt pass the compiled controller at once; all others are
-    judged one by one, as in the node.
+    judged one by one, as in the node. `changes` of its parameters act from the sample of their stamp on.
     """
-    settings = control_parameters(parameters)
-    controller = controller_for(gap, parameters)
+    begun = changed(parameters, [change for change in changes if change.time <= run.stamps[0]])
+    laws = _laws(run, gap, begun, [change for change in changes if change.time > run.stamps[0]])
+    settings = control_parameters(begun)
+    controller = controller_for(gap, begun)
     watch = SampleWatch(SAMPLE_TIME, settings.longest_bridge, settings.displacement_range)
     stream = MeasurementStream(gap.stamp, max(gap.stamp, int(run.stamps[0])))
     count = len(run.stamps)
     answers = ControlAnswers(
         run.stamps, np.zeros(count), np.zeros(count, bool), np.zeros(count, TRACE), watch.counts
     )
-    doubtful = np.flatnonzero(~_follows(run, settings)).tolist()
+    doubtful = sorted({*np.flatnonzero(~_follows(run, settings)).tolist(), *laws})
     for begin, end in zip(doubtful, [*doubtful[1:], count], strict=True):
         stamp, displacement = int(run.stamps[begin]), float(run.displacement[begin])
         stream.note(stamp)
@@ -124,6 +133,8 @@ def run_control(run: ControlRun, gap: MeasuredGap, parameters: Parameters) -> Co
         judgement, missing = watch.judge(stamp, displacement)
         if judgement in (Judgement.INVALID, Judgement.IGNORE):
             continue
+        for law in laws.get(begin, ()):
+            controller.change(law)
         if judgement is Judgement.RESTART:
             controller.restart(displacement)
         controller.step(displacement, missing)
@@ -139,11 +150,30 @@ def run_control(run: ControlRun, gap: MeasuredGap, parameters: Parameters) -> Co
 
 def controller_for(gap: MeasuredGap, parameters: Parameters) -> Controller:
     """Return the controller that mount_control makes when it is activated with `gap`."""
+    return Controller(*_ingredients(gap, parameters))
+
+
+def _ingredients(
+    gap: MeasuredGap, parameters: Parameters
+) -> tuple[ControlParameters, DamperCurve, FrictionCoefficients, FrictionContact, CurrentTable]:
     settings = control_parameters(parameters)
     table = resample(
         gap.table.current, gap.table.normal_force, gap.numbers['offset_current'], settings.highest_current
     )
-    return Controller(settings, chosen_damper(parameters), *friction_model(parameters), table)
+    return settings, chosen_damper(parameters), *friction_model(parameters), table
+
+
+def _laws(
+    run: ControlRun, gap: MeasuredGap, parameters: Parameters, changes: Sequence[ParametersChanged]
+) -> dict[int, list[ControlLaw]]:
+    """Return the laws by the places of the samples that are the first to be answered by them."""
+    laws: dict[int, list[ControlLaw]] = {}
+    for count, change in enumerate(changes, 1):
+        place = int(np.searchsorted(run.stamps, change.time))
+        if place < len(run.stamps):
+            law = ControlLaw(*_ingredients(gap, changed(parameters, changes[:count])))
+            laws.setdefault(place, []).append(law)
+    return laws
 
 
 def _follows(run: ControlRun, settings: ControlParameters) -> NDArray[np.bool_]:

@@ -16,12 +16,14 @@ from mount_bags.origin import short_name
 from mount_bags.reading import Recording
 from mount_bags.series import Payloads
 from mount_bags.time_axis import time_axis
+from mount_bringup.replay.parameter_changes import recorded_changes
 from mount_bringup.replay.ramps import MeasuredGap, Ramp, measured_gaps, ramps_of
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
+from mount_ros.event_message import ParametersChanged
 from mount_ros.force_table_message import ForceTable
 from mount_ros.topics import Topic
 
@@ -110,6 +112,7 @@ class ReplayInput:
     log_shift: int = 0
     session: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=Notes)
+    changes: list[ParametersChanged] = field(default_factory=list)  # of mount_control, while it ran
 
     @property
     def controls(self) -> list[ControlRun]:
@@ -157,7 +160,10 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     series = recording[topics.DISPLACEMENT.name]
     log_shift = int(series.receive_times[0] - series.stamps[0])
     name = short_name(recording)
-    return ReplayInput(name, parts, parameters, answers, messages, notes.zero, log_shift, session, notes)
+    changes = recorded_changes(recording)
+    return ReplayInput(
+        name, parts, parameters, answers, messages, notes.zero, log_shift, session, notes, changes
+    )
 
 
 def dated(gap: MeasuredGap, stamp: int) -> MeasuredGap:

@@ -17,6 +17,7 @@ from mount_bringup.replay.core import Progress, Replayed, controller_for, replay
 from mount_bringup.replay.foreign import ForeignOrder, chosen_gap, foreign_input
 from mount_bringup.replay.input import ReplayError, ReplayInput, replay_input
 from mount_bringup.replay.output import write_replay
+from mount_bringup.replay.parameter_changes import without
 from mount_bringup.run_folder import RunFolder, make_run_folder
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_init.parameters import InitParameters
@@ -96,6 +97,8 @@ def replay_without_output(order: ReplayOrder, progress: Progress = lambda share:
     given, reading_time, decoding_time = _read(order)
     parameters = _changed(given, order.changes)
     check_parameters(parameters)
+    given.changes = without(given.changes, order.changes.get('mount_control', {}))
+    given.notes += _told(given, order.mode)
     if order.mode == LOCKSTEP:
         from mount_bringup.replay.lockstep import replay_in_lockstep  # needs the middleware
 
@@ -106,6 +109,16 @@ def replay_without_output(order: ReplayOrder, progress: Progress = lambda share:
     return ReplayOutcome(
         order, given, parameters, replayed, agreement(given, replayed), reading_time, decoding_time
     )
+
+
+def _told(given: ReplayInput, mode: str) -> list[str]:
+    """Return a sentence for each change of parameters while the recording ran."""
+    done = 'the replay does the same' if mode == CORE else 'a replay in lock-step does not: use core'
+    return [
+        f'{change.node} was told {name} = {value} at {(change.time - given.zero) / 1e9:.3f} s; {done}'
+        for change in given.changes
+        for name, value in change.values.items()
+    ]
 
 
 def check_parameters(parameters: Parameters) -> None:

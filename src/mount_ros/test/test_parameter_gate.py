@@ -1,0 +1,87 @@
+"""What may be set on a node when, and what the node hears of it."""
+
+import pytest
+from rclpy.parameter import Parameter
+
+from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.parameter_gate import Change
+
+
+class Subject(SafeLifecycleNode):
+    """Two levels that may be set at run time, the lower below the upper, and a name that may not."""
+
+    run_time_parameters = frozenset({'lower', 'upper'})
+
+    def __init__(self, **arguments):
+        super().__init__('subject', **arguments)
+        self.declare_parameter('lower', 1.0)
+        self.declare_parameter('upper', 2.0)
+        self.declare_parameter('name', 'first')
+        self.taken = []
+
+    def check_parameters(self, values):
+        if not values['lower'] < values['upper']:
+            raise ValueError(f'lower ({values["lower"]:g}) must lie below upper ({values["upper"]:g})')
+
+    def take_changes(self, changes):
+        self.taken.append((changes, self.get_parameter('lower').value))
+
+
+@pytest.fixture
+def subject(context):
+    node = Subject(context=context)
+    yield node
+    node.close()
+    node.destroy_node()
+
+
+def _set(node, **values):
+    return node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
+
+
+def test_before_configure_everything_can_be_set_and_nothing_is_told(subject):
+    results = _set(subject, lower=5.0, upper=4.0, name='second', lockstep=True)
+    assert all(result.successful for result in results)
+    assert subject.taken == []
+
+
+@pytest.mark.parametrize('activated', [False, True])
+def test_once_configured_run_time_parameters_are_checked_set_and_told(subject, activated):
+    subject.trigger_configure()
+    if activated:
+        subject.trigger_activate()
+    assert _set(subject, lower=1.5)[0].successful
+    assert subject.taken == [({'lower': Change(1.0, 1.5)}, 1.5)]
+    (refused,) = _set(subject, upper=1.2)
+    assert (refused.successful, refused.reason) == (False, 'lower (1.5) must lie below upper (1.2)')
+    assert subject.get_parameter('upper').value == 2.0
+    # the present value is what was set last, and to set it again is no change
+    assert _set(subject, lower=1.5)[0].successful
+    assert _set(subject, lower=1.6)[0].successful
+    assert subject.taken[1:] == [({'lower': Change(1.5, 1.6)}, 1.6)]
+
+
+def test_what_goes_only_together_can_be_set_together(subject):
+    subject.trigger_configure()
+    both = [Parameter('lower', value=8.0), Parameter('upper', value=9.0)]
+    assert subject.set_parameters_atomically(both).successful
+    assert subject.taken == [({'lower': Change(1.0, 8.0), 'upper': Change(2.0, 9.0)}, 8.0)]
+
+
+@pytest.mark.parametrize(('name', 'value'), [('name', 'second'), ('lockstep', True)])
+def test_all_others_are_refused_until_cleanup(subject, name, value):
+    subject.trigger_configure()
+    (refused,) = _set(subject, **{name: value})
+    assert not refused.successful
+    assert refused.reason == (
+        f'{name} can be set before configure: deactivate and clean up first; '
+        'what can be set at run time is lower, upper'
+    )
+    subject.trigger_cleanup()
+    assert _set(subject, **{name: value})[0].successful
+    assert subject.taken == []
+
+
+def test_what_belongs_to_the_middleware_is_not_touched(subject):
+    subject.trigger_configure()
+    assert _set(subject, use_sim_time=True)[0].successful

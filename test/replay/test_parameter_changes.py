@@ -1,0 +1,91 @@
+"""A recording in the middle of which parameters were changed, put through the controller again."""
+
+import numpy as np
+import pytest
+from std_msgs.msg import String
+
+from mount_bringup.core import recording as core_recording
+from mount_bringup.core import run as core_run
+from mount_bringup.core.chain import CoreChain
+from mount_bringup.core.recording import record_core
+from mount_bringup.graph.supervisor import session_text
+from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, _told, replay_without_output
+from mount_control.controller import ControlLaw
+from mount_control.force_to_current import resample
+from mount_control.parameters import ControlParameters
+from mount_models.damper import damper_curve
+from mount_ros.cdr import serialised
+from mount_ros.event_message import change_text, dated
+from mount_ros.topics import EVENT
+
+PARAMETERS = {'mount_sim': {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 2.0}}
+CHANGES = [
+    (3.4, 'viscous_2000', {'damper': ('viscous_2000', 'viscous_3500')}),
+    (3.9, 'viscous_3500', {'eigenfrequency': (8.0, 7.0), 'lead_time': (0.0019, 0.004)}),
+]
+
+
+@pytest.fixture(scope='module')
+def changed_drive(tmp_path_factory):
+    """A core drive whose controller was changed twice, as mount_control would be, and what it told of it."""
+    folder, told, patch = tmp_path_factory.mktemp('changed') / 'recording', [], pytest.MonkeyPatch()
+    take_many, run_core = core_run._take_many, core_recording.run_core
+    values = {'damper': 'viscous_2000'}
+
+    def take_many_and_change(mount, chain, controller, samples, pending):
+        stamp = mount.sample * 1_000_000
+        if len(told) < len(CHANGES) and stamp >= CHANGES[len(told)][0] * 1e9:
+            _, _, changes = CHANGES[len(told)]
+            values.update({name: new for name, (_, new) in changes.items()})
+            controller.change(_law(chain, values))
+            told.append((stamp, dated(stamp, change_text('mount_control', changes))))
+        return take_many(mount, chain, controller, samples, pending)
+
+    def run_core_and_tell(parameters, write, *arguments):
+        outcome = run_core(parameters, write, *arguments)
+        for stamp, text in told:
+            write(EVENT, serialised(String(data=text)), stamp)
+        return outcome
+
+    patch.setattr(core_run, '_take_many', take_many_and_change)
+    patch.setattr(core_recording, 'run_core', run_core_and_tell)
+    record_core(folder, PARAMETERS, session_text({'scenario': 'bench', 'parameters': PARAMETERS}))
+    patch.undo()
+    assert len(told) == 2
+    return folder, told
+
+
+def _law(chain: CoreChain, values):
+    numbers = {name: value for name, value in values.items() if name != 'damper'}
+    table = resample(*chain.result.table, chain.result.offset_current, 3.0)
+    settings, damper = ControlParameters(**numbers), damper_curve(values['damper'])
+    return ControlLaw(settings, damper, chain._friction, chain._contact, table)
+
+
+def test_the_replay_changes_them_at_the_same_samples_to_the_bit(changed_drive):
+    folder, told = changed_drive
+    outcome = replay_without_output(ReplayOrder(folder, CORE))
+    assert outcome.difference.agrees, outcome.difference
+    assert outcome.given.changes[0].values == {'damper': 'viscous_3500'}
+    notes = [note for note in outcome.given.notes if 'was told' in note]
+    assert len(notes) == 3
+    assert f'mount_control was told damper = viscous_3500 at {told[0][0] / 1e9:.3f} s' in notes[0]
+    assert all(note.endswith('the replay does the same') for note in notes)
+
+
+def test_what_the_replay_is_asked_for_stays_as_asked(changed_drive):
+    folder, _ = changed_drive
+    order = ReplayOrder(folder, CORE, changes={'mount_control': {'damper': 'viscous_1000'}})
+    outcome = replay_without_output(order)
+    assert [sorted(change.values) for change in outcome.given.changes] == [['eigenfrequency', 'lead_time']]
+    (run,) = outcome.replayed.runs
+    moving = run.traces['damping_active'] == 1.0
+    wanted = np.abs(run.traces['desired_force'][moving]).max()
+    speed = np.abs(run.traces['predicted_velocity'][moving]).max()
+    assert wanted == pytest.approx(1000.0 * (speed - 0.004), rel=1e-6)
+
+
+def test_a_replay_in_lock_step_says_that_it_does_not_change_them(changed_drive):
+    folder, _ = changed_drive
+    given = replay_without_output(ReplayOrder(folder, CORE)).given
+    assert all(sentence.endswith('does not: use core') for sentence in _told(given, LOCKSTEP))
