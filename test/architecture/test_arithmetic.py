@@ -42,6 +42,7 @@ METHODS = {'mean', 'std', 'var', 'dot'}
 ALLOWED = {
     ('mount_models.random_numbers', 'np.random'): 'whole numbers of PCG64',
     ('mount_models.elementary', '**'): 'powers of whole numbers and fractions',
+    ('mount_sim.plant_check', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_models.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
     ('mount_models.vehicle', '**'): 'energy, which no run uses',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',

@@ -65,7 +65,7 @@ def _law(chain: CoreChain, values):
 def test_the_replay_changes_them_at_the_same_samples_to_the_bit(changed_drive):
     folder, told = changed_drive
     outcome = replay_without_output(ReplayOrder(folder, CORE))
-    assert outcome.difference.agrees, outcome.difference
+    assert outcome.agreement.agrees, outcome.agreement
     assert outcome.given.changes[0].values == {'damper': 'viscous_3500'}
     notes = [note for note in outcome.given.notes if 'was told' in note]
     assert len(notes) == 3

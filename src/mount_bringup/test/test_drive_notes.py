@@ -7,7 +7,7 @@ from rich.console import Console
 
 from mount_bringup import drive
 from mount_bringup.drive import DriveOrder
-from mount_bringup.graph.nodes import RECORDER
+from mount_bringup.graph.nodes import CONTROL, RECORDER
 from mount_bringup.run_folder import make_run_folder
 from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation import Excitation, Seat
@@ -37,8 +37,11 @@ class Graph:
     def figures(self, node):
         if node is RECORDER:
             return {'failed': 'True', 'fatal': 'False', 'sentence': SENTENCE}
+        if node is CONTROL:
+            return {}
         figures = ('samples', 'excitation_start_s', 'real_time_factor', 'latency_median_s', 'latency_p99_s')
-        return {'sentence': FINISHED, **dict.fromkeys(figures, '1')}
+        unshaken = {'beyond_range': '0', 'first_beyond_range_s': 'nan'}
+        return {'sentence': FINISHED, **unshaken, **dict.fromkeys(figures, '1')}
 
     def stop(self):
         return []

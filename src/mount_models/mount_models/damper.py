@@ -26,6 +26,7 @@ from mount_models.damper_points import (
     points_in,
 )
 from mount_models.elementary import expm1
+from mount_models.interpolation import each_interpolated
 from mount_models.quantity import ParameterError, Quantity, checked
 
 FloatArray = npt.NDArray[np.float64]
@@ -216,7 +217,7 @@ def _is_file(text: str) -> bool:
 def _curve_of_points(name: str, columns: Mapping[str, Any]) -> DamperCurve:
     velocity, force = checked_points(columns)
     grid = np.arange(math.floor(velocity[-1] / STEP_OF_POINTS * (1.0 + 1e-12)) + 1) * STEP_OF_POINTS
-    table = np.interp(grid, velocity, force)
+    table = each_interpolated(grid, velocity, force)
     if not table.max() > 0.0:
         raise DamperError(f'the points of the damper {name} must reach beyond {STEP_OF_POINTS:g} m/s')
     table.flags.writeable = False
