@@ -3,19 +3,33 @@
 import itertools
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from mount_ros.testing import free_domain
+
 # The tests are imported one by one (importmode importlib); what they share is found by this path.
 sys.path.insert(0, str(Path(__file__).parent))
 
-# A socket hears every group of its port that anyone on this machine has joined: ports of each process, too.
-_ports = itertools.count(20_000 + 100 * (os.getpid() % 400))
+_EACH = 40  # ports
+
+
+@pytest.fixture(scope='session')
+def ports() -> Iterator[Iterator[int]]:
+    """Give UDP ports that nobody else on this machine has, above those that the kernel gives to anybody.
+
+    A socket hears every group of its port that anyone on this machine has joined; so each process has ports
+    of its own, by the ROS domain that it holds.
+    """
+    with free_domain() as domain:
+        first = 61_000 + _EACH * domain
+        yield itertools.cycle(range(first, first + _EACH))
 
 
 @pytest.fixture
-def multicast() -> tuple[str, int]:
+def multicast(ports: Iterator[int]) -> tuple[str, int]:
     """Return a multicast group of this process and a port of this test."""
     process = os.getpid()
-    return f'239.74.{process >> 8 & 0xFF}.{process & 0xFF}', next(_ports)
+    return f'239.74.{process >> 8 & 0xFF}.{process & 0xFF}', next(ports)
