@@ -16,7 +16,7 @@ from mount_driver.bus import MULTICAST_GROUP, open_bus
 from mount_driver.codec import MountCodec
 from mount_ros.testing import wait_until
 
-FIRST_PORT = 43113
+FIRST_PORT, PORTS_OF_DOMAIN = 7530, 250
 
 # One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
 ENDLESS = (
@@ -33,7 +33,10 @@ def bus_listener(domain):
     codec = MountCodec()
     setpoints = []
     bus = open_bus(
-        'udp_multicast', MULTICAST_GROUP, port=FIRST_PORT + domain, receive=[codec.setpoint.frame_id]
+        'udp_multicast',
+        MULTICAST_GROUP,
+        port=FIRST_PORT + PORTS_OF_DOMAIN * domain,
+        receive=[codec.setpoint.frame_id],
     )
     ending = threading.Event()
 
@@ -139,7 +142,9 @@ def test_a_control_that_stands_still_costs_answers_the_coil_goes_to_0_ampere_and
         pytest.skip(f'this machine is too late for a drive in real time: {output}')
     assert process.returncode == 1, output
     figures = json.loads((out / 'summary.json').read_text())
-    assert figures['unanswered_samples'] > 300, output  # of 500; the last 100 wait in the queue and are answered late
+    assert figures['unanswered_samples'] > 300, (
+        output
+    )  # of 500; the last 100 wait in the queue and are answered late
     assert figures['late_samples'] > 0
     assert any('the coil went to 0 A' in fault['sentence'] for fault in figures['faults'])
     recording = mount_bags.open(out / 'recording')

@@ -20,7 +20,7 @@ from mount_bags.recorder_parameters import RecorderParameters, split_of
 from mount_bags.snapshot import saved_snapshots
 from mount_bringup.core.chain import Parameters, control_parameters
 from mount_bringup.core.recording import record_core
-from mount_bringup.domain import HIGHEST_DOMAIN, domain_lock
+from mount_bringup.domain import domain_lock
 from mount_bringup.ending_signals import ending_signals
 from mount_bringup.evaluation import Drive, load_drive, samples_at_the_ends
 from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
@@ -44,8 +44,10 @@ from mount_models.quantity import with_flattened
 from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation import Excitation
 
-_FIRST_PORT = 43113  # UDP port of domain 0 without a namespace
-_PLACES = 200  # namespaces told apart by their ports, up to 63614
+# A ROS domain has 250 UDP ports from 7400 on (RTPS 2.2, section 9.6.1.1), of which two for each participant are
+# in use. The bus takes one behind them: higher up the kernel gives them to anybody, and the bus would not open.
+_FIRST_PORT, _PORTS_OF_DOMAIN = 7530, 250  # behind 59 participants
+_PLACES = 119  # namespaces told apart by their ports
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
 
 
@@ -292,7 +294,7 @@ def _port(order: DriveOrder) -> int:
     """Return the UDP port of the CAN bus: one for each domain and namespace."""
     name = order.namespace.strip('/')
     place = 1 + zlib.crc32(name.encode()) % _PLACES if name else 0
-    return _FIRST_PORT + order.domain + (HIGHEST_DOMAIN + 1) * place
+    return _FIRST_PORT + _PORTS_OF_DOMAIN * order.domain + place
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
