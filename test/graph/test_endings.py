@@ -183,7 +183,7 @@ def _expect_a_sound_end(setpoints, out) -> None:
 
 
 def _damping(setpoints) -> bool:
-    """Whether the control node has the coil on: within 0.2 s its current rises and falls, a ramp's does one."""
+    """Whether the control node has the coil on: in 0.2 s its current rises and falls, a ramp's does one."""
     recent = [setpoint.current for setpoint in setpoints[-200:]]
     steps = [after - before for before, after in itertools.pairwise(recent)]
     up, down = sum(step > 0.0 for step in steps), sum(step < 0.0 for step in steps)

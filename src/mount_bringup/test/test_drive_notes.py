@@ -64,4 +64,4 @@ def test_each_domain_and_namespace_has_a_bus_of_its_own_where_nobody_else_is_giv
     ports = [drive._port(order) for order in orders]
     assert len(set(ports)) == len(orders)
     assert max(ports) < 32768  # above, Linux gives ports to whoever asks for any
-    assert all(130 <= (port - 7400) % 250 for port in ports)  # below are the participants of the domain
+    assert min((port - 7400) % 250 for port in ports) >= 130  # below are the participants of the domain
