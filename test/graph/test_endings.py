@@ -183,11 +183,11 @@ def _expect_a_sound_end(setpoints, out) -> None:
 
 
 def _damping(setpoints) -> bool:
-    """Whether the control node has the coil on: in 0.2 s its current rises and falls, a ramp's does one."""
-    recent = [setpoint.current for setpoint in setpoints[-200:]]
-    steps = [after - before for before, after in itertools.pairwise(recent)]
-    up, down = sum(step > 0.0 for step in steps), sum(step < 0.0 for step in steps)
-    return len(recent) == 200 and min(recent) > 0.4 and min(up, down) > 50
+    """Whether the control node has the coil on: its current has peak after peak, a ramp has one."""
+    recent = [setpoint.current for setpoint in setpoints[-300:]]
+    steps = [after - before for before, after in itertools.pairwise(recent) if after != before]
+    peaks = sum(before > 0.0 > after for before, after in itertools.pairwise(steps))
+    return len(recent) == 300 and min(recent) > 0.4 and peaks >= 3
 
 
 def _alive(pid: int) -> bool:
