@@ -7,7 +7,7 @@ name = 'mount_bringup'
 setup(
     name=name,
     version='0.1.0',
-    description='Launch files, configuration, supervisor and the engine-mount command.',
+    description='Launch files, configuration and the supervisor of the graph.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test']),
     data_files=[
@@ -18,5 +18,4 @@ setup(
         ('share/mount_bringup/layouts', glob('layouts/*')),
     ],
     install_requires=['setuptools'],
-    entry_points={'console_scripts': ['engine-mount = mount_bringup.command:main']},
 )

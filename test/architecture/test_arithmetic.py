@@ -14,9 +14,9 @@ import pytest
 
 ROOTS = (
     'mount_driver.node', 'mount_init.node', 'mount_control.node', 'mount_sim.node',
-    'mount_bringup.core.recording', 'mount_bringup.replay.replay', 'mount_bringup.replay.lockstep',
+    'mount_replay.loop.recording', 'mount_replay.replay', 'mount_replay.lockstep',
 )  # fmt: skip
-JUDGES = {'mount_bringup.replay.agreement', 'mount_bringup.evaluation'}
+JUDGES = {'mount_replay.agreement', 'mount_report.drive.evaluation'}
 """Modules that judge answers when they are there; what they alone need makes no number of a run."""
 OF_LIBRARIES = {
     *('exp', 'exp2', 'expm1', 'log', 'log1p', 'log2', 'log10', 'sin', 'cos', 'tan', 'asin', 'acos', 'atan'),
@@ -40,22 +40,22 @@ OF_LIBRARIES = {
 """Functions of `math` and numpy that choose instructions by the processor, contract, or sum in any order."""
 METHODS = {'mean', 'std', 'var', 'dot'}
 ALLOWED = {
-    ('mount_models.random_numbers', 'np.random'): 'whole numbers of PCG64',
-    ('mount_models.elementary', '**'): 'powers of whole numbers and fractions',
-    ('mount_sim.plant_check', 'np.linalg'): 'whether parameters are refused, no number of a run',
+    ('mount_models.arithmetic.random_numbers', 'np.random'): 'whole numbers of PCG64',
+    ('mount_models.arithmetic.elementary', '**'): 'powers of whole numbers and fractions',
+    ('mount_sim.plant.check', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_models.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
     ('mount_models.vehicle', '**'): 'energy, which no run uses',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimation', 'np.sum'): 'whole numbers',
-    ('mount_bags.container', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.message_compression', 'np.cumsum'): 'whole numbers',
+    ('mount_bags.container.writer', 'np.cumsum'): 'whole numbers',
+    ('mount_bags.container.message_compression', 'np.cumsum'): 'whole numbers',
     ('mount_bags.signals.even_grid', 'np.mean'): 'shares of whole numbers',
-    ('mount_bags.stamps', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.time_axis', 'np.interp'): 'times told to people',
-    ('mount_bags.stamps', '**'): 'rates of topics, for the eye',
-    ('mount_bags.stamps', 'np.mean'): 'rates of topics, for the eye',
-    ('mount_ros.scalars', 'math.prod'): 'whole numbers',
+    ('mount_bags.messages.stamps', 'np.cumsum'): 'whole numbers',
+    ('mount_bags.messages.time_axis', 'np.interp'): 'times told to people',
+    ('mount_bags.messages.stamps', '**'): 'rates of topics, for the eye',
+    ('mount_bags.messages.stamps', 'np.mean'): 'rates of topics, for the eye',
+    ('mount_ros.messages.scalars', 'math.prod'): 'whole numbers',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',
     ('mount_ros.timing', '**'): 'bins of latency, for the eye',

@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from mount_bringup.command import app
-from mount_bringup.commands import compare
+from mount_cli.command import app
+from mount_cli.commands import compare
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'interface.md'
 

@@ -11,13 +11,13 @@ import pytest
 import typer
 from cantools.database.can import Database
 
-from mount_bringup.command import app
 from mount_bringup.graph.nodes import SIMULATED
+from mount_cli.command import app
 from mount_control.controller import TRACE
 from mount_driver.codec import DATABASE_FILE
+from mount_models.actuator.closing import ClosingMechanics
 from mount_models.actuator.law import ForceLaw
 from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.closing import ClosingMechanics
 from mount_models.coil.ripple import RippleCoil
 from mount_models.damper import DegressiveDamper, ProgressiveDamper, ViscousDamper
 from mount_models.elastomer import Elastomer
@@ -39,15 +39,15 @@ from mount_ros.topics import (
     Delivery,
     Topic,
 )
-from mount_sim.plant import TRUTH
+from mount_sim.plant.plant import TRUTH
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
 MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themselves
-    'mount_ros/collector.py',
+    'mount_bags/recorder/collector.py',
     'mount_ros/data_path.py',
-    'mount_ros/diagnostics.py',
-    'mount_bringup/supervisor.py',
+    'mount_ros/nodes/diagnostics.py',
+    'mount_bringup/graph/supervisor.py',
 }
 
 PARAMETER_SETS = (
@@ -98,8 +98,10 @@ def test_interface_names_publishers_and_subscribers_as_the_nodes_have_them():
 
 def test_only_experiments_use_the_topics_of_the_rack():
     of_rack = {constant for constant, value in vars(topics).items() if value in RACK_TOPICS}
-    using = {file.parent.name for file in python_files() if of_rack & set(topics_used_in(file))}
-    assert using == {'experiments'}
+    using = {
+        file.relative_to(SOURCES).parts[0] for file in python_files() if of_rack & set(topics_used_in(file))
+    }
+    assert using == {'mount_experiments'}
 
 
 def test_control_traces_what_the_registry_declares():
@@ -123,7 +125,7 @@ def test_every_topic_that_a_source_names_is_registered():
 
 def test_publishers_and_subscriptions_are_opened_by_the_registry_alone():
     opening = {
-        file.relative_to(SOURCES).parts[0] + '/' + file.name
+        '/'.join(file.relative_to(SOURCES).parts[1:])
         for file in python_files()
         if re.search(r'\.create_(publisher|subscription)\(', file.read_text())
     }
@@ -159,7 +161,7 @@ def test_interface_lists_the_signals_of_the_dbc(message):
 
 
 def test_interface_lists_the_figures_of_a_drive():
-    source = ast.parse((SOURCES / 'mount_bringup/mount_bringup/summary.py').read_text())
+    source = ast.parse((SOURCES / 'mount_report/mount_report/drive/summary.py').read_text())
     function = next(
         node for node in source.body if isinstance(node, ast.FunctionDef) and node.name == 'summarise'
     )
@@ -193,8 +195,8 @@ def test_bringup_readme_lists_every_option_of_drive():
     command = typer.main.get_command(app)
     assert isinstance(command, typer.core.TyperGroup)
     options = {parameter.opts[0] for parameter in command.commands['drive'].params}
-    assert {row['option'].split()[0] for row in table('drive', 'src/mount_bringup/README.md')} == options
-    commands = {row['command'].split()[1] for row in table('Commands', 'src/mount_bringup/README.md')}
+    assert {row['option'].split()[0] for row in table('drive', 'src/mount_cli/README.md')} == options
+    commands = {row['command'].split()[1] for row in table('Commands', 'src/mount_cli/README.md')}
     assert commands == set(command.commands)
 
 

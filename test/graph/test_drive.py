@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import mount_bags
-from mount_bags.audit import audit
-from mount_bags.losses import losses
-from mount_bags.node_reports import node_reports
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
+from mount_bags.audit.node_reports import node_reports
 
 DATA_TOPICS = (
     'displacement',

@@ -10,8 +10,8 @@ import threading
 import pytest
 
 import mount_bags
-from mount_bags.audit import audit
-from mount_bags.losses import losses
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
 from mount_driver.bus import MULTICAST_GROUP, open_bus
 from mount_driver.codec import MountCodec
 from mount_ros.testing import wait_until

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mount_bags
-from mount_bags.session_differences import session_text
-from mount_bringup.command import main
+from mount_bags.run.session_differences import session_text
+from mount_cli.command import main
 
 
 def _setpoints(run):

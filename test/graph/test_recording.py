@@ -14,10 +14,10 @@ from std_msgs.msg import String
 from typer.testing import CliRunner
 
 import mount_bags
-from mount_bags.event_marks import read_marks
-from mount_bringup.command import app
+from mount_bags.events.event_marks import read_marks
+from mount_cli.command import app
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.qos import publisher_qos
-from mount_ros.scalars import ScalarsLayout
 from mount_ros.testing import wait_until
 from mount_ros.topics import CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT, EVENT
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bringup.command import main
+from mount_cli.command import main
 
 
 @pytest.fixture(autouse=True)

@@ -16,13 +16,13 @@ from numba.core.registry import cpu_target
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 from threadpoolctl import threadpool_info
 
-from mount_bringup.core.recording import record_core
 from mount_bringup.graph.supervisor import session_text
-from mount_bringup.replay.replay import CORE, ReplayOrder, replay
 from mount_models.damper import DAMPERS, damper_curve
 from mount_models.quantity import with_flattened
+from mount_replay.loop.recording import record_core
+from mount_replay.replay import CORE, ReplayOrder, replay
+from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.scenario import build_excitation
 
 DRIVE = {
     'mount_sim': {

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
 import mount_bags
-from mount_bags.reference import differences_from_reference
-from mount_bringup.command import app
+from mount_bags.compare.reference import differences_from_reference
+from mount_cli.command import app
 
 DRIVE = (
     'drive',
@@ -71,7 +71,7 @@ def test_what_a_tolerance_allows_is_equal(run):
 
 
 def test_recordings_without_common_topics_end_with_code_2(run, tmp_path):
-    from mount_bags.writer import BagWriter
+    from mount_bags.bag.writer import BagWriter
 
     writer = BagWriter(tmp_path / 'other')
     writer.add_topic('/other', 'std_msgs/msg/String')

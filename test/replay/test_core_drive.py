@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mount_bringup.core import chain as core_chain
-from mount_bringup.core import run as core_run
-from mount_bringup.core.chain import chosen_damper, control_parameters
-from mount_bringup.core.run import CoreOutcome, run_core
-from mount_bringup.evaluation import Drive, switching, tracking_error
+from mount_bringup.chosen import chosen_damper, control_parameters
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_control.controller import _STATE
 from mount_models.specimen import default_specimen
+from mount_replay.loop import chain as core_chain
+from mount_replay.loop import run as core_run
+from mount_replay.loop.run import CoreOutcome, run_core
+from mount_report.drive.evaluation import Drive, switching, tracking_error
 from mount_ros import topics
-from mount_ros.scalars import ScalarsLayout
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import Topic
-from mount_sim.scenario import build_excitation
-from mount_sim.simulated_mount import DivergedError
+from mount_sim.excitation.scenario import build_excitation
+from mount_sim.plant.simulated_mount import DivergedError
 
 PERIOD = 0.125  # s, of 8 Hz
 BENCH = {

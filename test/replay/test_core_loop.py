@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mount_bringup.core.chain import CoreChain
-from mount_bringup.core.run import run_core
+from mount_replay.loop.chain import CoreChain
+from mount_replay.loop.run import run_core
 from mount_ros import topics
-from mount_ros.scalars import ScalarsLayout, stamp_of
+from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 
 MOTION = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 1.5, 'bench.amplitude': 0.0015}
 NARROW = 0.0010  # m

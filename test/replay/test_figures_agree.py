@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 import mount_bags
-from mount_bags.writer import BagWriter
-from mount_bringup import drive as driving
-from mount_bringup.command import app
-from mount_ros.cdr import serialised
+from mount_bags.bag.writer import BagWriter
+from mount_cli.command import app
+from mount_replay.drive import drive as driving
+from mount_ros.messages.cdr import serialised
 
 BENCH = (
     '--core', '--scenario', 'bench', '--duration', '0.8', '--set', 'mount_sim.timeline.start=2.8',

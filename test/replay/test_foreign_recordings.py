@@ -6,9 +6,9 @@ from sensor_msgs.msg import JointState
 
 from mount_bags import BagWriter
 from mount_bags.signals.signal import SignalError
-from mount_bringup.replay.foreign import default_gap, foreign_input, foreign_order
-from mount_bringup.replay.input import ReplayError
-from mount_ros.cdr import serialised
+from mount_replay.given.foreign import default_gap, foreign_input, foreign_order
+from mount_replay.given.input import ReplayError
+from mount_ros.messages.cdr import serialised
 
 TIMES = np.arange(1000) / 100.0
 MILLIMETRES = 0.8 * np.sin(2.0 * np.pi * 8.0 * TIMES) + 0.1 * np.random.default_rng(1).standard_normal(1000)

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from std_msgs.msg import String
 
-from mount_bringup.core import recording as core_recording
-from mount_bringup.core import run as core_run
-from mount_bringup.core.chain import CoreChain
-from mount_bringup.core.recording import record_core
 from mount_bringup.graph.supervisor import session_text
-from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, _told, replay_without_output
 from mount_control.controller import ControlLaw
 from mount_control.force_to_current import resample
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
-from mount_ros.cdr import serialised
-from mount_ros.event_message import change_text, dated
+from mount_replay.loop import recording as core_recording
+from mount_replay.loop import run as core_run
+from mount_replay.loop.chain import CoreChain
+from mount_replay.loop.recording import record_core
+from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, _told, replay_without_output
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.event import change_text, dated
 from mount_ros.topics import EVENT
 
 PARAMETERS = {'mount_sim': {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 2.0}}

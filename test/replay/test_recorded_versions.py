@@ -3,11 +3,11 @@
 import pytest
 from rich.console import Console
 
-from mount_bringup.core.recording import record_core
+from mount_bags.run.versions import versions
 from mount_bringup.graph.supervisor import session_text
-from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
-from mount_bringup.replay.summary import print_replay, replay_figures
-from mount_bringup.versions import versions
+from mount_replay.loop.recording import record_core
+from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from mount_replay.summary import print_replay, replay_figures
 
 SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.1}
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from mount_bags.accept import ACCEPTED_NAME, LARGEST_TOTAL
-from mount_bags.reference import differences_from_reference
-from mount_bringup.replay.recorded_versions import version_differences, versions_sentence
-from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
-from mount_bringup.versions import versions
+from mount_bags.compare.accept import ACCEPTED_NAME, LARGEST_TOTAL
+from mount_bags.compare.reference import differences_from_reference
+from mount_bags.run.versions import versions
+from mount_replay.recorded_versions import version_differences, versions_sentence
+from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 REFERENCES = sorted(
     folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()

@@ -11,11 +11,12 @@ import pytest
 from std_msgs.msg import String
 from typer.testing import CliRunner, Result
 
-from mount_bags.report import run_sections, sections
-from mount_bags.writer import BagWriter
-from mount_bringup.command import app
-from mount_bringup.report_pages import default_pictures
-from mount_ros.cdr import serialised
+from mount_bags.bag.writer import BagWriter
+from mount_cli.command import app
+from mount_report.pages import default_pictures
+from mount_report.sections import run_sections
+from mount_report.sections import signal_sections as sections
+from mount_ros.messages.cdr import serialised
 
 REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
 BENCH = ('--scenario', 'bench', '--duration', '2.5', '--set', 'mount_sim.timeline.start=2.8')
@@ -120,8 +121,8 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 @pytest.mark.parametrize(
     ('broken', 'file'),
     [
-        ('mount_bringup.figure.draw_drive', 'drive.png'),
-        ('mount_bringup.report_pages.make_report', 'report.html'),
+        ('mount_report.drive.figure.draw_drive', 'drive.png'),
+        ('mount_report.pages.make_report', 'report.html'),
     ],
 )
 def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figures(

@@ -17,9 +17,9 @@ import numpy as np
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import mount_bags
-from mount_bags.compare import compare
-from mount_bags.comparison_words import differences
-from mount_bringup.versions import versions
+from mount_bags.compare.compare import compare
+from mount_bags.compare.words import differences
+from mount_bags.run.versions import versions
 from mount_ros.topics import EVENT, SESSION, TOPICS
 
 FOLDER = Path(__file__).parents[2] / 'bags' / 'reference'

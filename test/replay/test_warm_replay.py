@@ -3,11 +3,11 @@
 import pytest
 
 import mount_bags
-from mount_bags.accept import accept
-from mount_bringup.core.recording import record_core
+from mount_bags.compare.accept import accept
 from mount_bringup.graph.supervisor import session_text
-from mount_bringup.replay.ramps import measured_gaps
-from mount_bringup.replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from mount_replay.given.ramps import measured_gaps
+from mount_replay.loop.recording import record_core
+from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 SIM = {
     'scenario': 'bench',

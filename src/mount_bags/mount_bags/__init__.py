@@ -1,8 +1,8 @@
 """Recording, reading and auditing of drives in rosbag2 MCAP bags."""
 
-from mount_bags.reading import ReadingError, Recording, open_recording
-from mount_bags.series import Series, SeriesError
-from mount_bags.writer import BagWriter, RecordingError
+from mount_bags.bag.recording import ReadingError, Recording, open_recording
+from mount_bags.bag.writer import BagWriter, RecordingError
+from mount_bags.messages.series import Series, SeriesError
 
 open = open_recording
 

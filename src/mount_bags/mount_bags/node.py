@@ -10,23 +10,23 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from mount_bags.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
-from mount_bags.diagnosis import OnFull, RecorderState, judge, unobserved_sentence
-from mount_bags.event_marks import present_time
-from mount_bags.offered_qos import OfferedQos
-from mount_bags.recorder_parameters import RecorderParameters, split_of
-from mount_bags.recording import Recorder
-from mount_bags.snapshot import Snapshot, SnapshotRule
-from mount_bags.space import SpaceGuard
-from mount_bags.watching import watch_topic
-from mount_bags.writer import BagWriter, RecordingError
-from mount_ros.cdr import serialised
-from mount_ros.collector import Collector
-from mount_ros.diagnostics import Verdict
-from mount_ros.event_message import BY_HAND, Mark, mark_text
-from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.parameters import declare, read
-from mount_ros.process import run_node
+from mount_bags.bag.offered_qos import OfferedQos
+from mount_bags.bag.writer import BagWriter, RecordingError
+from mount_bags.events.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
+from mount_bags.events.event_marks import present_time
+from mount_bags.recorder.collector import Collector
+from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge, unobserved_sentence
+from mount_bags.recorder.parameters import RecorderParameters, split_of
+from mount_bags.recorder.recorder import Recorder
+from mount_bags.recorder.snapshot import Snapshot, SnapshotRule
+from mount_bags.recorder.space import SpaceGuard
+from mount_bags.recorder.watching import watch_topic
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.event import BY_HAND, Mark, mark_text
+from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.parameters import declare, read
+from mount_ros.nodes.process import run_node
 from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
 NAME = 'mount_recorder'
@@ -71,7 +71,7 @@ class MountRecorder(SafeLifecycleNode):
         self._space = SpaceGuard(folder, parameters.free_reserve)
         if shortage := self._space.shortage():
             raise RecordingError(f'recording {folder} cannot be started: {shortage}')
-        data_path = self.open_collector()
+        data_path = self._open_collector()
         event = data_path.node.resolve_topic_name(EVENT.name)
         self._sink = _sink(folder, parameters, event, topics)
         self._event = event
@@ -157,6 +157,11 @@ class MountRecorder(SafeLifecycleNode):
         except RecordingError as error:
             response.message = str(error)
         return response
+
+    def _open_collector(self) -> Collector:
+        thread = self.data_thread if self.lockstep else None
+        self.data_path = collector = Collector(self, thread=thread, on_failure=self.tell_failure)
+        return collector
 
     def _record(self, data_path: Collector, entry: Topic) -> None:
         sink, recorder, marks = self._present_sink(), self._present_recorder(), self._marks

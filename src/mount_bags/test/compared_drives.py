@@ -6,8 +6,8 @@ import numpy as np
 from recorded_drive import PERIOD, START, joint_state
 from rosbags.typesys import Stores, get_typestore
 
-from mount_bags.offered_qos import OfferedQos
-from mount_bags.writer import BagWriter
+from mount_bags.bag.offered_qos import OfferedQos
+from mount_bags.bag.writer import BagWriter
 from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 _STORE = get_typestore(Stores.ROS2_JAZZY)

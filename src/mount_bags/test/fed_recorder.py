@@ -8,9 +8,9 @@ import random
 import sys
 import time
 
-from mount_bags.recording import Recorder
-from mount_bags.split import SplitRule
-from mount_bags.writer import BagWriter
+from mount_bags.bag.split import SplitRule
+from mount_bags.bag.writer import BagWriter
+from mount_bags.recorder.recorder import Recorder
 
 TOPICS = ('/one', '/two', '/three', '/four')
 JOINT_STATE = 'sensor_msgs/msg/JointState'

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from mount_bags.writer import BagWriter
+from mount_bags.bag.writer import BagWriter
 from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
 START = 1_700_000_000_000_000_000  # ns, any time

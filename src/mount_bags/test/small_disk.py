@@ -3,7 +3,7 @@
 import errno
 import os
 
-from mount_bags.record_file import RecordFile
+from mount_bags.container.record_file import RecordFile
 
 
 class SmallDisk(RecordFile):

@@ -8,11 +8,11 @@ from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
 from rich.console import Console
 
 import mount_bags
-from mount_bags.audit import audit
-from mount_bags.audit_report import as_json, as_table
-from mount_bags.losses import losses
-from mount_bags.writer import BagWriter
-from mount_ros.scalars import ScalarsLayout
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
+from mount_bags.audit.report import as_json, as_table
+from mount_bags.bag.writer import BagWriter
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 

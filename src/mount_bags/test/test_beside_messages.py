@@ -9,14 +9,14 @@ from mcap.writer import Writer
 from recorded_drive import PERIOD, START, sample
 
 import mount_bags
-from mount_bags.audit import audit
-from mount_bags.cut import cut
-from mount_bags.losses import losses
-from mount_bags.merge import merge
-from mount_bags.recover import recover
-from mount_bags.schemas import schema_text
-from mount_bags.statement import Reception
-from mount_bags.writer import BagWriter
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
+from mount_bags.bag.schemas import schema_text
+from mount_bags.bag.statement import Reception
+from mount_bags.bag.writer import BagWriter
+from mount_bags.edit.cut import cut
+from mount_bags.edit.merge import merge
+from mount_bags.edit.recover import recover
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 200

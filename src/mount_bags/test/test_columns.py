@@ -7,7 +7,8 @@ import pytest
 from recorded_drive import PERIOD, START, joint_state, write_drive
 
 import mount_bags
-from mount_bags import BagWriter, ReadingError, SeriesError, columns
+from mount_bags import BagWriter, ReadingError, SeriesError
+from mount_bags.messages import columns
 from mount_ros.topics import DISPLACEMENT, JOINT_STATE, SIM_MOUNT_FORCE
 
 COUNT = 500

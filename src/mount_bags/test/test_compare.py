@@ -7,10 +7,10 @@ import pytest
 from compared_drives import START, answers, write_answers
 
 import mount_bags
-from mount_bags.alignment import ComparisonError
-from mount_bags.compare import compare
-from mount_bags.comparison_words import as_json, as_table, sentences
-from mount_bags.tolerances import ToleranceError, Tolerances
+from mount_bags.compare.alignment import ComparisonError
+from mount_bags.compare.compare import compare
+from mount_bags.compare.tolerances import ToleranceError, Tolerances
+from mount_bags.compare.words import as_json, as_table, sentences
 
 COUNT = 400
 LIVE = START + 90_000_000_317  # ns: another start, as of a second drive

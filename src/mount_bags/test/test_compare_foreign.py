@@ -10,12 +10,12 @@ from recorded_drive import START
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import mount_bags
-from mount_bags.compare import compare
-from mount_bags.comparison_words import sentences
-from mount_bags.recorded_events import recorded_events
-from mount_bags.report.signals import Signals
-from mount_bags.tolerances import Tolerances
-from mount_bags.writer import BagWriter
+from mount_bags.bag.writer import BagWriter
+from mount_bags.compare.compare import compare
+from mount_bags.compare.tolerances import Tolerances
+from mount_bags.compare.words import sentences
+from mount_bags.events.recorded_events import recorded_events
+from mount_report.signals import Signals
 
 COUNT = 50
 PERIOD = 10_000_000  # ns
@@ -151,7 +151,7 @@ def test_a_topic_of_another_type_is_never_equal(tmp_path):
 @pytest.fixture
 def with_camera(tmp_path):
     """Return a recording with a camera beside the mount whose topics are called like ours."""
-    from mount_bags.merge import merge
+    from mount_bags.edit.merge import merge
 
     drive = write_answers(tmp_path / 'drive', answers(400), marks=((100, 'a bump'),))
     writer = BagWriter(tmp_path / 'camera')

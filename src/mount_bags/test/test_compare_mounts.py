@@ -7,13 +7,13 @@ import pytest
 from compared_drives import START, answers, text, write_answers
 
 import mount_bags
-from mount_bags.alignment import ComparisonError
-from mount_bags.compare import compare
-from mount_bags.comparison_words import as_json, as_table, sentences
-from mount_bags.merge import merge
-from mount_bags.recorded_events import recorded_events
-from mount_bags.tolerances import ToleranceError, Tolerances
-from mount_bags.writer import BagWriter
+from mount_bags.bag.writer import BagWriter
+from mount_bags.compare.alignment import ComparisonError
+from mount_bags.compare.compare import compare
+from mount_bags.compare.tolerances import ToleranceError, Tolerances
+from mount_bags.compare.words import as_json, as_table, sentences
+from mount_bags.edit.merge import merge
+from mount_bags.events.recorded_events import recorded_events
 
 COUNT = 400
 SIGNALS = answers(COUNT)

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 import mount_bags
-from mount_bags.compare import compare
-from mount_bags.cut import CutError, cut
-from mount_bags.merge import MergeError, merge
-from mount_bags.origin import origin
-from mount_bags.recorded_events import EventError, find_event, recorded_events
-from mount_bags.report.signals import Signals
-from mount_bags.writer import BagWriter
+from mount_bags.bag.origin import origin
+from mount_bags.bag.writer import BagWriter
+from mount_bags.compare.compare import compare
+from mount_bags.edit.cut import CutError, cut
+from mount_bags.edit.merge import MergeError, merge
+from mount_bags.events.recorded_events import EventError, find_event, recorded_events
+from mount_report.signals import Signals
 
 COUNT = 400
 MARKS = ((50, '{time: 1, kind: fault, text: cable}'), (250, 'just a sentence'), (320, '{kind: fault}'))

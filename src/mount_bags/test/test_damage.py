@@ -13,10 +13,10 @@ from recorded_drive import sample
 
 import mount_bags
 from mount_bags import BagWriter, ReadingError
-from mount_bags.audit import audit
-from mount_bags.audit_report import as_json, as_table, sentences
-from mount_bags.losses import losses
-from mount_bags.recover import RecoveryError, recover
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
+from mount_bags.audit.report import as_json, as_table, sentences
+from mount_bags.edit.recover import RecoveryError, recover
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
 
 TIMES = 200

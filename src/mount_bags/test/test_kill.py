@@ -16,8 +16,8 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 
 import mount_bags
-from mount_bags.split import SplitRule
-from mount_bags.writer import BagWriter
+from mount_bags.bag.split import SplitRule
+from mount_bags.bag.writer import BagWriter
 from mount_ros.testing import wait_until
 
 STRING = 'std_msgs/msg/String'

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mount_bags.lag import lag
+from mount_bags.compare.lag import lag
 
 PERIOD = 1e-3
 

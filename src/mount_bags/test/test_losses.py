@@ -9,12 +9,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from recorded_drive import PERIOD, START, joint_state
 
 import mount_bags
-from mount_bags.answers import Control, Setpoints, Silence, judge_answers
-from mount_bags.audit import audit
-from mount_bags.audit_report import as_json, sentences
-from mount_bags.losses import losses
-from mount_bags.writer import BagWriter
-from mount_ros.cdr import serialised
+from mount_bags.audit.answers import Control, Setpoints, Silence, judge_answers
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
+from mount_bags.audit.report import as_json, sentences
+from mount_bags.bag.writer import BagWriter
+from mount_ros.messages.cdr import serialised
 from mount_ros.topics import (
     COIL_RIPPLE,
     CONTROL_TRACE,

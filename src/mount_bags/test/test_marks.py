@@ -6,7 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded_drive import PERIOD, START
 
-from mount_bags.automatic_marks import (
+from mount_bags.bag.recording import open_recording
+from mount_bags.bag.writer import BagWriter
+from mount_bags.events.automatic_marks import (
     BURST,
     REFILL,
     AutomaticMarks,
@@ -17,17 +19,15 @@ from mount_bags.automatic_marks import (
     SwitchOnWatch,
     mark_kinds,
 )
-from mount_bags.diagnosis import OnFull, RecorderState, judge
-from mount_bags.event_marks import present_time
-from mount_bags.reading import open_recording
-from mount_bags.recording import Recorder
-from mount_bags.stamps import StampWatch
-from mount_bags.watching import watch_topic
-from mount_bags.writer import BagWriter
-from mount_ros.cdr import serialised
-from mount_ros.diagnostics import Level
-from mount_ros.event_message import BY_HAND, Mark, mark_text, read_mark
-from mount_ros.scalars import ScalarsLayout
+from mount_bags.events.event_marks import present_time
+from mount_bags.messages.stamps import StampWatch
+from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
+from mount_bags.recorder.recorder import Recorder
+from mount_bags.recorder.watching import watch_topic
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.event import BY_HAND, Mark, mark_text, read_mark
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.nodes.diagnostics import Level
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS
 
 

@@ -17,8 +17,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 import mount_bags
-from mount_bags.event_marks import read_marks
-from mount_bags.metadata import read_metadata
+from mount_bags.bag.metadata import read_metadata
+from mount_bags.events.event_marks import read_marks
 from mount_bags.node import MountRecorder
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
@@ -313,7 +313,7 @@ def test_snapshot_holds_what_came_before_the_mark(make_recorder, source, tmp_pat
 # The process of the node, which takes itself through its transitions as a supervisor would.
 _AUTONOMOUS = """
 from mount_bags.node import MountRecorder
-from mount_ros.process import run_node
+from mount_ros.nodes.process import run_node
 
 class Recorder(MountRecorder):
     def __init__(self):

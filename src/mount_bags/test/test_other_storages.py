@@ -13,11 +13,11 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StorageP
 from rosbags.typesys import Stores, get_typestore
 
 import mount_bags
-from mount_bags.audit import audit
-from mount_bags.container import ChunkedMcap
-from mount_bags.cut import cut
-from mount_bags.merge import merge
-from mount_bags.recover import recover
+from mount_bags.audit.audit import audit
+from mount_bags.container.writer import ChunkedMcap
+from mount_bags.edit.cut import cut
+from mount_bags.edit.merge import merge
+from mount_bags.edit.recover import recover
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 101

@@ -14,8 +14,8 @@ from rosbags.typesys import Stores, get_typestore
 
 import mount_bags
 from mount_bags import BagWriter, ReadingError, SeriesError
-from mount_bags.schemas import schema_text
-from mount_ros.scalars import ScalarsLayout
+from mount_bags.bag.schemas import schema_text
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, SIM_CHASSIS_ACCELERATION, SIM_MOUNT_FORCE
 
 STORE = get_typestore(Stores.ROS2_JAZZY)

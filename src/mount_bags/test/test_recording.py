@@ -9,14 +9,14 @@ from mcap.reader import make_reader
 from recorded_drive import PERIOD, START, sample
 from small_disk import small_disk
 
-from mount_bags import recording
-from mount_bags.diagnosis import OnFull, RecorderState, judge
-from mount_bags.recording import Recorder, Unobserved
-from mount_bags.space import SpaceGuard
-from mount_bags.statement import RECORDER_RECORD, read_statement
-from mount_bags.writer import BagWriter, RecordingError
-from mount_ros.diagnostics import Level
-from mount_ros.scalars import stamp_of
+from mount_bags.bag.statement import RECORDER_RECORD, read_statement
+from mount_bags.bag.writer import BagWriter, RecordingError
+from mount_bags.recorder import recorder as recording
+from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
+from mount_bags.recorder.recorder import Recorder, Unobserved
+from mount_bags.recorder.space import SpaceGuard
+from mount_ros.messages.scalars import stamp_of
+from mount_ros.nodes.diagnostics import Level
 from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
@@ -232,7 +232,7 @@ def test_full_disk_is_an_error_or_a_warning_as_wished(tmp_path, clocked, on_full
 
 
 def test_rare_messages_reach_the_disk_without_waiting_for_a_full_chunk(tmp_path, clocked, monkeypatch):
-    monkeypatch.setattr('mount_bags.recording._FLUSH_PERIOD', 0.0)
+    monkeypatch.setattr('mount_bags.recorder.recorder._FLUSH_PERIOD', 0.0)
     recorder = recorder_of(tmp_path / 'bag')
     recorder.begin()
     clocked(recorder.receiver('/displacement'))(sample(DISPLACEMENT, 0))
@@ -322,7 +322,7 @@ def test_statement_that_is_not_understood_is_empty(text):
 
 @pytest.mark.parametrize(('on_full', 'level'), [(OnFull.STOP, Level.ERROR), (OnFull.CONTINUE, Level.WARN)])
 def test_recording_is_closed_before_the_disk_is_full(tmp_path, clocked, monkeypatch, on_full, level):
-    monkeypatch.setattr('mount_bags.recording._SPACE_PERIOD', 0.0)
+    monkeypatch.setattr('mount_bags.recorder.recorder._SPACE_PERIOD', 0.0)
     free = [250_000_000]
     guard = SpaceGuard(tmp_path / 'bag', 200_000_000, lambda _: free[0])
     recorder = recorder_of(tmp_path / 'bag', space=guard)

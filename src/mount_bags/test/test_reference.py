@@ -7,11 +7,11 @@ from compared_drives import START, answers, text, write_answers
 from recorded_drive import joint_state
 
 import mount_bags
-from mount_bags import accept as accept_module
-from mount_bags.accept import ACCEPTED_NAME, AcceptError, accept
-from mount_bags.reference import differences_from_reference
-from mount_bags.writer import BagWriter
-from mount_ros.force_table_message import to_message
+from mount_bags.bag.writer import BagWriter
+from mount_bags.compare import accept as accept_module
+from mount_bags.compare.accept import ACCEPTED_NAME, AcceptError, accept
+from mount_bags.compare.reference import differences_from_reference
+from mount_ros.messages.force_table import to_message
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
@@ -30,7 +30,7 @@ ANSWERS = (CURRENT_SETPOINT, CONTROL_TRACE)
 
 def _run(folder, *, shift=0, topics=(*INPUTS, *ANSWERS), session='scenario: bench\n', count=COUNT, begin=0):
     """Write a run: setpoints from the beginning, traces after the ramp; damping `shift` samples later."""
-    from mount_ros.cdr import serialised
+    from mount_ros.messages.cdr import serialised
 
     signals = answers(COUNT, on=80 + shift, off=150)
     writer = BagWriter(folder)

@@ -11,8 +11,8 @@ from rosbags.rosbag2 import Reader
 
 import mount_bags
 from mount_bags import BagWriter
-from mount_bags.recover import recover
-from mount_bags.split import SplitRule
+from mount_bags.bag.split import SplitRule
+from mount_bags.edit.recover import recover
 
 TOPICS = ('/displacement', '/mount_right/event', '/a')
 TYPES = ('sensor_msgs/msg/JointState', 'std_msgs/msg/String', 'std_msgs/msg/String')

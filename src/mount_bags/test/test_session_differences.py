@@ -1,6 +1,6 @@
 """Two sessions in words."""
 
-from mount_bags.session_differences import session_differences
+from mount_bags.run.session_differences import session_differences
 
 
 def test_changed_parameters_come_first_and_by_their_names():

@@ -9,7 +9,7 @@ from sensor_msgs.msg import Imu, JointState
 import mount_bags
 from mount_bags.signals.loading import load_signal
 from mount_bags.signals.signal import SignalError
-from mount_ros.cdr import serialised
+from mount_ros.messages.cdr import serialised
 
 RATE = 104.26  # Hz, of a common motion sensor
 

@@ -9,12 +9,12 @@ from mcap.reader import make_reader
 from small_disk import small_disk
 
 import mount_bags
-from mount_bags.diagnosis import OnFull, RecorderState, judge
-from mount_bags.recording import Recorder
-from mount_bags.snapshot import ITEM_OVERHEAD, Snapshot, SnapshotRule
-from mount_bags.statement import RECORDER_RECORD, read_statement
-from mount_bags.writer import BagWriter, RecordingError
-from mount_ros.diagnostics import Level
+from mount_bags.bag.statement import RECORDER_RECORD, read_statement
+from mount_bags.bag.writer import BagWriter, RecordingError
+from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
+from mount_bags.recorder.recorder import Recorder
+from mount_bags.recorder.snapshot import ITEM_OVERHEAD, Snapshot, SnapshotRule
+from mount_ros.nodes.diagnostics import Level
 
 STRING = 'std_msgs/msg/String'
 RULE = SnapshotRule(before=30, after=10, memory=1 << 20)

@@ -13,11 +13,11 @@ from rosbags.highlevel import AnyReader
 from small_disk import small_disk
 
 import mount_bags
-from mount_bags.metadata import read_metadata
-from mount_bags.piece import Piece
-from mount_bags.piece_topics import PIECE_RECORD
-from mount_bags.split import SplitError, SplitRule, checked_rule, duration_in_nanoseconds, split_rule
-from mount_bags.writer import BagWriter, RecordingError
+from mount_bags.bag.metadata import read_metadata
+from mount_bags.bag.piece import Piece
+from mount_bags.bag.piece_topics import PIECE_RECORD
+from mount_bags.bag.split import SplitError, SplitRule, checked_rule, duration_in_nanoseconds, split_rule
+from mount_bags.bag.writer import BagWriter, RecordingError
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
@@ -132,7 +132,7 @@ def test_writing_goes_on_while_a_full_file_is_brought_to_the_disk(tmp_path, monk
     released = threading.Event()
     finish = Piece.finish
     monkeypatch.setattr(
-        'mount_bags.piece.Piece.finish',
+        'mount_bags.bag.piece.Piece.finish',
         lambda piece, records: (piece.number == 0 and released.wait(30)) or finish(piece, records),
     )
     writer = BagWriter(tmp_path / 'bag', split=SplitRule(duration=10), chunk_size=1)
@@ -154,7 +154,7 @@ def test_file_that_cannot_be_finished_is_named_at_the_end(tmp_path, monkeypatch)
     writer.add_topic('/text', STRING)
     writer.write('/text', string('x'), 0)
     with monkeypatch.context() as patch:
-        patch.setattr('mount_bags.piece.Piece.finish', refuse)
+        patch.setattr('mount_bags.bag.piece.Piece.finish', refuse)
         writer.write('/text', string('y'), 10)
         writer._wait_for_closing()
     with pytest.raises(RecordingError, match=r'bag_0\.mcap ends without its summary'):

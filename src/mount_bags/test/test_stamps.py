@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_bags.stamps import StampWatch, stamp_statistics
+from mount_bags.messages.stamps import StampWatch, stamp_statistics
 
 RATE = 1000.0
 PERIOD = 1_000_000

@@ -26,11 +26,11 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from small_disk import small_disk
 
-from mount_bags.metadata import read_metadata
-from mount_bags.offered_qos import OfferedQos, QosError, qos_text, read_qos
-from mount_bags.schemas import SchemaError, schema_text, type_hash
-from mount_bags.split import WHOLE, SplitRule
-from mount_bags.writer import BagWriter, RecordingError
+from mount_bags.bag.metadata import read_metadata
+from mount_bags.bag.offered_qos import OfferedQos, QosError, qos_text, read_qos
+from mount_bags.bag.schemas import SchemaError, schema_text, type_hash
+from mount_bags.bag.split import WHOLE, SplitRule
+from mount_bags.bag.writer import BagWriter, RecordingError
 from mount_ros.topics import DISPLACEMENT, TOPICS
 
 STRING = 'std_msgs/msg/String'
@@ -328,7 +328,7 @@ def test_full_disk_leaves_a_complete_recording_up_to_the_last_chunk(tmp_path):
 
 
 def test_room_for_the_end_grows_with_the_recording(tmp_path, monkeypatch):
-    monkeypatch.setattr('mount_bags.record_file.RESERVE_STEP', 4096)
+    monkeypatch.setattr('mount_bags.container.record_file.RESERVE_STEP', 4096)
     writer = BagWriter(tmp_path / 'bag', chunk_size=1, open_file=small_disk(1 << 20))
     _, sentence = fill(writer)
     assert 'closed and readable' in sentence
@@ -371,7 +371,7 @@ def test_limit_on_the_size_of_files_ends_the_recording_with_whole_chunks(tmp_pat
         import resource, signal, sys
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from test_writer import fill
-        from mount_bags.writer import BagWriter
+        from mount_bags.bag.writer import BagWriter
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20))
         writer = BagWriter({str(tmp_path / 'bag')!r})
@@ -391,7 +391,7 @@ def test_killed_process_leaves_every_complete_chunk(tmp_path):
         import os, signal, sys
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from recorded_drive import RECORDED, START, sample
-        from mount_bags.writer import BagWriter
+        from mount_bags.bag.writer import BagWriter
         writer = BagWriter({str(tmp_path / 'bag')!r})
         for topic in RECORDED:
             writer.add_topic('/' + topic.name, topic.type)

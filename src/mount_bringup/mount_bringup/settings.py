@@ -7,8 +7,8 @@ from typing import Any
 
 import yaml
 
-from mount_bags.recorder_parameters import RecorderParameters
-from mount_control.parameters import ControlParameters
+from mount_bags.recorder.parameters import RecorderParameters
+from mount_control.parameters import DEFAULT_DAMPER, ControlParameters
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
@@ -16,8 +16,6 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, flattened
 from mount_sim.parameters import SimParameters
-
-DEFAULT_DAMPER = 'viscous_2000'
 
 
 class SettingError(ParameterError):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_bringup.core.chain import chosen_damper
+from mount_bringup.chosen import chosen_damper
 from mount_bringup.settings import checked_settings, settings_of_options
 from mount_models.damper import DamperError, damper_curve
 

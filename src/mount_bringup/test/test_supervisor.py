@@ -3,8 +3,9 @@
 import pytest
 
 from mount_bringup.graph import supervisor
+from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import DRIVER, INIT, SIM, SIMULATED, VEHICLE, GraphSettings, ending_order
-from mount_bringup.graph.supervisor import GraphError, Supervisor
+from mount_bringup.graph.supervisor import Supervisor
 
 
 class Refused(Supervisor):

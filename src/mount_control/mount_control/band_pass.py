@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_models.compiled import compiled
-from mount_models.elementary import sine_and_cosine
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import sine_and_cosine
 
 
 class BandPass(NamedTuple):

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from mount_control import band_pass, force_to_current, switching
 from mount_control.parameters import ControlParameters, checked_parameters
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_bytes, record_dtype
 from mount_models.damper import DamperCurve, damper_force
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import check_friction
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
-from mount_models.record import record_bytes, record_dtype
 from mount_models.sampling import SAMPLE_TIME
 
 FADE_SAMPLES = 50

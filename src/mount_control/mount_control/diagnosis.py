@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from mount_control.sample_watch import SampleCounts
-from mount_ros.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Level, Verdict
 
 
 @dataclass(frozen=True)

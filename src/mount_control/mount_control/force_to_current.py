@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_models.compiled import compiled
-from mount_models.interpolation import each_interpolated
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.interpolation import each_interpolated
 
 FORCE_STEP = 0.5  # N, chosen: the table's own step
 _FIRST_TOUCH = 1.0  # N, chosen

@@ -15,7 +15,7 @@ from mount_control.controller import TRACE, ControlLaw, Controller, load_compile
 from mount_control.diagnosis import ControlFigures, verdict
 from mount_control.force_to_current import ForceTableError, resample
 from mount_control.identified import check_fits
-from mount_control.parameters import RUN_TIME, ControlParameters, checked_parameters
+from mount_control.parameters import DEFAULT_DAMPER, RUN_TIME, ControlParameters, checked_parameters
 from mount_control.sample_watch import Judgement, SampleWatch
 from mount_models.damper import DamperError, damper_curve, damper_text
 from mount_models.friction.coefficient import FrictionCoefficients
@@ -24,15 +24,15 @@ from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
-from mount_ros.cdr import serialised
-from mount_ros.diagnostics import Verdict
-from mount_ros.event_message import change_text, dated
-from mount_ros.force_table_message import ForceTable, ForceTableMessageError, from_bytes
-from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.parameter_gate import Change
-from mount_ros.parameters import SpecimenValues, declare, read
-from mount_ros.process import run_node
-from mount_ros.scalars import ScalarsLayout
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.event import change_text, dated
+from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_bytes
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.parameter_gate import Change
+from mount_ros.nodes.parameters import SpecimenValues, declare, read
+from mount_ros.nodes.process import run_node
 from mount_ros.timing import LatencyHistogram
 
 _OFF = 0.0  # A
@@ -49,7 +49,7 @@ class MountControl(SafeLifecycleNode):
         declare(self, ControlParameters())
         declare(self, FrictionCoefficients(), 'friction')
         declare(self, FrictionContact(), 'contact')
-        self.declare_parameter('damper', 'viscous_2000')
+        self.declare_parameter('damper', DEFAULT_DAMPER)
         self.declare_parameter('parameters_file', '')
         self.declare_parameter('specimen', '')
         self.add_pre_set_parameters_callback(_spelled_out)

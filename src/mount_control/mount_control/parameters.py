@@ -6,6 +6,8 @@ from typing import Annotated, NamedTuple
 from mount_models.quantity import ParameterError, Quantity, checked
 from mount_models.sampling import SAMPLE_TIME
 
+DEFAULT_DAMPER = 'viscous_2000'
+
 
 class ControlParameters(NamedTuple):
     """Parameters of band-pass, prediction, switching and output."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mount_control.parameters import ControlParameters
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 
 
 class Switching(NamedTuple):

@@ -6,7 +6,7 @@ import pytest
 
 from mount_control.diagnosis import ControlFigures, verdict
 from mount_control.sample_watch import SampleCounts
-from mount_ros.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level
 
 GOOD = ControlFigures(
     counts=SampleCounts(samples=10_000),

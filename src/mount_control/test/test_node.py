@@ -22,12 +22,12 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen, load_specimen, save_specimen
 from mount_ros import topics
-from mount_ros.cdr import serialised
 from mount_ros.data_path import DataPath
-from mount_ros.diagnostics import Level
-from mount_ros.event_message import Mark, ParametersChanged, read_change, read_mark
-from mount_ros.force_table_message import to_message
-from mount_ros.scalars import ScalarsLayout
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.event import Mark, ParametersChanged, read_change, read_mark
+from mount_ros.messages.force_table import to_message
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.nodes.diagnostics import Level
 from mount_ros.testing import wait_until
 
 MS = 1_000_000  # ns

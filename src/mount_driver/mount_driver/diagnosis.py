@@ -8,7 +8,7 @@ from mount_driver.e2e_receiver import Outcome
 from mount_driver.exchange import Exchange
 from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
-from mount_ros.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Level, Verdict
 
 _PERIOD = 1.0  # s: rates are taken over this long
 _SERIOUS_FAULTS = ('over_temperature', 'over_current', 'under_voltage', 'displacement_sensor')

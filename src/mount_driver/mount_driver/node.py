@@ -9,12 +9,12 @@ from mount_driver.diagnosis import LinkWatch, judge, snapshot
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
-from mount_ros.diagnostics import Level, Verdict
-from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.parameters import declare, read
-from mount_ros.process import run_node
-from mount_ros.scalars import ScalarsError, ScalarsLayout
-from mount_ros.temperature_message import temperature_layout
+from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
+from mount_ros.messages.temperature import temperature_layout
+from mount_ros.nodes.diagnostics import Level, Verdict
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.parameters import declare, read
+from mount_ros.nodes.process import run_node
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
 
 

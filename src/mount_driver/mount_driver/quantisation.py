@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 
 DISPLACEMENT_STEPS = 1.0e7  # per m
 DISPLACEMENT_LIMIT = 500_000.0  # raw, both ways

@@ -8,7 +8,7 @@ from mount_driver.codec import Status
 from mount_driver.diagnosis import LinkWatch, Snapshot, judge
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
-from mount_ros.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level
 
 PARAMETERS = DriverParameters(interface='socketcan', channel='can0')
 BEFORE = Snapshot(time=9.0, samples=9_000, setpoints=9_000, driving=True, status=Status(13.8, 40.0))

@@ -22,10 +22,10 @@ from mount_driver.codec import Setpoint, Status
 from mount_driver.link import Arrival
 from mount_driver.node import MountDriver
 from mount_ros.data_path import DataPath
-from mount_ros.diagnostics import Level
+from mount_ros.messages.scalars import ScalarsLayout, stamp_of
+from mount_ros.messages.temperature import temperature_of
+from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
-from mount_ros.scalars import ScalarsLayout, stamp_of
-from mount_ros.temperature_message import temperature_of
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT
 

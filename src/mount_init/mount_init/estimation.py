@@ -13,7 +13,7 @@ import numpy.typing as npt
 from mount_init.errors import AmbiguousCurveError, OutsideCalibrationError, UnusableReadingsError
 from mount_init.parameters import InitParameters
 from mount_models.actuator.law import OutsideLawError, checked_force
-from mount_models.averages import mean, standard_deviation
+from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, CrossingError, find_crossing
 from mount_models.coil.gap import (
     OutsideCurveError,

@@ -42,7 +42,7 @@ from mount_init.plausibility import (
 from mount_init.ramp import Ramp, current_ramp
 from mount_init.readings import Readings, check_readings
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
-from mount_models.averages import mean, standard_deviation
+from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, find_crossing
 from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
 from mount_models.specimen import Specimen

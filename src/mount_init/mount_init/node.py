@@ -9,15 +9,15 @@ from mount_init.initialisation import Initialisation, InitialisationResult, load
 from mount_init.parameters import InitParameters
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
-from mount_ros.cdr import serialised
 from mount_ros.data_path import DataPath
-from mount_ros.diagnostics import Verdict
-from mount_ros.force_table_message import to_message
-from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.parameters import declare, read
-from mount_ros.process import run_node
-from mount_ros.scalars import ScalarsError, ScalarsLayout
-from mount_ros.temperature_message import temperature_of
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.force_table import to_message
+from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
+from mount_ros.messages.temperature import temperature_of
+from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.parameters import declare, read
+from mount_ros.nodes.process import run_node
 
 
 class MountInit(SafeLifecycleNode):

@@ -10,8 +10,8 @@ import pytest
 from mount_init.coil_temperature import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
+from mount_models.actuator.closing import ClosingMechanics, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator, mean_incremental_inductance
-from mount_models.closing import ClosingMechanics, closed_state
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
 from mount_models.specimen import Specimen, default_specimen
 

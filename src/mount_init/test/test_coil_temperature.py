@@ -10,7 +10,7 @@ from mount_init.diagnosis import InitFigures, verdict
 from mount_init.errors import OutsideCalibrationError
 from mount_init.parameters import InitParameters
 from mount_models.specimen import Specimen
-from mount_ros.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level
 
 SECOND = 1_000_000_000  # ns
 PARAMETERS = InitParameters(peak_current=2.5)

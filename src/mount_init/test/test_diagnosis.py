@@ -6,7 +6,7 @@ import pytest
 
 from mount_init.diagnosis import InitFigures, verdict, wear_reserve
 from mount_init.parameters import InitParameters
-from mount_ros.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level
 
 
 @pytest.fixture(scope='module')

@@ -14,9 +14,9 @@ from mount_init.node import MountInit
 from mount_init.parameters import InitParameters
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.force_table_message import from_bytes
-from mount_ros.scalars import ScalarsLayout
-from mount_ros.temperature_message import temperature_layout
+from mount_ros.messages.force_table import from_bytes
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.messages.temperature import temperature_layout
 from mount_ros.testing import LIMIT, wait_until
 
 STEP = 1_000_000  # ns

@@ -16,7 +16,9 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import expm1
+from mount_models.arithmetic.interpolation import each_interpolated
 from mount_models.damper_points import (
     COLUMNS,
     FILE_ENDINGS,
@@ -25,8 +27,6 @@ from mount_models.damper_points import (
     checked_points,
     points_in,
 )
-from mount_models.elementary import expm1
-from mount_models.interpolation import each_interpolated
 from mount_models.quantity import ParameterError, Quantity, checked
 
 FloatArray = npt.NDArray[np.float64]

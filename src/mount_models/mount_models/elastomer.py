@@ -9,8 +9,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.compiled import compiled
-from mount_models.elementary import expm1
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import expm1
 from mount_models.quantity import Quantity
 
 

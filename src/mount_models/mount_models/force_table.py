@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.actuator.law import ForceLaw, checked_current_for_force, checked_force
-from mount_models.compiled import compiled
-from mount_models.interpolation import each_interpolated, interpolated
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.interpolation import each_interpolated, interpolated
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 from mount_models.quantity import Quantity
 
 _RESISTANCE = 'Pa s/m^3'

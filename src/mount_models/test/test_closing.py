@@ -8,8 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from mount_models.actuator.reluctance import MU_0, ReluctanceActuator, differential_permeability, force
-from mount_models.closing import (
+from mount_models.actuator.closing import (
     ClosingError,
     ClosingMechanics,
     checked_closing,
@@ -17,6 +16,7 @@ from mount_models.closing import (
     contact_current,
     contact_force,
 )
+from mount_models.actuator.reluctance import MU_0, ReluctanceActuator, differential_permeability, force
 from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.quantity import ParameterError, quantities, with_values
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mount_models.actuator.closing import ClosingMechanics, closed_state
+from mount_models.actuator.closing import contact_force as true_contact_force
 from mount_models.actuator.law import ForceOutsideLaw, GapOutsideLaw, OutsideLawError, force
 from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.closing import ClosingMechanics, closed_state
-from mount_models.closing import contact_force as true_contact_force
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import gap_from_crossing_current, rest_gap_from_inductance
 from mount_models.coil.ripple import RippleCoil, incremental_inductance

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from mount_models.actuator.closing import ClosingMechanics, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.closing import ClosingMechanics, closed_state
 from mount_models.coil.crossing import CrossingError, find_crossing
 from mount_models.coil.ripple import RippleCoil, incremental_inductance
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
+from mount_identification.coil.gap_calibration import GapPoint, calibrate_gap_curves
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.gap import (
     GapCurvesRefusedError,
@@ -21,7 +22,6 @@ from mount_models.coil.gap import (
     measured_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.coil.gap_calibration import GapPoint, calibrate_gap_curves
 from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.quantity import with_values
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mount_models.compiled import compiled
-from mount_models.elementary import atan, cosines, exp, expm1, log, sine_and_cosine, sines
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import atan, cosines, exp, expm1, log, sine_and_cosine, sines
 
 SMALLEST_NORMAL = np.finfo(float).tiny
 LONG = np.longdouble

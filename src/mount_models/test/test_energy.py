@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 from mount_models.energy import ACCOUNT, LOSSES, book_step, imbalance, new_account
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 from mount_models.friction.coefficient import (
     FrictionCoefficients,
     dynamic_coefficient,

@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
-from mount_ros.message_types import message_class
+from mount_ros.messages.types import message_class
 from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Delivery, Topic
 

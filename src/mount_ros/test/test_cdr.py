@@ -9,7 +9,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
 
-from mount_ros.cdr import serialised
+from mount_ros.messages.cdr import serialised
 
 texts = st.text(st.characters(exclude_characters='\x00', codec='utf-8'), max_size=12)
 numbers = st.lists(st.floats(allow_nan=False), max_size=5)

@@ -7,7 +7,7 @@ from rclpy.node import Node
 
 import mount_ros.data_path
 from mount_ros.data_path import DataPath, DataThread, DataThreadEndedError, DataThreadError
-from mount_ros.scalars import ScalarsLayout
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
-from mount_ros.force_table_message import (
+from mount_ros.messages.force_table import (
     ForceTableMessageError,
     from_bytes,
     from_message,

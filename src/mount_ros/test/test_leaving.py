@@ -3,11 +3,11 @@ import sys
 
 import pytest
 
-from mount_ros.leaving import leave_middleware
+from mount_ros.nodes.leaving import leave_middleware
 
 _STUCK = """
 import sys, threading
-from mount_ros.leaving import end_process, leave_middleware
+from mount_ros.nodes.leaving import end_process, leave_middleware
 never = threading.Event()
 threading.Thread(target=never.wait).start()  # as a thread of the middleware, which the interpreter waits for
 print(leave_middleware(never.wait, 0.05), end='')

@@ -10,8 +10,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_ros.data_path import DataPath
-from mount_ros.diagnostics import Level, Verdict
-from mount_ros.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.diagnostics import Level, Verdict
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT

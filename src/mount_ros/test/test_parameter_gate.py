@@ -3,8 +3,8 @@
 import pytest
 from rclpy.parameter import Parameter
 
-from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.parameter_gate import Change
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.parameter_gate import Change
 
 
 class Subject(SafeLifecycleNode):

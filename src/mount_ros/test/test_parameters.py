@@ -8,7 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity
-from mount_ros.parameters import SpecimenValues, declare, read
+from mount_ros.nodes.parameters import SpecimenValues, declare, read
 
 
 class Spring(NamedTuple):

@@ -11,13 +11,13 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from mount_ros.process import wake
+from mount_ros.nodes.process import wake
 from mount_ros.testing import LIMIT, free_domain
 
 PROGRAM = """
 import os, threading
-from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.process import run_nodes
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.process import run_nodes
 from mount_ros.topics import DISPLACEMENT
 
 def say(node, what):
@@ -162,7 +162,7 @@ def test_the_end_of_the_data_thread_ends_the_process_with_the_reason_and_code_1(
 
 SLEEPER = """
 import signal, threading
-from mount_ros.process import _Ending
+from mount_ros.nodes.process import _Ending
 over = _Ending()
 over.listen(signal.SIGTERM)
 

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from mount_ros.data_path import DataPath
-from mount_ros.diagnostics import Level
-from mount_ros.scalars import ScalarsLayout
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.nodes.diagnostics import Level
 from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from mount_ros.scalars import OneNumberLayout, ScalarsError, ScalarsLayout, stamp_of
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsError, ScalarsLayout, stamp_of
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, TOPICS
 
 STAMP = 1_763_680_000_123_456_789

@@ -4,12 +4,12 @@ import os
 
 import pytest
 
-from mount_ros.scheduling import calm_resending, resending_threads
+from mount_ros.nodes.scheduling import calm_resending, resending_threads
 
 
 def test_threads_that_send_again_are_taken_out_of_real_time(context):
     threads = resending_threads()
-    assert threads, 'the middleware names its threads otherwise: mount_ros.scheduling must know'
+    assert threads, 'the middleware names its threads otherwise: mount_ros.nodes.scheduling must know'
     try:
         for thread in threads:
             os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(1))

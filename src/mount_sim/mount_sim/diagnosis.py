@@ -1,9 +1,9 @@
 """The simulator's verdict on itself, from figures alone."""
 
 from mount_models.sampling import SAMPLE_TIME
-from mount_ros.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_sim.loop import LoopFigures
-from mount_sim.simulated_mount import FARTHEST_DISPLACEMENT, Run
+from mount_sim.plant.simulated_mount import FARTHEST_DISPLACEMENT, Run
 
 DRIVING, FINISHED = 'driving', 'finished'
 LATE_SHARE = 0.05  # chosen: of the samples; beyond it the machine is too busy for real time

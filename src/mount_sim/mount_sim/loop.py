@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 from mount_driver.codec import Status
 from mount_ros.timing import LatencyHistogram
-from mount_sim.can_end import CanEnd, ReceivedSetpoint
-from mount_sim.electronics import STATUS_EVERY, ElectronicsParameters
-from mount_sim.faults import Fault
-from mount_sim.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
+from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
+from mount_sim.electronics.electronics import STATUS_EVERY, ElectronicsParameters
+from mount_sim.electronics.faults import Fault
+from mount_sim.plant.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
 
 _LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
 _REMEMBERED = 1024  # samples whose sending time is kept

@@ -10,19 +10,19 @@ from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
-from mount_ros.diagnostics import Verdict
-from mount_ros.lifecycle import SafeLifecycleNode
-from mount_ros.parameters import declare, read
-from mount_ros.process import run_node
-from mount_ros.scalars import OneNumberLayout, ScalarsLayout
-from mount_sim.can_end import CanEnd
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
+from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.parameters import declare, read
+from mount_ros.nodes.process import run_node
 from mount_sim.diagnosis import verdict
-from mount_sim.faults import Fault
+from mount_sim.electronics.can_end import CanEnd
+from mount_sim.electronics.faults import Fault
+from mount_sim.excitation.scenario import build_excitation
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
-from mount_sim.plant import TRUTH
-from mount_sim.scenario import build_excitation
-from mount_sim.simulated_mount import DivergedError, SimulatedMount
+from mount_sim.plant.plant import TRUTH
+from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 
 _SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
 _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance

@@ -2,19 +2,18 @@
 
 from typing import Annotated, NamedTuple
 
+from mount_models.actuator.closing import ClosingMechanics
 from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.closing import ClosingMechanics
 from mount_models.coil.ripple import RippleCoil
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.hydromount import Hydromount
 from mount_models.quantity import Quantity
 from mount_models.vehicle import Engine, Vehicle
-from mount_sim.electronics import ElectronicsParameters
-from mount_sim.faults import FaultParameters
-from mount_sim.mounts import seated_mount
-from mount_sim.plant import Plant
-from mount_sim.scenario import (
+from mount_sim.electronics.electronics import ElectronicsParameters
+from mount_sim.electronics.faults import FaultParameters
+from mount_sim.electronics.warm_coil import TemperatureCoefficients
+from mount_sim.excitation.scenario import (
     BenchScenario,
     IdleForce,
     MotorwayScenario,
@@ -22,7 +21,8 @@ from mount_sim.scenario import (
     SweepScenario,
     Timeline,
 )
-from mount_sim.warm_coil import TemperatureCoefficients
+from mount_sim.plant.mounts import seated_mount
+from mount_sim.plant.plant import Plant
 
 
 class SimParameters(NamedTuple):

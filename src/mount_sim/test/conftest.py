@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mount_models.quantity import with_flattened
+from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.scenario import build_excitation
-from mount_sim.simulated_mount import SimulatedMount
+from mount_sim.plant.simulated_mount import SimulatedMount
 
 
 def sim_parameters(**changes: Any) -> SimParameters:

@@ -1,9 +1,9 @@
 """The simulator's verdict on itself."""
 
-from mount_ros.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level
 from mount_sim.diagnosis import DRIVING, FINISHED, verdict
 from mount_sim.loop import LoopFigures
-from mount_sim.simulated_mount import BeyondRange, Run
+from mount_sim.plant.simulated_mount import BeyondRange, Run
 
 RUN = Run(samples=20_000, excitation_start=5000)
 

@@ -8,7 +8,7 @@ import pytest
 
 from mount_models.actuator.reluctance import ReluctanceActuator, mean_incremental_inductance
 from mount_models.coil.ripple import RippleCoil, incremental_inductance
-from mount_sim.electronics import ElectronicsParameters, Noise, advance_current, read_sensors
+from mount_sim.electronics.electronics import ElectronicsParameters, Noise, advance_current, read_sensors
 
 ACTUATOR, COIL = ReluctanceActuator(), RippleCoil()
 DT, GAP = 5e-5, 349e-6

@@ -7,9 +7,9 @@ import pytest
 
 from mount_driver.codec import MountCodec
 from mount_models.quantity import ParameterError
-from mount_sim.can_end import CanEnd
-from mount_sim.electronics import Reading
-from mount_sim.faults import FAULTS, Fault, FaultParameters
+from mount_sim.electronics.can_end import CanEnd
+from mount_sim.electronics.electronics import Reading
+from mount_sim.electronics.faults import FAULTS, Fault, FaultParameters
 
 BEGIN, DURATION = 2.0, 0.5
 TIMES = (1.999, 2.0, 2.25, 2.499, 2.5)

@@ -13,9 +13,9 @@ from mount_driver.codec import MountCodec
 from mount_driver.exchange import Exchange
 from mount_driver.frame import Frame
 from mount_driver.parameters import DriverParameters
-from mount_sim.can_end import CanEnd
-from mount_sim.electronics import ElectronicsParameters
-from mount_sim.faults import Fault, FaultParameters
+from mount_sim.electronics.can_end import CanEnd
+from mount_sim.electronics.electronics import ElectronicsParameters
+from mount_sim.electronics.faults import Fault, FaultParameters
 from mount_sim.loop import ElectronicsLoop
 
 CODEC = MountCodec()

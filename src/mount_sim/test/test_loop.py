@@ -13,11 +13,11 @@ from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
-from mount_sim.can_end import CanEnd
-from mount_sim.electronics import ElectronicsParameters, Reading
-from mount_sim.faults import Fault, FaultParameters
+from mount_sim.electronics.can_end import CanEnd
+from mount_sim.electronics.electronics import ElectronicsParameters, Reading
+from mount_sim.electronics.faults import Fault, FaultParameters
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
-from mount_sim.simulated_mount import DivergedError
+from mount_sim.plant.simulated_mount import DivergedError
 
 CODEC = MountCodec()
 _channels = itertools.count()

@@ -5,7 +5,7 @@ import pytest
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
-from mount_ros.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level
 from mount_ros.testing import wait_until
 from mount_sim.node import MountSim
 

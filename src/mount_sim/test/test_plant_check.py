@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mount_models.quantity import ParameterError, with_flattened
-from mount_sim.excitation import Seat
-from mount_sim.mounts import MOUNTS
+from mount_sim.excitation.excitation import Seat
 from mount_sim.parameters import SimParameters
-from mount_sim.plant import PlantSimulation
-from mount_sim.plant_check import checked_plant, growth
+from mount_sim.plant.check import checked_plant, growth
+from mount_sim.plant.mounts import MOUNTS
+from mount_sim.plant.plant import PlantSimulation
 
 STEP = 5e-5  # s
 

@@ -5,7 +5,7 @@ import pytest
 
 from mount_bags.signals.csv_file import read_csv
 from mount_models.actuator.reluctance import force
-from mount_sim.rack import (
+from mount_sim.rack.coil import (
     GAPS,
     Rack,
     RackError,

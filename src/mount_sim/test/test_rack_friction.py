@@ -5,7 +5,7 @@ import pytest
 
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_sim.rack_friction import move, sawtooth_corners, with_noise
+from mount_sim.rack.friction import move, sawtooth_corners, with_noise
 
 CONTACT, COEFFICIENTS = FrictionContact(), FrictionCoefficients()
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from mount_models.quantity import quantities
-from mount_sim.faults import FAULTS
-from mount_sim.mounts import MOUNTS
+from mount_sim.electronics.faults import FAULTS
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.mounts import MOUNTS
 
 README = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
 OWN = ('timeline', 'bench', 'motorway', 'sweep', 'recorded', 'idle', 'electronics', 'temperature', 'fault')

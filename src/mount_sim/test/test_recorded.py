@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mount_bags.signals.signal import SignalError
-from mount_sim.recorded import acceleration_at, recorded_acceleration
+from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
 
 RATE = 104.26  # Hz, of a common motion sensor
 STEP = 5e-5

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mount_models.quantity import ParameterError
-from mount_sim.excitation import Seat
-from mount_sim.scenario import STEP_TIME, build_excitation
+from mount_sim.excitation.excitation import Seat
+from mount_sim.excitation.scenario import STEP_TIME, build_excitation
 
 
 def _refusal(chosen):

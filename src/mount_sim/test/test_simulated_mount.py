@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mount_models.closing import ClosingError
+from mount_models.actuator.closing import ClosingError
 from mount_models.quantity import ParameterError
 from mount_ros import topics
-from mount_sim.excitation import Seat
-from mount_sim.plant import TRUTH, Plant, PlantSimulation
+from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.plant import TRUTH, Plant, PlantSimulation
 
 
 def test_truth_has_the_names_of_its_topic():

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mount_models.coil.ripple import RippleCoil
-from mount_sim.electronics import ElectronicsParameters
-from mount_sim.excitation import Seat
-from mount_sim.plant import Plant, PlantSimulation
-from mount_sim.warm_coil import TemperatureCoefficients, coil_at
+from mount_sim.electronics.electronics import ElectronicsParameters
+from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
+from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.plant import Plant, PlantSimulation
 
 COIL = RippleCoil()
 

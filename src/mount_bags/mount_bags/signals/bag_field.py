@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mount_bags.reading import ReadingError, Recording
-from mount_bags.series import Series, SeriesError, Times
+from mount_bags.bag.recording import ReadingError, Recording
+from mount_bags.messages.series import Series, SeriesError, Times
 from mount_bags.signals.signal import SECOND, Signal, SignalError, check_count
 
 

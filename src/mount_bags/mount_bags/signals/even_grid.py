@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mount_bags.signals.local_cubic import interpolated, prediction_error
 from mount_bags.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 
 ON_THE_LINE = 1e-3
 """Share of a period, chosen: so late a sample of a sine of 0.15 of the rate is wrong by a thousandth."""

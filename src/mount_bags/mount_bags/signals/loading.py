@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mount_bags.reading import ReadingError, open_recording
+from mount_bags.bag.recording import ReadingError, open_recording
 from mount_bags.signals.bag_field import read_field
 from mount_bags.signals.csv_file import read_csv
 from mount_bags.signals.json_file import read_json

@@ -6,7 +6,7 @@ The error of a sine of frequency f at even distances T is below 0.024 (2 pi f T)
 import numpy as np
 
 from mount_bags.signals.signal import FloatArray
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 
 
 @compiled

@@ -21,8 +21,8 @@ import numpy as np
 from mount_bags.signals.even_grid import EvenSignal
 from mount_bags.signals.plausibility import check_range
 from mount_bags.signals.signal import FloatArray
-from mount_models.compiled import compiled
-from mount_models.elementary import sine_and_cosine
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import sine_and_cosine
 
 HALF_LENGTH = 26  # samples of the slower rate
 CUTOFF = 0.45  # of the slower rate, chosen: what is left at its half is as small as the window allows

@@ -104,7 +104,7 @@ def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder:
 def _program(nodes: Sequence[GraphNode]) -> str:
     imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in nodes)
     classes = ', '.join(node.class_name for node in nodes)
-    return f'{imports}; from mount_ros.process import run_nodes; run_nodes([{classes}])'
+    return f'{imports}; from mount_ros.nodes.process import run_nodes; run_nodes([{classes}])'
 
 
 def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
@@ -118,8 +118,8 @@ def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
 def _prepare_child(schedule: Callable[[], None]) -> None:
     # Without its supervisor a node must not go on driving the coil.
     ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGINT)
-    # Before the middleware makes its threads, so that those that receive inherit it; those that send
-    # again are taken out of real time by `mount_ros.scheduling`. Where it is not permitted the node runs as
-    # any other process.
+    # Before the middleware makes its threads, so that those that receive inherit it; those that send again
+    # are taken out of real time by `mount_ros.nodes.scheduling`. Where not permitted the node runs as any
+    # other process.
     with contextlib.suppress(PermissionError):
         schedule()

@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from mount_bringup.graph.errors import GraphError, Interrupted
 from mount_bringup.graph.nodes import (
     CONTROL,
     DRIVER,
@@ -29,8 +30,8 @@ from mount_bringup.graph.nodes import (
     ending_order,
 )
 from mount_bringup.graph.processes import NodeProcess, end_all, start_processes
-from mount_ros.diagnostics import Level
-from mount_ros.leaving import leave_middleware
+from mount_ros.nodes.diagnostics import Level
+from mount_ros.nodes.leaving import leave_middleware
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, SESSION
 from mount_sim.diagnosis import LATE_SHARE
@@ -40,14 +41,6 @@ _MATCH_LIMIT = 20.0  # s, chosen
 _FRESH_DIAGNOSTICS = 1.5  # s, chosen: every node tells its figures once a second
 _LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
 _TRANSITION_LIMIT = 60.0  # s, chosen: activation of mount_init includes its current ramp
-
-
-class GraphError(RuntimeError):
-    """The graph could not be started or broke down; the text names the node and its reason."""
-
-
-class Interrupted(Exception):  # noqa: N818 - no error: the user wants to end
-    """The user asked to end."""
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.compiled import compiled
-from mount_models.elementary import atan
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import atan
 from mount_models.quantity import Quantity
 
 _POLYNOMIAL = 'polynomial coefficients in powers of the gap in micrometres, lowest power first'

@@ -7,7 +7,7 @@ to this actuator's force (`actuator.law`, `actuator.fit`).
 import math
 from typing import Annotated, NamedTuple
 
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 from mount_models.quantity import Quantity
 
 MU_0 = 4e-7 * math.pi

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.compiled import compiled
-from mount_models.least_squares import combination_std, least_squares
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.least_squares import combination_std, least_squares
 
 FloatArray = npt.NDArray[np.float64]
 

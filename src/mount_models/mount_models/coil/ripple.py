@@ -9,8 +9,8 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.actuator.reluctance import core_field, differential_permeability, gap_permeance
-from mount_models.compiled import compiled
-from mount_models.elementary import exp, expm1
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import exp, expm1
 from mount_models.quantity import Quantity
 
 

@@ -10,8 +10,8 @@ one pad's coefficient and Table 2 together), so each pad has half of it.
 import math
 from typing import Annotated, NamedTuple
 
-from mount_models.compiled import compiled
-from mount_models.elementary import exp, log
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import exp, log
 from mount_models.quantity import Quantity
 
 _TABLE_2 = 'Table 2'

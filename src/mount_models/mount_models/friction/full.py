@@ -9,7 +9,7 @@ has no such limit and needs one scalar solution for the sliding speed per step.
 
 import numpy as np
 
-from mount_models.compiled import compiled
+from mount_models.arithmetic.compiled import compiled
 from mount_models.friction.coefficient import sliding_speed
 
 

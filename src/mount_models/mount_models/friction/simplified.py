@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mount_models.compiled import compiled
-from mount_models.elementary import expm1
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import expm1
 from mount_models.friction.coefficient import (
     dynamic_coefficient,
     dynamic_coefficient_with,

@@ -1,0 +1,329 @@
+"""Opens recordings: those of this project and genuine rosbag2 bags, whole or in part."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mount_bags.bag.folder import BagFolderError, find_pieces, open_piece
+from mount_bags.bag.metadata import (
+    METADATA_NAME,
+    BagInformation,
+    MetadataError,
+    TopicInformation,
+    read_metadata,
+)
+from mount_bags.bag.piece_topics import (
+    BagFile,
+    Declared,
+    declared_topics,
+    readable_definition,
+    repeated_topics,
+)
+from mount_bags.container.chunks import MESSAGE_HEAD, Contents
+from mount_bags.container.mcap_file import McapFileError
+from mount_bags.messages.columns import ColumnCollector
+from mount_bags.messages.definitions import Definition
+from mount_bags.messages.series import Column, Payloads, Series, Times
+from mount_bags.messages.topic_times import TimesCollector, TopicTimes
+
+# Key of the custom data in which `engine-mount recover` says what it could not prove.
+RECOVERY_NOTE = 'recovered_unchecked'
+
+
+class ReadingError(ValueError):
+    """A recording, or what was asked of it, cannot be read; the text says why."""
+
+
+def open_recording(path: str | os.PathLike[str]) -> 'Recording':
+    """Open a recording: its folder or a single file; raises `ReadingError` if nothing is readable.
+
+    What is missing or damaged but does not prevent reading stands in `Recording.warnings`; more may come
+    there when topics are read.
+    """
+    return Recording(Path(path))
+
+
+class Recording:
+    """The messages of a recording by topic; topics are found by full name or by their last part."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.warnings: list[str] = []
+        self.information: BagInformation | None = None
+        self.files: list[BagFile] = self._open()
+        self._declared: dict[str, Declared] = declared_topics(self.files, self.information)
+        self.topics: dict[str, TopicInformation] = {
+            name: declared.information for name, declared in self._declared.items()
+        }
+        self.missing: dict[str, int] = self._missing()
+        self._definitions: dict[str, tuple[Definition | None, str]] = {}
+        self._check_topics()
+        self._note_recovery()
+        self._series: dict[str, Series] = {}
+
+    @property
+    def message_count(self) -> int:
+        """How many messages the files hold."""
+        return sum(topic.message_count for topic in self.topics.values())
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is known to be missing; damage inside of a topic is known once that was read."""
+        if self.missing or not self._complete or any(file.damaged for file in self.files):
+            return False
+        return all(file.whole for file in self.files) or self._counts_agree
+
+    @property
+    def all_pieces(self) -> bool:
+        """Whether no file of the recording is known to be missing."""
+        return self._complete
+
+    @property
+    def described(self) -> bool:
+        """Whether `metadata.yaml` tells of all files."""
+        information = self.information
+        return self._has_description and information is not None and len(information.files) >= len(self.files)
+
+    @property
+    def proven(self) -> bool:
+        """Whether no file is missing and checksums vouch for what all of them say of themselves."""
+        return self._complete and all(file.proven for file in self.files)
+
+    @property
+    def time_range(self) -> tuple[int, int] | None:
+        """The first and the last receive time in ns, None without messages."""
+        ranges = [found for found in (file.time_range() for file in self.files) if found is not None]
+        return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
+
+    def __contains__(self, name: str) -> bool:
+        return len(self._candidates(name)) == 1
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.topics)
+
+    def __getitem__(self, name: str) -> Series:
+        """Return all messages of a topic; raises `ReadingError` with the known topics."""
+        full_name = self.resolve(name)
+        if full_name not in self._series:
+            self._series |= self._load([full_name])
+        return self._series[full_name]
+
+    def load(self, names: Iterable[str]) -> None:
+        """Read several topics in one pass through the files, for later use; raises `ReadingError`."""
+        wanted = dict.fromkeys(self.resolve(name) for name in names)
+        self._series |= self._load([name for name in wanted if not self._is_loaded(name)])
+
+    def load_columns(self, columns: Mapping[str, Iterable[str]]) -> None:
+        """Read columns of topics and their stamps in one pass, for later use; raises `ReadingError`.
+
+        In memory are at no time more messages than a block. What else is asked of these topics later, such
+        as a message or a column that is not in each of them, is read then.
+        """
+        wanted = {self.resolve(topic): self._unread(self.resolve(topic), columns[topic]) for topic in columns}
+        collectors = {
+            name: ColumnCollector(partial(self._made, name), names) for name, names in wanted.items() if names
+        }
+        for name, block in self._blocks(list(collectors)) if collectors else ():
+            collectors[name].add(block)
+        for name in list(collectors):
+            head, found, stamps = collectors.pop(name).finish()
+            self._note_damage(name, len(head))
+            known = self._series[name].columns if name in self._series else {}
+            self._series[name] = self._made(
+                name, partial(self._payloads, name), head, columns={**known, **found}, stamps=stamps
+            )
+
+    def latched(self, name: str) -> Any:
+        """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
+        series = self[name]
+        if not len(series):
+            raise ReadingError(f'{series.topic} has no message in {self.path}')
+        return series.message(len(series) - 1)
+
+    def resolve(self, name: str) -> str:
+        """Return the full name of the topic meant by `name`, which may lack its namespace."""
+        candidates = self._candidates(name)
+        if not candidates:
+            raise ReadingError(
+                f'{self.path} has no topic {name!r}; it has {", ".join(self.topics) or "none"}'
+            )
+        if len(candidates) > 1:
+            raise ReadingError(f'{name!r} is ambiguous in {self.path}: {", ".join(candidates)}')
+        return candidates[0]
+
+    def _candidates(self, name: str) -> list[str]:
+        for full_name in (name, f'/{name}'):
+            if full_name in self.topics:
+                return [full_name]
+        return [full_name for full_name in self.topics if full_name.endswith(f'/{name}')]
+
+    # Opening.
+
+    def _open(self) -> list[BagFile]:
+        try:
+            found = find_pieces(self.path)
+        except BagFolderError as error:
+            raise ReadingError(str(error)) from None
+        self.information = found.information
+        self._has_description = found.information is not None
+        self.warnings += found.warnings
+        files, reasons = [], []
+        for path in found.paths:
+            try:
+                files.append(open_piece(path))
+            except McapFileError as error:
+                reasons.append(str(error))
+        if not files:
+            raise ReadingError('; '.join(reasons) or f'{self.path} holds no MCAP file')
+        self._complete = found.complete and not reasons
+        self.warnings += reasons
+        for file in files:
+            self.warnings += file.warnings
+            file.warnings = self.warnings  # what is found later, while a topic is read, comes here too
+        if self.information is None:
+            self._read_embedded(files)
+        return files
+
+    def _read_embedded(self, files: list[BagFile]) -> None:
+        text = files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
+        if text:
+            try:
+                self.information = read_metadata(text)
+            except MetadataError as error:
+                self.warnings.append(f'{files[0].path.name}: {error}')
+
+    def _missing(self) -> dict[str, int]:
+        """Return how many messages of a topic the description tells of that the files do not hold."""
+        information = self.information
+        self._counts_agree = False
+        if information is None or not self.described:
+            return {}
+        held = {name: declared.stored for name, declared in self._declared.items()}
+        total = sum(held.values())
+        self._counts_agree = information.message_count == total
+        if self._complete and not self._counts_agree:
+            self.warnings.append(
+                f'{METADATA_NAME} tells of {information.message_count} messages, the files hold {total}'
+            )
+        if self.proven:
+            return {}
+        return {
+            topic.name: topic.message_count - held.get(topic.name, 0)
+            for topic in information.topics
+            if topic.message_count > held.get(topic.name, 0)
+        }
+
+    def _check_topics(self) -> None:
+        for name, declared in self._declared.items():
+            definition, sentence = readable_definition(declared)
+            self._definitions[name] = (definition, sentence)
+            if declared.other_types:
+                others = ', '.join(declared.other_types)
+                kept = declared.information.type
+                self.warnings.append(f'{name}: messages of {others} are left out; read are those of {kept}')
+            if sentence and declared.information.message_count:
+                what = 'the installed one is used' if definition else 'only its raw bytes can be read'
+                self.warnings.append(f'{name}: {sentence}; {what}')
+
+    def _note_recovery(self) -> None:
+        custom = self.information.custom_data if self.information else {}
+        if custom.get(RECOVERY_NOTE):
+            self.warnings.append(custom[RECOVERY_NOTE])
+
+    # Reading.
+
+    def times(self) -> dict[str, TopicTimes]:
+        """Return the times of all topics: one pass through the files, no message is kept."""
+        collectors = {
+            name: TimesCollector(name, declared.information.type, *self._definitions[name])
+            for name, declared in self._declared.items()
+        }
+        for name, block in self._blocks(list(self.topics)):
+            collectors[name].add(block)
+        found = {name: collector.times() for name, collector in collectors.items()}
+        for name, times in found.items():
+            self._note_damage(name, len(times))
+        return found
+
+    def _load(self, names: Sequence[str]) -> dict[str, Series]:
+        blocks: dict[str, list[Contents]] = {name: [] for name in names}
+        for name, block in self._blocks(names) if names else ():
+            blocks[name].append(block)
+        return {name: self._series_of(name, found) for name, found in blocks.items()}
+
+    def _series_of(self, name: str, blocks: list[Contents]) -> Series:
+        head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, MESSAGE_HEAD)
+        self._note_damage(name, len(head))
+        return self._made(name, Payloads([block.payloads() for block in blocks]), head)
+
+    def _is_loaded(self, name: str) -> bool:
+        return name in self._series and self._series[name].loaded
+
+    def _payloads(self, name: str) -> Payloads:
+        return self._load([name])[name].payloads
+
+    def _unread(self, name: str, columns: Iterable[str]) -> set[str]:
+        """Return which of the columns need a pass through the files: none where all messages are here."""
+        known = self._series.get(name)
+        if known is None:
+            return set(columns)
+        return set() if known.loaded else set(columns) - known.columns.keys()
+
+    def _made(
+        self,
+        name: str,
+        payloads: Payloads | Callable[[], Payloads],
+        head: np.ndarray,
+        *,
+        columns: Mapping[str, Column] | None = None,
+        stamps: Times | None = None,
+    ) -> Series:
+        definition, sentence = self._definitions[name]
+        return Series(
+            name,
+            self.topics[name].type,
+            payloads,
+            head['log_time'].astype(np.int64),
+            head['publish_time'].astype(np.int64),
+            sequences=head['sequence'].astype(np.uint32),
+            columns=columns,
+            stamps=stamps,
+            definition=definition,
+            obstacle='' if definition else sentence,
+            zero=self.time_range[0] if self.time_range else 0,
+        )
+
+    def _note_damage(self, name: str, present: int) -> None:
+        expected = self.topics[name].message_count
+        if present < expected and self.missing.get(name, 0) < expected - present:
+            self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
+            self.missing[name] = expected - present
+
+    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, Contents]]:
+        """Yield the messages of topics, without those that a piece repeats from the one before."""
+        last: dict[str, tuple[bytes, int]] = {}
+        watched = frozenset().union(*repeated_topics(self.files))
+        for file, repeated in zip(self.files, repeated_topics(self.files), strict=True):
+            channels = {name: np.array(self._declared[name].channels_of(file), np.int64) for name in names}
+            channels = {name: numbers for name, numbers in channels.items() if numbers.size}
+            heads = set(repeated)
+            for block in file.blocks([int(number) for numbers in channels.values() for number in numbers]):
+                for name, numbers in channels.items():
+                    found = block.of(numbers) if len(channels) > 1 else block
+                    if not found.offsets.size:
+                        continue
+                    if name in heads and _first(found) == last.get(name):
+                        found = found.behind_first()
+                    heads.discard(name)
+                    if found.offsets.size:
+                        if name in watched:
+                            last[name] = found.message(-1)
+                        yield name, found
+
+
+def _first(block: Contents) -> tuple[bytes, int]:
+    return block.message(0)

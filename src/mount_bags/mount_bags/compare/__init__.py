@@ -1,0 +1,1 @@
+"""Two recordings, sample by sample, in numbers and words; references."""

@@ -1,0 +1,1 @@
+"""Bytes of MCAP and SQLite files: chunks, indexes, compression."""

@@ -1,0 +1,453 @@
+"""Reads one MCAP file as far as it is proven whole: complete, cut off by a crash, or damaged in places.
+
+Where the summary at the end is sound, it says where the chunks stand, and these are unpacked when a topic
+is asked for. Where it is not, the file is walked record by record and searched for chunks, and whatever
+their checksums prove is taken. Declarations of topics count more where a checksum covers them.
+"""
+
+import mmap
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Schema, Statistics
+from mcap.writer import MCAP0_MAGIC
+
+from mount_bags.bag.piece_topics import ACCOUNTS
+from mount_bags.container.chunks import (
+    MESSAGE_HEAD,
+    RECORD,
+    Chunk,
+    Contents,
+    chunk_at,
+    contents_of,
+    explore,
+    indexed_chunk,
+    messages_at,
+    partial_chunk,
+    scattered_chunks,
+)
+from mount_bags.container.message_compression import plain
+from mount_bags.container.summary import (
+    Proof,
+    data_proof,
+    parsed,
+    parsed_attachment,
+    parsed_metadata,
+    read_summary,
+)
+from mount_bags.container.whole_files import FileError, mapped
+
+_LAST_OPCODE = Opcode.DATA_END
+_LENGTHS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
+_PRIVATE_OPCODE = 0x80  # and above: of other programs, to be skipped
+
+
+class McapFileError(ValueError):
+    """A file is no MCAP file."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of the file in which something is lost: bytes from `begin` to `end`."""
+
+    begin: int
+    end: int
+
+
+class McapFile:
+    """Channels, metadata and message records of one file; what is wrong with it stands in `warnings`."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.channels: dict[int, Channel] = {}
+        self.schemas: dict[int, Schema] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.records: list[tuple[str, dict[str, str]]] = []
+        self.warnings: list[str] = []
+        self.lost_beside: list[str] = []  # names of metadata and attachments
+        self.chunks: list[Chunk] = []
+        self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
+        self.closed = False  # whether the writer came to the end of its messages
+        self.undeclared = 0  # messages whose topic is not known
+        self.tail: Chunk | None = None  # begun at the end of the file, cut off before its own
+        self._data_end = 0  # where the messages end, by the file's own account
+        self._footer_found = False
+        self._loose: list[int] = []  # messages outside of chunks
+        self._records_at: set[int] = set()  # where those of metadata begin
+        self._attachments: list[tuple[int, int]] = []  # begin and end of their records
+        self._counts: dict[int, int] = {}
+        self._times: tuple[int, int] | None = None
+        self._data = _opened(path)
+        self._summary = read_summary(self._data)
+        self._data_proof: Proof | None = None
+        if self._summary.proof is not Proof.SOUND or not self._take_summary():
+            self._search()
+        self._note_missing_checksums()
+
+    @property
+    def size(self) -> int:
+        """The size of the file in bytes."""
+        return len(self._data)
+
+    @property
+    def proven(self) -> bool:
+        """Whether a checksum vouches for what the file says of itself: topics, counts and chunks."""
+        return self._summary.proof is Proof.SOUND
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing of it is known to be missing; chunks count from when they were unpacked."""
+        return self.closed and not self.damaged and not self.unexplained
+
+    @property
+    def damaged(self) -> bool:
+        """Whether messages are known to be lost inside of it, not only at a cut-off end."""
+        return bool(self.undeclared) or any(chunk.damaged for chunk in self.chunks)
+
+    def topic_type(self, channel: int) -> str:
+        """Return the type name of a channel, empty where the file tells none."""
+        schema = self.schemas.get(self.channels[channel].schema_id)
+        return '' if schema is None else schema.name
+
+    def message_counts(self) -> dict[int, int]:
+        """Return the number of messages by channel: as written where that is proven, else as readable."""
+        return dict(self._counts)
+
+    def time_range(self) -> tuple[int, int] | None:
+        """Return the earliest and the latest log time (ns), None for a file without messages."""
+        return self._times
+
+    def blocks(self, channels: Collection[int]) -> Iterator[Contents]:
+        """Yield the messages of `channels` in the order of the file, unpacked where each is packed."""
+        self.data_proof()
+        wanted = np.array(sorted(channels), np.int64)
+        for chunk in self.chunks:
+            if chunk.channels is None or not chunk.channels.isdisjoint(channels):
+                contents = self.contents(chunk)
+                if contents is not None and (found := contents.of(wanted)).offsets.size:
+                    yield plain(found)
+        if self._loose:
+            found = messages_at(self._data, np.array(self._loose)).of(wanted)
+            if found.offsets.size:
+                yield plain(found)
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the attachments, without those that are damaged."""
+        for begin, end in self._attachments:
+            attachment = parsed_attachment(self._data[begin + RECORD.size : end])
+            if attachment is not None:
+                yield attachment
+            elif (name := f'attachment at byte {begin}') not in self.lost_beside:
+                self.lost_beside.append(name)
+                self._warn(f'the {name} is damaged and left out')
+
+    def contents(self, chunk: Chunk) -> Contents | None:
+        """Return what is in a chunk; None, with a warning, if it is damaged."""
+        if chunk.damaged:
+            return None
+        contents = contents_of(self._data, chunk)
+        if contents is None:
+            self._leave_out(chunk)
+        elif not contents.whole:
+            self._warn(f'the chunk at byte {chunk.position} ends with what is no record')
+        return contents
+
+    def data_proof(self) -> Proof:
+        """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
+        if self._data_proof is None:
+            self._data_proof = data_proof(self._data, self._summary)
+            if self._data_proof is Proof.WRONG:
+                self._warn('the checksum of its data section is wrong: some byte of the file is damaged')
+        return self._data_proof
+
+    def tail_bytes(self) -> bytes:
+        """Return what is there of the chunk that the end of the file cuts off."""
+        return b'' if self.tail is None else self._data[self.tail.begin : self.tail.end]
+
+    # A file with a sound summary.
+
+    def _take_summary(self) -> bool:
+        """Take what the summary tells; False if that is not enough."""
+        summary = self._summary
+        chunks = [indexed_chunk(self._data, index) for index in summary.chunks]
+        statistics = summary.statistics
+        if statistics is None or statistics.chunk_count != len(chunks) or None in chunks:
+            return False
+        if statistics.channel_count > len(summary.channels) or statistics.schema_count > len(summary.schemas):
+            return False  # not repeated in the summary
+        self.channels, self.schemas = dict(summary.channels), dict(summary.schemas)
+        if any(channel not in self.channels for channel in statistics.channel_message_counts):
+            return False
+        self.chunks = sorted((chunk for chunk in chunks if chunk), key=lambda chunk: chunk.position)
+        self._counts = dict(statistics.channel_message_counts)
+        self._walk_between_chunks()
+        self._take_times(statistics)
+        self._note_lost_beside()
+        self.closed = True
+        if self._data[-len(MCAP0_MAGIC) :] != MCAP0_MAGIC:
+            self._warn('its last bytes are damaged; all else is read')
+        return True
+
+    def _take_times(self, statistics: Statistics) -> None:
+        """Take the times of the chunks, which are nearer to the messages than the statistics of the file."""
+        for chunk in self.chunks:
+            # Without indexes, whether a chunk holds messages shows in its times alone.
+            if chunk.channels or (chunk.channels is None and chunk.end_time):
+                self._widen(chunk.start_time, chunk.end_time)
+        if self._loose:
+            times = messages_at(self._data, np.array(self._loose)).heads['log_time']
+            self._widen(int(times.min()), int(times.max()))
+        told = statistics.message_start_time, statistics.message_end_time
+        if self._times is not None and told != self._times:
+            self._warn('its statistics tell of other times than its chunks; believed are the chunks')
+
+    def _note_lost_beside(self) -> None:
+        found = {begin for begin, _ in self._attachments} | self._records_at
+        for index in self._summary.beside:
+            if index.offset not in found and index.name not in ACCOUNTS:
+                self.lost_beside.append(index.name)
+                self._warn(f'{index.name}, metadata or attachment at byte {index.offset}, is damaged')
+
+    def _walk_between_chunks(self) -> None:
+        lengths = {index.chunk_start_offset: index.message_index_length for index in self._summary.chunks}
+        position = len(MCAP0_MAGIC)
+        for chunk in self.chunks:
+            self._walk(position, chunk.position)
+            position = chunk.end + lengths[chunk.position]
+        self._walk(position, self._summary.begin)
+        # A file with chunks has its messages there; a record that says otherwise needs a proof.
+        if self._loose and self.chunks and self.data_proof() is not Proof.SOUND:
+            self._drop_loose()
+
+    # A file without one.
+
+    def _search(self) -> None:
+        self.chunks, self._loose, self._counts, self._times = [], [], {}, None
+        loose_channels, loose_schemas = self._walk_all()
+        self.channels, self.schemas = {}, {}
+        for chunk in self.chunks:
+            self._take_explored(chunk)
+        if not self.chunks or (self.whole and self._summary.proof is not Proof.WRONG):
+            # Nothing better is known, or there is no reason to doubt.
+            self.channels = loose_channels | self.channels
+            self.schemas = loose_schemas | self.schemas
+        if self._loose and self.chunks and not self.whole:
+            self._drop_loose()
+        if self._loose:
+            self._count(messages_at(self._data, np.array(self._loose)))
+        self._forget_undeclared()
+
+    def _walk_all(self) -> tuple[dict[int, Channel], dict[int, Schema]]:
+        """Find the chunks; return the channels and schemas that are declared outside of them."""
+        self.channels, self.schemas = {}, {}
+        end = self._walk(len(MCAP0_MAGIC), len(self._data), into_chunks=True)
+        if not (self._footer_found and self._data[end:] == MCAP0_MAGIC):
+            self.tail = self._tail(end)
+            self._add_scattered_chunks()
+            self._note_unexplained(end)
+            self.closed = bool(self._data_end)
+            kept = f'read up to byte {end}, {len(self.chunks)} whole chunks'
+            messages = 'all messages are there' if self.whole else kept
+            self._warn(f'ends without its footer, as after a crash: {messages}')
+        self.closed = bool(self._data_end)
+        if self._summary.proof is Proof.WRONG:
+            self._warn('the summary at its end is damaged; its chunks are searched for')
+        return self.channels, self.schemas
+
+    def _add_scattered_chunks(self) -> None:
+        """Replace what the walk found by all chunks of the file that their checksums prove."""
+        found = {chunk.position: chunk for chunk in scattered_chunks(self._data)}
+        found |= {chunk.position: chunk for chunk in self.chunks}
+        kept: list[Chunk] = []
+        for _, chunk in sorted(found.items()):
+            inside = bool(kept) and chunk.position < kept[-1].end
+            if not inside and explore(self._data, chunk):
+                kept.append(chunk)
+        self.chunks = kept
+        self._loose = [place for place in self._loose if not any(_holds(chunk, place) for chunk in kept)]
+
+    def _note_unexplained(self, walked: int) -> None:
+        position = len(MCAP0_MAGIC)
+        stretches = []
+        for chunk in self.chunks:
+            stretches.append((position, chunk.position))
+            position = chunk.end
+        stretches.append((position, len(self._data)))
+        for begin, limit in stretches:
+            understood = self._understood(begin, limit, walked)
+            if understood < limit and not 0 < self._data_end <= understood:
+                self.unexplained.append(Stretch(understood, limit))
+        for stretch in self.unexplained:
+            if stretch.end < len(self._data):
+                self._warn(f'bytes {stretch.begin} to {stretch.end} are damaged and left out')
+
+    def _understood(self, position: int, limit: int, walked: int) -> int:
+        """Return where from `position` on the last whole record before `limit` ends.
+
+        What stands beside the messages is taken where nobody has `walked` so far.
+        """
+        while position < limit:
+            end = self._record_end(position, limit)
+            if end is None or self._data[position] == Opcode.CHUNK:
+                break
+            opcode = self._data[position]
+            if opcode == Opcode.DATA_END:
+                self._data_end = end
+            if position >= walked and opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
+                self._take_record(opcode, position, end)
+            position = end
+        return position
+
+    def _tail(self, position: int) -> Chunk | None:
+        """Return the chunk that begins at `position` and ends, by its own account, behind the file's end."""
+        if position + RECORD.size > len(self._data):
+            return None
+        opcode, length = RECORD.unpack_from(self._data, position)
+        if opcode != Opcode.CHUNK or position + RECORD.size + length <= len(self._data):
+            return None
+        return partial_chunk(self._data, position)
+
+    def _take_explored(self, chunk: Chunk) -> None:
+        if not explore(self._data, chunk):
+            self._leave_out(chunk)
+            return
+        for opcode, content in chunk.declarations:
+            self._declare(opcode, content)
+        for channel, count in chunk.counts.items():
+            self._counts[channel] = self._counts.get(channel, 0) + count
+        if chunk.counts:
+            self._widen(chunk.start_time, chunk.end_time)
+
+    def _count(self, contents: Contents) -> None:
+        for channel, count in contents.counts().items():
+            self._counts[channel] = self._counts.get(channel, 0) + count
+        times = contents.heads['log_time']
+        self._widen(int(times.min()), int(times.max()))
+
+    def _widen(self, first: int, last: int) -> None:
+        if self._times is not None:
+            first, last = min(first, self._times[0]), max(last, self._times[1])
+        self._times = first, last
+
+    def _forget_undeclared(self) -> None:
+        for channel in self._counts.keys() - self.channels.keys():
+            count = self._counts.pop(channel)
+            self._warn(f'{count} messages of channel {channel} are left out: their topic is not known')
+            self.undeclared += count
+
+    # Records outside of chunks.
+
+    def _walk(self, position: int, limit: int, into_chunks: bool = False) -> int:
+        """Take the records from `position` on; return where the last whole one before `limit` ends."""
+        while position < limit:
+            end = self._record_end(position, limit)
+            if end is None:
+                break
+            opcode = self._data[position]
+            chunk = chunk_at(self._data, position) if into_chunks and opcode == Opcode.CHUNK else None
+            if chunk is not None:
+                self.chunks.append(chunk)
+            else:
+                self._take_record(opcode, position, end)
+            position = end
+            if opcode == Opcode.DATA_END:
+                self._data_end = position
+            if opcode == Opcode.FOOTER:
+                self._footer_found = True
+                break
+        return position
+
+    def _record_end(self, position: int, limit: int) -> int | None:
+        """Return the end of the record at `position`, None if there is no whole and sensible one."""
+        if position + RECORD.size > limit:
+            return None
+        opcode, length = RECORD.unpack_from(self._data, position)
+        end = position + RECORD.size + length
+        known = 0 < opcode <= _LAST_OPCODE or opcode >= _PRIVATE_OPCODE
+        if not known or end > limit or (opcode == Opcode.CHUNK and chunk_at(self._data, position) is None):
+            return None
+        if opcode == Opcode.MESSAGE and end - position < MESSAGE_HEAD.itemsize:
+            return None
+        if _LENGTHS.get(opcode, length) != length:
+            return None
+        if opcode not in (Opcode.CHUNK, Opcode.MESSAGE) and _is_chunk(self._data, position):
+            return None  # only its first byte is damaged
+        return end
+
+    def _take_record(self, opcode: int, position: int, end: int) -> None:
+        if opcode == Opcode.MESSAGE:
+            self._loose.append(position)
+            return
+        if opcode == Opcode.ATTACHMENT:
+            self._attachments.append((position, end))
+            return
+        content = self._data[position + RECORD.size : end]
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._declare(opcode, content)
+        elif opcode == Opcode.METADATA:
+            metadata = parsed_metadata(content)
+            if metadata is None:
+                self._warn(f'the metadata at byte {position} is not readable')
+            else:
+                self.metadata[metadata.name] = dict(metadata.metadata)
+                self.records.append((metadata.name, dict(metadata.metadata)))
+                self._records_at.add(position)
+
+    def _declare(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = parsed(Schema.read, content)
+            if schema is not None:
+                self.schemas.setdefault(schema.id, schema)
+        else:
+            channel = parsed(Channel.read, content)
+            if channel is not None:
+                self.channels.setdefault(channel.id, channel)
+
+    def _leave_out(self, chunk: Chunk) -> None:
+        chunk.damaged = True
+        self._warn(f'the chunk at byte {chunk.position} is damaged and left out')
+
+    def _drop_loose(self) -> None:
+        self._warn(f'{len(self._loose)} records outside of its chunks pass for messages; they are left out')
+        self._loose = []
+
+    def _note_missing_checksums(self) -> None:
+        without = sum(not chunk.crc for chunk in self.chunks if chunk.size)
+        if without:
+            what = f'{without} of its {len(self.chunks)} chunks carry'
+            self._warn(f'{what} no checksum, as their writer chose: a damaged number in them would go unseen')
+        elif self._loose and self.data_proof() is not Proof.SOUND:
+            self._warn('its messages are under no sound checksum: a damaged number in them would go unseen')
+
+    def _warn(self, sentence: str) -> None:
+        self.warnings.append(f'{self.path.name}: {sentence}')
+
+
+def _holds(chunk: Chunk, position: int) -> bool:
+    return chunk.position <= position < chunk.end
+
+
+def _is_chunk(data: mmap.mmap, position: int) -> bool:
+    """Return whether the record at `position` has the head of a chunk, whatever its first byte says."""
+    chunk = partial_chunk(data, position)
+    if chunk is None:
+        return False
+    whole = chunk_at(data, position)
+    plain = whole is not None and len(whole.ends) == 1 and whole.end - whole.begin == whole.size > 0
+    return chunk.compression in ('zstd', 'lz4') or (plain and not chunk.compression)
+
+
+def _opened(path: Path) -> mmap.mmap:
+    try:
+        data = mapped(path)
+    except FileError as error:
+        raise McapFileError(str(error)) from None
+    if data[: len(MCAP0_MAGIC)] == MCAP0_MAGIC:
+        return data
+    known = read_summary(data).proof is Proof.SOUND or next(scattered_chunks(data), None) is not None
+    if not known:
+        raise McapFileError(f'{path} is no MCAP file: its first bytes are not those of one')
+    return data

@@ -1,0 +1,147 @@
+"""The end of an MCAP file: the summary, if its checksum holds, and the checksum of what stands before it."""
+
+import mmap
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from io import BytesIO
+from typing import TypeVar
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    Footer,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from mcap.writer import MCAP0_MAGIC
+
+from mount_bags.container.chunks import RECORD
+
+T = TypeVar('T')
+
+_FOOTER_SIZE = 20  # bytes behind opcode and length
+_FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
+_CRC_SIZE = 4  # bytes
+_DATA_END = struct.Struct('<BQI')
+_STEP = 1 << 24  # bytes read at once for a checksum
+
+
+class Proof(Enum):
+    """What a checksum says."""
+
+    SOUND = 'sound'
+    WRONG = 'wrong'
+    ABSENT = 'absent'  # nothing was written that could prove anything
+
+
+@dataclass
+class Summary:
+    """What stands at the end of a file; empty unless `proof` is sound."""
+
+    proof: Proof
+    begin: int = 0  # of the summary in the file; the data section ends before
+    footer: int = 0
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: list[ChunkIndex] = field(default_factory=list)
+    statistics: Statistics | None = None
+    beside: list[MetadataIndex | AttachmentIndex] = field(default_factory=list)
+
+
+def read_summary(data: mmap.mmap) -> Summary:
+    """Return the summary of a file; absent where the file ends without a footer or without a checksum."""
+    footer_at = len(data) - len(MCAP0_MAGIC) - _FOOTER_RECORD
+    if footer_at < len(MCAP0_MAGIC):
+        return Summary(Proof.ABSENT)
+    # The opcode is under the checksum too, the length before it as well.
+    footer = parsed(Footer.read, data[footer_at + RECORD.size : footer_at + _FOOTER_RECORD])
+    if footer is None or not len(MCAP0_MAGIC) <= footer.summary_start < footer_at:
+        return Summary(Proof.ABSENT)
+    if RECORD.unpack_from(data, footer_at) != (Opcode.FOOTER, _FOOTER_SIZE) or not footer.summary_crc:
+        return Summary(Proof.ABSENT)
+    if checksum(data, footer.summary_start, footer_at + _FOOTER_RECORD - 4) != footer.summary_crc:
+        return Summary(Proof.WRONG)
+    summary = Summary(Proof.SOUND, footer.summary_start, footer_at)
+    return summary if _fill(summary, data) else Summary(Proof.WRONG)
+
+
+def data_proof(data: mmap.mmap, summary: Summary) -> Proof:
+    """Return what the checksum of the data section says of everything before a sound summary."""
+    end_at = summary.begin - _DATA_END.size
+    if summary.proof is not Proof.SOUND or end_at < 0:
+        return Proof.ABSENT
+    opcode, length, crc = _DATA_END.unpack_from(data, end_at)
+    if (opcode, length) != (Opcode.DATA_END, 4):
+        return Proof.WRONG
+    if not crc:
+        return Proof.ABSENT
+    return Proof.SOUND if checksum(data, 0, end_at) == crc else Proof.WRONG
+
+
+def checksum(data: mmap.mmap, begin: int, end: int) -> int:
+    """Return the CRC of a part of a file."""
+    crc = 0
+    for position in range(begin, end, _STEP):
+        crc = zlib.crc32(data[position : min(position + _STEP, end)], crc)
+    return crc
+
+
+def parsed(read: Callable[[ReadDataStream], T], content: bytes) -> T | None:
+    """Return the record in `content`, None if it is not readable."""
+    try:
+        return read(ReadDataStream(BytesIO(content)))
+    except (EndOfFile, struct.error, ValueError, MemoryError, OverflowError):
+        return None
+
+
+def parsed_metadata(content: bytes) -> Metadata | None:
+    """Return the metadata record in `content`, None if it is not readable."""
+    return parsed(Metadata.read, content)
+
+
+def parsed_attachment(content: bytes) -> Attachment | None:
+    """Return the attachment in `content`, None if it is not readable or its checksum is wrong."""
+    crc = int.from_bytes(content[-_CRC_SIZE:], 'little')
+    if len(content) < _CRC_SIZE or (crc and zlib.crc32(content[:-_CRC_SIZE]) != crc):
+        return None
+    return parsed(Attachment.read, content)
+
+
+def _fill(summary: Summary, data: mmap.mmap) -> bool:
+    position = summary.begin
+    while position + RECORD.size <= summary.footer:
+        opcode, length = RECORD.unpack_from(data, position)
+        position += RECORD.size
+        content = data[position : position + length]
+        position += length
+        if position > summary.footer or not _take(summary, opcode, content):
+            return False
+    return True
+
+
+def _take(summary: Summary, opcode: int, content: bytes) -> bool:
+    if opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
+        summary.schemas[schema.id] = schema
+    elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):
+        summary.channels[channel.id] = channel
+    elif opcode == Opcode.CHUNK_INDEX and (chunk := parsed(ChunkIndex.read, content)):
+        summary.chunks.append(chunk)
+    elif opcode == Opcode.METADATA_INDEX and (metadata := parsed(MetadataIndex.read, content)):
+        summary.beside.append(metadata)
+    elif opcode == Opcode.ATTACHMENT_INDEX and (attachment := parsed(AttachmentIndex.read, content)):
+        summary.beside.append(attachment)
+    elif opcode == Opcode.STATISTICS and (statistics := parsed(Statistics.read, content)):
+        summary.statistics = statistics
+    else:
+        return opcode not in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.STATISTICS)
+    return True

@@ -1,0 +1,1 @@
+"""Marks and switchings: what in a recording is worth finding again."""

@@ -1,0 +1,1 @@
+"""Serialised messages as columns of numbers, with their times."""

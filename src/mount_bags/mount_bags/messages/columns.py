@@ -1,0 +1,62 @@
+"""Chosen columns of a topic, taken block by block: a long recording needs the memory of these alone."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.lib.recfunctions import repack_fields
+
+from mount_bags.container.chunks import MESSAGE_HEAD, Contents
+from mount_bags.messages.series import Column, Payloads, Series, SeriesError, Times
+
+_KEPT = ['log_time', 'publish_time', 'sequence']  # of the head of a message
+_BLOCK = 4096  # messages, chosen: 3 MB of the longest ones of this project
+
+MakeSeries = Callable[[Payloads, np.ndarray], Series]
+"""Makes a series of messages and their heads."""
+
+
+class ColumnCollector:
+    """Collects columns and stamps of one topic; what is not in each message is left out."""
+
+    def __init__(self, make_series: MakeSeries, names: Iterable[str]):
+        self._make_series = make_series
+        self._columns: dict[str, list[Column]] = {name: [] for name in names}
+        self._stamps: list[Times] | None = []
+        self._heads: list[np.ndarray] = []
+        self._waiting: list[np.ndarray | list[bytes]] = []
+        self._waiting_heads: list[np.ndarray] = []
+        self._count = 0
+
+    def add(self, block: Contents) -> None:
+        """Take the messages in `block`."""
+        self._waiting.append(block.payloads())
+        self._waiting_heads.append(block.heads)
+        self._count += len(block.heads)
+        if self._count >= _BLOCK:
+            self._take()
+
+    def finish(self) -> tuple[np.ndarray, dict[str, Column], Times | None]:
+        """Return the heads of all messages, the columns, and the stamps in ns, None where there are none."""
+        if self._count:
+            self._take()
+        if not self._heads:
+            return np.empty(0, MESSAGE_HEAD), {}, None
+        columns = {name: np.concatenate(parts) for name, parts in self._columns.items()}
+        stamps = None if self._stamps is None else np.concatenate(self._stamps)
+        return np.concatenate(self._heads), columns, stamps
+
+    def _take(self) -> None:
+        heads = repack_fields(np.concatenate(self._waiting_heads)[_KEPT])
+        series = self._make_series(Payloads(self._waiting), heads)
+        self._heads.append(heads)
+        self._waiting, self._waiting_heads, self._count = [], [], 0
+        for name in list(self._columns):
+            try:
+                self._columns[name].append(series[name])
+            except SeriesError:
+                del self._columns[name]
+        if self._stamps is not None:
+            try:
+                self._stamps.append(series.stamps)
+            except SeriesError:
+                self._stamps = None

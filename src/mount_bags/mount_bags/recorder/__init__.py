@@ -1,0 +1,1 @@
+"""The recorder: from messages that arrive to a bag."""

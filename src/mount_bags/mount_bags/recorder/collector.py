@@ -1,0 +1,146 @@
+"""Takes everything that arrives on many topics, in batches, for those who need all of it but not at once.
+
+The middleware queues messages by itself; waking an executor for each of them costs several times what
+taking it does. A batch every few milliseconds loses nothing, and brings what a callback does not: when the
+message was sent and when it arrived.
+"""
+
+import operator
+import threading
+import time
+import traceback
+from collections.abc import Callable
+
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+from mount_ros.data_path import DataThread, Work, io_node
+from mount_ros.messages.types import message_class
+from mount_ros.qos import publisher_qos, recording_qos
+from mount_ros.topics import Topic
+
+Receive = Callable[[bytes, int, int], None]
+"""Takes (serialised message, time of arrival ns, time of sending ns), both of the system clock."""
+
+_PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold five seconds
+_SHARED_PERIOD = 0.02  # s, chosen: the same where nobody looks at the recording while it grows
+
+
+class Collector:
+    """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first.
+
+    The thread is its own, or (`thread`) the one that also serves the publishers: two that take turns in one
+    process cost more than the work. Only that one can `attend` to other work too. `on_failure` takes the
+    sentence on the exception that has ended a thread of its own.
+    """
+
+    def __init__(
+        self,
+        owner: Node,
+        *,
+        thread: DataThread | None = None,
+        on_failure: Callable[[str], None] = lambda sentence: None,
+    ):
+        self.node = io_node(owner)
+        self.refused = 0
+        """Messages whose receiver raised an exception; `refusal` says what the last one was."""
+        self.refusal = ''
+        self._shared_thread = thread
+        self._on_failure = on_failure
+        self._failure = ''
+        self._taken_at = 0.0
+        self._works: list[Work] = [self._take_when_due]
+        self._attended: list[Work] = []
+        self._receivers: list[tuple[Subscription, Receive]] = []
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+
+    @property
+    def failure(self) -> str:
+        """Why the thread that takes the messages has ended by itself; empty while it serves."""
+        return self._failure if self._shared_thread is None else self._shared_thread.failure
+
+    def collect(self, topic: Topic, receive: Receive) -> Subscription:
+        """Hand every message of `topic` to `receive`."""
+        subscription = self.node.create_subscription(
+            message_class(topic.type), topic.name, _never_called, recording_qos(topic), raw=True
+        )
+        self._receivers.append((subscription, receive))
+        return subscription
+
+    def sender(self, topic: Topic) -> Callable[[bytes], None]:
+        """Create a publisher of `topic` and return the function that publishes its bytes, from any thread."""
+        publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
+        return publisher.handle.publish_raw
+
+    def unmatched(self) -> list[str]:
+        """Return the names of the topics that no publisher has been found for yet."""
+        return sorted(s.topic_name for s, _ in self._receivers if s.get_publisher_count() == 0)
+
+    def attend(self, work: Work) -> None:
+        """Let the thread that serves the publishers do `work` too while it serves; `work` must not raise."""
+        if self._shared_thread is None:
+            raise ValueError('a collector with a thread of its own attends to nothing but its messages')
+        self._works.append(work)
+
+    def start(self) -> None:
+        """Begin to take messages."""
+        if self._shared_thread is not None:
+            for work in self._works:
+                self._shared_thread.attend(work)
+                self._attended.append(work)
+            return
+        self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Take what is there, end the thread and destroy the node; safe to call twice."""
+        if self._ending.is_set():
+            return
+        self._ending.set()
+        if self._shared_thread is not None:
+            for work in self._attended:
+                self._shared_thread.leave(work)
+        if self._thread is not None:
+            self._thread.join()
+        self.node.destroy_node()
+
+    def _serve(self) -> None:
+        try:
+            while not self._ending.wait(_PERIOD):
+                self._take_batch()
+            self._take_batch()
+        except BaseException as error:
+            # The border of the thread: unheard, its end would leave a recording without its messages.
+            traceback.print_exc()
+            self._failure = f'the thread that takes the messages has ended: {type(error).__name__}: {error}'
+            self._on_failure(self._failure)
+
+    def _take_when_due(self) -> bool:
+        now = time.monotonic()
+        if now - self._taken_at > _SHARED_PERIOD:
+            self._taken_at = now
+            self._take_batch()
+        return False
+
+    def _take_batch(self) -> None:
+        batch: list[tuple[int, int, bytes, Receive]] = []
+        for subscription, receive in self._receivers:
+            handle, kind = subscription.handle, subscription.msg_type
+            with handle:
+                while (taken := handle.take_message(kind, True)) is not None:
+                    raw, times = taken
+                    batch.append((times['received_timestamp'], times['source_timestamp'], raw, receive))
+        batch.sort(key=operator.itemgetter(0))
+        for received, sent, raw, receive in batch:
+            try:
+                receive(raw, received, sent)
+            except Exception as error:
+                # The border of the thread: what one message does must not cost all others.
+                self.refused += 1
+                self.refusal = f'a message was not taken: {type(error).__name__}: {error}'
+                self.node.get_logger().error(self.refusal, throttle_duration_sec=1.0)
+
+
+def _never_called(_: bytes) -> None:
+    """No executor serves these subscriptions."""

@@ -1,0 +1,336 @@
+"""The core of the recorder: a queue between the thread that receives and the one that writes.
+
+Receiving is one append. Whatever the disk does, publishers never wait: the queue grows up to a limit
+in bytes, and what does not fit is lost, counted and reported. In lock-step one thread does both, in turn:
+no time passes while it writes, and two that take turns in one process cost more than the work.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from mount_bags.bag.statement import Reception
+from mount_bags.bag.writer import RecordingError
+from mount_bags.messages.stamps import StampWatch
+from mount_bags.recorder.space import SpaceGuard
+
+MEMORY_LIMIT = 64 * 1024 * 1024  # bytes, chosen: half a minute of a full drive with the simulator's truth
+_DRAIN_PERIOD = 0.02  # s, chosen: what a crash may cost besides the chunk being filled
+_FLUSH_PERIOD = 0.08  # s, chosen: longest time that a chunk is filled; with the above a crash costs 0.12 s
+_SPACE_PERIOD = 0.2  # s, chosen: a tenth of the reserve at 100 MB/s
+_BATCH = 500  # messages, chosen: after so many the queue's room is given back to the receiving thread
+_QUIET_PERIOD = 0.15  # s, chosen: several heartbeats of a writer, in which a missing message is repaired
+_SETTLE_LIMIT = 5.0  # s, chosen
+
+Receive = Callable[[bytes, int, int], None]
+"""Takes (serialised message, time of arrival ns, time of sending ns)."""
+
+Observe = Callable[[bytes, int], None]
+"""Looks at (serialised message, time of arrival ns)."""
+
+_Item = tuple[str, bytes, int, int]  # topic, message, times of arrival and of sending
+
+
+class Sink(Protocol):
+    """Where the messages go: a `BagWriter` for all of them, a `Snapshot` for those around events."""
+
+    folder: Path
+
+    @property
+    def kept(self) -> int: ...
+    @property
+    def pending(self) -> int: ...
+    @property
+    def size(self) -> int: ...
+    def attach(self, receptions: dict[str, Reception]) -> None: ...
+    def unwritten(self, handed: int) -> int: ...
+    def write(self, topic: str, raw: bytes, receive_time: int, publish_time: int) -> None: ...
+    def flush(self) -> None: ...
+    def stop(self, why: str) -> None: ...
+    def close(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class RecorderFigures:
+    """What the recorder has done; sizes in bytes."""
+
+    received: int
+    kept: int  # in complete chunks on the disk
+    file_size: int
+    queued: int
+    queued_bytes: int
+    lost: int  # did not fit into the queue, or came after the disk was full
+    failure: str
+
+
+@dataclass(frozen=True)
+class Unobserved:
+    """Messages of a topic, all recorded, that its observer could not read: bytes of the last, and why."""
+
+    count: int
+    size: int
+    why: str
+
+
+class Recorder:
+    """Takes serialised messages of announced topics and writes them from `begin` to `end`.
+
+    The functions that `receiver` and `latched_receiver` return are all called by one thread, `begin`
+    and `end` by any other. The writing is done by a thread of its own, or (`threaded` off) by whoever
+    calls `poll`. What `watch` and `observe` take is called where the writing is done, and so is
+    `on_loss`, with the number of messages for which the queue had no room since it was called last.
+    A message on which an observer fails is recorded all the same and counted in `unobserved`.
+    """
+
+    def __init__(
+        self,
+        writer: Sink,
+        *,
+        memory_limit: int = MEMORY_LIMIT,
+        threaded: bool = True,
+        space: SpaceGuard | None = None,
+        on_loss: Callable[[int], None] = lambda _: None,
+    ):
+        self.watches: dict[str, StampWatch] = {}
+        self.unobserved: dict[str, Unobserved] = {}
+        self.begun = False
+        self._writer = writer
+        self._memory_limit = memory_limit
+        self._space = space
+        self._on_loss = on_loss
+        self._observers: dict[str, Observe] = {}
+        self._receptions: dict[str, Reception] = {}
+        self._queue: deque[_Item] = deque()
+        self._open = False
+        self._gate = threading.Lock()
+        self._latched: dict[str, _Item] = {}
+        self._received_bytes = 0  # changed by the receiving thread alone
+        self._drained_bytes = 0  # changed where the writing is done alone
+        self._handed = 0  # to the writer, or thrown away after it failed
+        self._failure = ''
+        self._turn_end = self._changed = self._looked = 0.0  # steady times, s
+        self._kept_before = self._lost_before = 0
+        self._writing = threading.Lock()
+        self._ending = threading.Event()
+        self._threaded = threaded
+        self._thread = threading.Thread(target=self._work, name='recorder', daemon=True)
+        writer.attach(self._receptions)
+
+    def receiver(self, topic: str) -> Receive:
+        """Return the function that takes the messages of `topic`; before `begin` it drops them."""
+        take = self._taker(topic)
+
+        def receive(raw: bytes, received: int, sent: int) -> None:
+            if self._open:
+                take((topic, raw, received, sent))
+
+        return receive
+
+    def latched_receiver(self, topic: str) -> Receive:
+        """Return the same for a latched topic: the last message before `begin` is kept for it."""
+        take = self._taker(topic)
+
+        def receive(raw: bytes, received: int, sent: int) -> None:
+            item = (topic, raw, received, sent)
+            with self._gate:
+                if self._open:
+                    take(item)
+                else:
+                    self._latched[topic] = item
+
+        return receive
+
+    def watch(self, topic: str, rate: float, stamp_of: Callable[[bytes], int]) -> StampWatch:
+        """Count missing samples of `topic`, which has `rate` in Hz; `stamp_of` returns ns."""
+        watch = self.watches[topic] = StampWatch(rate)
+        self.observe(topic, lambda raw, _: watch.add(stamp_of(raw)))
+        return watch
+
+    def observe(self, topic: str, observe: Observe) -> None:
+        """Show each message of `topic` to `observe`, instead of to the one before."""
+        self._observers[topic] = observe
+
+    def begin(self) -> None:
+        """Record from now on, the kept latched messages first; raises `RecordingError` a second time."""
+        if self.begun:
+            raise RecordingError(f'recording {self._writer.folder} has ended; configure a new one')
+        with self._gate:
+            self.begun = True
+            for item in sorted(self._latched.values(), key=lambda item: item[2]):
+                self._taker(item[0])(item)
+            self._changed = self._looked = time.monotonic()
+            self._open = True
+        if self._threaded:
+            self._thread.start()
+
+    def poll(self) -> bool:
+        """Write what is queued, a few times per 0.1 s; for a recorder without a thread. Returns False."""
+        if self._open and time.monotonic() - self._turn_end > _DRAIN_PERIOD:
+            with self._writing:
+                if self._open:
+                    self._take_turn()
+        return False
+
+    def end(self) -> None:
+        """Wait until no message is under way, write what is queued and close; safe to call twice.
+
+        Raises `RecordingError` where the end of the file could not be written.
+        """
+        if self._open:
+            self._settle()
+            self._open = False
+            self._ending.set()
+            if self._threaded:
+                self._thread.join()
+            with self._writing:
+                self._guarded(self._write_queued)
+        self._note_missing()
+        try:
+            self._writer.close()
+        except RecordingError as error:
+            self._failure = str(error)
+            raise
+
+    def figures(self) -> RecorderFigures:
+        """Return what was done so far."""
+        return RecorderFigures(
+            received=self._received(),
+            kept=self._writer.kept,
+            file_size=self._writer.size,
+            queued=len(self._queue),
+            queued_bytes=self._received_bytes - self._drained_bytes,
+            lost=self._overflowed() + (self._writer.unwritten(self._handed) if self._failure else 0),
+            failure=self._failure,
+        )
+
+    def overflowed(self) -> dict[str, int]:
+        """Return how many messages of each topic did not fit into the queue, where there are any."""
+        return {name: entry.overflowed for name, entry in self._receptions.items() if entry.overflowed}
+
+    def received_on(self, topic: str) -> int:
+        """Return how many messages of `topic` came since `begin`."""
+        entry = self._receptions.get(topic)
+        return entry.received if entry is not None else 0
+
+    @property
+    def last_stamp(self) -> int:
+        """The latest stamp of all watched topics, ns."""
+        return max((watch.last_stamp for watch in self.watches.values()), default=0)
+
+    def _taker(self, topic: str) -> Callable[[_Item], None]:
+        reception = self._receptions.setdefault(topic, Reception())
+        append = self._queue.append
+
+        def take(item: _Item) -> None:
+            reception.received += 1
+            size = len(item[1])
+            if self._received_bytes + size - self._drained_bytes > self._memory_limit:
+                reception.overflowed += 1
+                return
+            self._received_bytes += size
+            append(item)
+
+        return take
+
+    def _received(self) -> int:
+        return sum(entry.received for entry in self._receptions.values())
+
+    def _overflowed(self) -> int:
+        return sum(entry.overflowed for entry in self._receptions.values())
+
+    def _settle(self) -> None:
+        """Wait until messages cease, or until those come that arrived well after this call."""
+        limit = time.monotonic() + _SETTLE_LIMIT
+        latest = time.time_ns() + int(2e9 * _QUIET_PERIOD)
+        before = -1
+        while self._received() != before and time.monotonic() < limit:
+            before = self._received()
+            self._ending.wait(_QUIET_PERIOD)
+            if self._newest_arrival() > latest:
+                return
+
+    def _newest_arrival(self) -> int:
+        try:
+            return self._queue[-1][2]
+        except IndexError:  # the writing thread was faster
+            return 0
+
+    # The writing.
+
+    def _work(self) -> None:
+        while not self._ending.wait(_DRAIN_PERIOD):
+            self._take_turn()
+
+    def _take_turn(self) -> None:
+        self._guarded(self._write_queued)
+        now = self._turn_end = time.monotonic()
+        if self._writer.kept != self._kept_before or not self._writer.pending:
+            self._kept_before, self._changed = self._writer.kept, now
+        elif now - self._changed > _FLUSH_PERIOD:
+            self._guarded(self._writer.flush)
+        if now - self._looked > _SPACE_PERIOD:
+            self._looked = now
+            self._guarded(self._look_at_space)
+        if (overflowed := self._overflowed()) > self._lost_before:
+            self._on_loss(overflowed - self._lost_before)
+            self._lost_before = overflowed
+
+    def _write_queued(self) -> None:
+        rest = len(self._queue)
+        while rest > 0:
+            self._write_batch(min(rest, _BATCH))
+            rest -= _BATCH
+
+    def _write_batch(self, count: int) -> None:
+        take, write, observers = self._queue.popleft, self._writer.write, self._observers
+        taken = taken_bytes = 0
+        try:
+            for taken in range(1, count + 1):  # noqa: B007 - also read after an exception
+                topic, raw, received, sent = take()
+                taken_bytes += len(raw)
+                write(topic, raw, received, sent)
+                if topic in observers:
+                    try:
+                        observers[topic](raw, received)
+                    except Exception as error:
+                        # Anybody may publish anything: what is wrong with one message ends no recording.
+                        self._note_unobserved(topic, raw, error)
+        finally:
+            self._handed += taken
+            self._drained_bytes += taken_bytes
+
+    def _note_unobserved(self, topic: str, raw: bytes, error: Exception) -> None:
+        before = self.unobserved.get(topic)
+        count = 1 if before is None else before.count + 1
+        why = f'{type(error).__name__}: {error}'.splitlines()[0]
+        self.unobserved[topic] = Unobserved(count, len(raw), why)
+
+    def _discard_queued(self) -> None:
+        for _ in range(len(self._queue)):
+            self._drained_bytes += len(self._queue.popleft()[1])
+            self._handed += 1
+
+    def _look_at_space(self) -> None:
+        shortage = self._space.shortage() if self._space is not None else ''
+        if shortage:
+            self._note_missing()
+            self._writer.stop(shortage)
+
+    def _note_missing(self) -> None:
+        for name, watch in self.watches.items():
+            self._receptions.setdefault(name, Reception()).missing = watch.lost
+
+    def _guarded(self, step: Callable[[], None]) -> None:
+        try:
+            if not self._failure:
+                step()
+        except Exception as error:
+            # The border of the thread: a recorder that ends without a word would be the worst of all.
+            known = isinstance(error, RecordingError)
+            self._failure = str(error) if known else f'recording stopped: {type(error).__name__}: {error}'
+        if self._failure:
+            self._discard_queued()

@@ -1,0 +1,59 @@
+"""What the recorder looks at in passing: the stamps of streams, the switching of damping, faults of nodes."""
+
+from collections.abc import Callable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+
+from mount_bags.events.automatic_marks import (
+    AutomaticMarks,
+    FaultWatch,
+    LostSampleWatch,
+    MarkKind,
+    SwitchOnWatch,
+)
+from mount_bags.recorder.recorder import Observe, Recorder
+from mount_ros.messages.scalars import ScalarsLayout, stamp_of
+from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DIAGNOSTICS, Delivery, Topic
+
+PresentTime = Callable[[], int]
+"""Returns now on the clock of the stamps, ns."""
+
+
+def watch_topic(
+    recorder: Recorder, topic: Topic, name: str, marks: AutomaticMarks, namespace: str, now: PresentTime
+) -> None:
+    """Let `recorder` look at what it receives on `topic`, whose full name is `name`."""
+    if topic is DIAGNOSTICS:
+        recorder.observe(name, _fault_observer(FaultWatch(marks, namespace), now))
+    # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
+    elif topic.delivery is Delivery.STREAM and topic is not CURRENT_SETPOINT:
+        kind = MarkKind.UNANSWERED if topic is CONTROL_TRACE else MarkKind.LOST_SAMPLE
+        samples = LostSampleWatch(marks, name, recorder.watch(name, topic.rate, stamp_of), kind)
+        switching = SwitchOnWatch(marks) if topic is CONTROL_TRACE else None
+        recorder.observe(name, _stream_observer(samples, switching))
+
+
+def _stream_observer(samples: LostSampleWatch, switching: SwitchOnWatch | None) -> Observe:
+    add = samples.add
+    if switching is None:
+        return lambda raw, _: add(stamp_of(raw))
+    layout = ScalarsLayout(CONTROL_TRACE)
+    active, magnitude = (CONTROL_TRACE.names.index(name) for name in ('damping_active', 'magnitude'))
+
+    def observe(raw: bytes, _: int) -> None:
+        stamp, numbers, _ = layout.unpack(raw)
+        add(stamp)
+        switching.add(stamp, numbers[active], numbers[magnitude])
+
+    return observe
+
+
+def _fault_observer(faults: FaultWatch, now: PresentTime) -> Observe:
+    def observe(raw: bytes, _: int) -> None:
+        message: Any = deserialize_message(raw, DiagnosticArray)
+        for status in message.status:
+            faults.add(now(), status)
+
+    return observe

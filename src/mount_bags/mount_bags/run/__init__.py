@@ -1,0 +1,1 @@
+"""A run: its folder, its session, what it was made with."""

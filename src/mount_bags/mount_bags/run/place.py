@@ -1,0 +1,28 @@
+"""The recording that a person means: its own folder or file, or the run folder that holds it."""
+
+import hashlib
+from pathlib import Path
+
+from mount_bags.bag.recording import Recording, open_recording
+
+
+def open_run(path: Path) -> Recording:
+    """Open the recording at `path` or, for the folder of a run, the one in it; raises `ReadingError`."""
+    return open_recording(recording_place(path))
+
+
+def recording_place(path: Path) -> Path:
+    """Return the recording in `path` if that is the folder of a run, else `path` itself."""
+    inside = path / 'recording'
+    return inside if inside.is_dir() else path
+
+
+def recording_hash(path: Path) -> str:
+    """Return the SHA-256 of a file; of a folder that of its MCAP files, in the order of their names."""
+    digest = hashlib.sha256()
+    parts = sorted(part for part in path.rglob('*.mcap*') if part.is_file()) if path.is_dir() else [path]
+    for part in parts:
+        with part.open('rb') as stream:
+            while block := stream.read(1 << 20):
+                digest.update(block)
+    return digest.hexdigest()

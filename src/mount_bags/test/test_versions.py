@@ -1,0 +1,85 @@
+"""What a session tells about versions and processor, and what a replay says about it."""
+
+import subprocess
+
+import pytest
+
+from mount_bags.run.versions import _project_version, processor, versions
+from mount_replay.recorded_versions import version_differences, versions_sentence
+
+X86 = """processor\t: 0
+vendor_id\t: AuthenticAMD
+model name\t: AMD EPYC
+flags\t\t: fpu sse2 avx fma sse4_2 avx2 avx512f avx512bw
+
+processor\t: 1
+model name\t: another
+"""
+ARM = """processor\t: 0
+Features\t: fp asimd evtstrm sve
+CPU implementer\t: 0x41
+CPU part\t: 0xd40
+"""
+HERE = {'numpy': '2.4.6', 'c_library': 'glibc 2.36', 'processor': 'AMD EPYC (avx2)'}
+
+
+@pytest.mark.parametrize(
+    ('text', 'told'),
+    [
+        (X86, 'AMD EPYC (sse4_2 avx2 fma avx512f)'),
+        (ARM, 'implementer 0x41 part 0xd40 (asimd sve)'),
+        ('', 'implementer unknown part unknown (no abilities known)'),
+    ],
+)
+def test_a_processor_is_told_by_its_name_and_the_abilities_by_which_libraries_choose(text, told):
+    assert processor(text) == told
+
+
+def test_versions_tell_libraries_c_library_and_processor():
+    told = versions()
+    wanted = {'mount_bringup', 'numpy', 'scipy', 'numba', 'llvmlite', 'c_library', 'machine', 'processor'}
+    assert wanted <= set(told)
+    assert all(told.values())
+
+
+def test_the_state_of_the_repository_is_part_of_the_version(tmp_path):
+    plain = _project_version(tmp_path)
+    git = ('git', '-C', str(tmp_path), '-c', 'user.name=x', '-c', 'user.email=x@y')
+    subprocess.run([*git, 'init', '-q'], check=True)
+    (tmp_path / 'file').write_text('a')
+    subprocess.run([*git, 'add', 'file'], check=True)
+    subprocess.run([*git, 'commit', '-q', '-m', 'x'], check=True)
+    committed = _project_version(tmp_path)
+    (tmp_path / 'file').write_text('b')
+    assert committed.startswith(f'{plain}+')
+    assert _project_version(tmp_path) == f'{committed}-dirty'
+
+
+@pytest.mark.parametrize(
+    ('session', 'sentence'),
+    [
+        ({'versions': HERE}, 'made with the same versions on the same kind of processor'),
+        ({'versions': {**HERE, 'more': '1'}}, 'made with the same versions on the same kind of processor'),
+        (
+            {'versions': {**HERE, 'numpy': '2.4.5'}},
+            'made with others than here: numpy 2.4.5 (here 2.4.6)',
+        ),
+        (
+            {'versions': {'numpy': '2.4.5'}},
+            'made with others than here: numpy 2.4.5 (here 2.4.6); it does not tell c_library, processor',
+        ),
+        (
+            {'versions': {'numpy': '2.4.6'}},
+            'made with the same versions as far as it tells; it does not tell c_library, processor',
+        ),
+        (
+            {'versions': {**HERE, 'numpy': '1'}, 'replay': {'versions': HERE}},
+            'the same versions on the same kind',
+        ),
+        ({'versions': HERE, 'replay': {'versions': {**HERE, 'numpy': '1'}}}, 'numpy 1 (here 2.4.6)'),
+        ({}, 'does not tell with which versions and on which processor it was made'),
+        ({'versions': 'no mapping', 'replay': 3}, 'does not tell with which versions'),
+    ],
+)
+def test_a_replay_says_which_versions_differ_and_that_none_does(session, sentence):
+    assert sentence in versions_sentence(version_differences(session, HERE), HERE)

@@ -1,1 +1,0 @@
-"""The paper's experiments: one file for each, behind the contract of `contract`, listed in `registry`."""

@@ -1,0 +1,39 @@
+"""`engine-mount accept`: a reference recording made or renewed, with a reason."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mount_bringup.terminal import terminal
+
+EPILOG = """Examples:
+
+`engine-mount drive --core --scenario bench --duration 3 --out bags/new`
+
+`engine-mount accept bags/new --reference initialisation --reason "ramp is 50 ms shorter"`
+"""
+
+
+def accept(
+    run: Annotated[Path, typer.Argument(help='folder of a run, a recording, or a replay of the reference')],
+    reference: Annotated[str, typer.Option(metavar='NAME', help='name of the reference')],
+    reason: Annotated[str, typer.Option(metavar='TEXT', help='why its setpoints may change')],
+    folder: Annotated[Path, typer.Option(help='folder of the references')] = Path('bags/reference'),
+) -> None:
+    """Make a run the reference that `make test` replays; the reason is kept with it."""
+    from mount_bags.compare.accept import ACCEPTED_NAME
+    from mount_bags.compare.accept import accept as accept_run
+    from mount_bags.run.place import open_run
+    from mount_bags.run.versions import versions
+
+    accepted = accept_run(open_run(run), reference, reason, folder, versions())
+    console = terminal()
+    for change in accepted.changes or ('new reference',):
+        console.print(f'- {change}', soft_wrap=True)
+    console.print(
+        f'reference  {accepted.folder}, {accepted.size / 1e6:.2f} MB; '
+        f'all references {accepted.total / 1e6:.2f} MB\n'
+        f'reason     {accepted.folder / ACCEPTED_NAME}',
+        soft_wrap=True,
+    )

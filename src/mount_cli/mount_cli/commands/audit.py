@@ -1,0 +1,55 @@
+"""`engine-mount audit`: was anything lost in a recording?"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mount_bringup.terminal import note, terminal
+from mount_cli.commands.options import JsonFile
+
+EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
+control left samples without a setpoint, on faults, or when nothing can be read.
+
+Examples:
+
+`engine-mount audit bags/2026-11-20_18-03-11_motorway/recording`
+
+`engine-mount audit /data/rosbag2_2024_05_02 --json audit.json` - any rosbag2 recording
+
+A topic with a rate is judged by its stamps, every topic by what the recorder, the file or its
+metadata counted. Expected = present - duplicated + lost. Jitter is the rms deviation of the steps between
+neighbouring stamps. Samples lost, samples unanswered and faults are the figures of `drive` and `report`.
+The JSON holds them, and below `topics` for each topic `expected`, `present`, `lost`, `duplicated`,
+`longest_gap_s` and more; unknown is null.
+"""
+
+
+def audit(
+    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
+    json_file: JsonFile = None,
+) -> None:
+    """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
+    import json
+
+    from mount_bags.audit.audit import audit as audited
+    from mount_bags.audit.losses import losses
+    from mount_bags.audit.report import as_json, as_table, latency_lines, sentences
+    from mount_bags.run.place import open_run
+
+    console = terminal()
+    with console.status('reading'):
+        opened = open_run(recording)
+        audits = audited(opened)
+        found = losses(opened, audits)
+    console.print(as_table(audits))
+    for line in latency_lines(audits):
+        console.print(line, soft_wrap=True)
+    for sentence in sentences(audits, found):
+        console.print(sentence, soft_wrap=True)
+    for warning in opened.warnings:
+        note(console, warning)
+    if json_file is not None:
+        json_file.write_text(json.dumps(as_json(audits, found), indent=2) + '\n', encoding='utf-8')
+    if not found.sound:
+        raise typer.Exit(1)

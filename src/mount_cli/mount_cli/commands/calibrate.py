@@ -1,0 +1,390 @@
+"""`engine-mount calibrate`: from rack recordings to the specimen file that init and control load."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from mount_bringup.progress_bar import progress_bar
+from mount_bringup.terminal import note, terminal
+
+if TYPE_CHECKING:
+    from mount_models.specimen import Specimen
+
+app = typer.Typer(
+    name='calibrate',
+    help='Calibrate an actuator from rack recordings: force law, gap curves, their files.',
+    no_args_is_help=True,
+    rich_markup_mode='markdown',
+)
+
+_ACTUATOR_EPILOG = """Examples:
+
+`engine-mount calibrate actuator force.csv --name left --out left.yaml`
+
+`engine-mount calibrate actuator run1.csv run2.csv --orders 4,4,4,2,4 --figure force.png`
+
+`engine-mount calibrate actuator F.csv --column gap=Spalt:mm --column force=Kraft:kN`
+
+`engine-mount calibrate actuator bags/ramp_349um bags/ramp_400um ...` - MCAP, one gap each
+
+CSV columns are `gap_um`, `current_a`, `force_n`, or the same with another unit (mm, m, ma, kn).
+"""
+_INDUCTANCE_EPILOG = """Examples:
+
+`engine-mount calibrate inductance ripple_*um.csv --coil-temperature 20 --base left.yaml --out left.yaml`
+
+`engine-mount calibrate inductance a.csv b.csv ... --gap a.csv=300 --gap b.csv=320`
+
+`engine-mount calibrate inductance cold/*.csv warm/*.csv` - two temperatures: compensation is measured
+
+CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
+`flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
+tells them.
+"""
+_RACK_EPILOG = """Example:
+
+`engine-mount calibrate rack --out rack --celsius 20 --celsius 80` - then `calibrate actuator rack/force.csv`,
+`calibrate inductance rack/ripple_*.csv`, `identify friction --train rack/friction_*.csv`
+"""
+
+Files = Annotated[list[Path], typer.Argument(help='CSV files, MCAP files or folders of recordings')]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option('--column', metavar='NAME=HEADER[:UNIT]', help='which column is what, and its unit'),
+]
+Gaps = Annotated[
+    list[str] | None, typer.Option('--gap', metavar='FILE=UM', help='air gap of a file, um; may be repeated')
+]
+Base = Annotated[
+    Path | None, typer.Option(help='specimen that gives all other values; default: the shipped one')
+]
+Name = Annotated[str, typer.Option(help='name of the specimen; default: that of the base')]
+Out = Annotated[Path | None, typer.Option(metavar='FILE', help='write the specimen (YAML)')]
+JsonFile = Annotated[
+    Path | None, typer.Option('--json', metavar='FILE', help='write parameters and errors to this file')
+]
+Figure = Annotated[Path | None, typer.Option(metavar='FILE', help='draw measurement and result (PNG)')]
+
+
+@app.command(epilog=_ACTUATOR_EPILOG)
+def actuator(
+    files: Files,
+    orders: Annotated[
+        str, typer.Option(help='numbers of coefficients of a1 .. a5; 18 in all, as in Table 1')
+    ] = '4,4,4,2,4',
+    columns: Columns = None,
+    gaps: Gaps = None,
+    base: Base = None,
+    name: Name = '',
+    out: Out = None,
+    json_file: JsonFile = None,
+    figure: Figure = None,
+) -> None:
+    """Fit the force law, Eqs (3) and (4), to measured points of gap, current and force.
+
+    Refused are outliers, too few gaps or currents, and a law that is not positive, rising with the current
+    and falling with the gap within the measured range. Then no file is written.
+    """
+    from mount_identification.actuator.fit import fit_force_law
+    from mount_identification.rack.recordings import GivenValues, read_force
+    from mount_identification.specimen import check_targets, with_force_law
+    from mount_models.specimen import chosen_specimen
+
+    console = terminal()
+    check_targets(out, json_file, figure)
+    starting = chosen_specimen(str(base) if base else '')
+    given = GivenValues(_per_file(gaps or [], files, '--gap', 1e-6), {})
+    chosen_orders = _orders(orders)
+    with progress_bar(console, transient=True) as progress:
+        task = progress.add_task('reading', total=None)
+        points = read_force(files, _columns(columns or []), given)
+        progress.update(task, description='fitting')
+        fit = fit_force_law(
+            points.gap,
+            points.current,
+            points.force,
+            chosen_orders,
+            force_floor=_FLOOR * float(points.force.max()),
+            progress=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    specimen = with_force_law(starting, name, fit, files)
+    law = fit.law
+    table = Table(
+        title=f'force law of {specimen.name!r}, {sum(chosen_orders)} parameters', title_justify='left'
+    )
+    table.add_column('air gap (um)', justify='right')
+    table.add_column('rms error (N)', justify='right')
+    for gap, rms in zip(fit.gaps, fit.gap_rms, strict=True):
+        table.add_row(f'{gap * 1e6:.1f}', f'{rms:.2f}')
+    console.print(table)
+    console.print(
+        f'{fit.points} points; error rms {fit.relative_rms:.2%} of the force above 20 N, worst '
+        f'{fit.worst:.2%}; rms {fit.rms_error:.2f} N, largest {fit.largest_error:.2f} N',
+        soft_wrap=True,
+    )
+    console.print(
+        f'positive, rising with the current and falling with the gap within {law.gap_low * 1e6:.1f} .. '
+        f'{law.gap_high * 1e6:.1f} um and 0 .. {law.current_high:.2f} A; refused beyond',
+        soft_wrap=True,
+    )
+    figures: dict[str, Any] = {
+        'specimen': specimen.name,
+        'parameters': {part: list(getattr(law, part)) for part in ('a1', 'a2', 'a3', 'a4', 'a5')},
+        'parameter_std': _split(fit.covariance.diagonal().clip(0.0) ** 0.5, chosen_orders),
+        'valid_gap_m': [law.gap_low, law.gap_high],
+        'valid_current_a': [0.0, law.current_high],
+        'points': fit.points,
+        'relative_rms': _known(fit.relative_rms),
+        'relative_worst': _known(fit.worst),
+        'rms_error_n': fit.rms_error,
+        'largest_error_n': fit.largest_error,
+        'rms_by_gap': [{'gap_m': g, 'rms_n': r} for g, r in zip(fit.gaps, fit.gap_rms, strict=True)],
+    }
+    if figure is not None:
+        from mount_identification.calibration_figure import draw_force_law
+
+        draw_force_law(points, law, figure)
+        console.print(f'figure     {figure}', soft_wrap=True)
+    _write(console, specimen, figures, json_file, out)
+
+
+@app.command(epilog=_INDUCTANCE_EPILOG)
+def inductance(
+    files: Files,
+    gaps: Gaps = None,
+    temperatures: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--coil-temperature', metavar='[FILE=]DEGC', help='of a file, or of all that do not tell theirs'
+        ),
+    ] = None,
+    rest_current: Annotated[float | None, typer.Option(help='A; default: that of the base')] = None,
+    crossing_inductance: Annotated[float | None, typer.Option(help='mH; default: that of the base')] = None,
+    turns_area: Annotated[
+        float | None, typer.Option(help='turns times core area, m^2; default: that of the base')
+    ] = None,
+    coefficient: Annotated[
+        float | None, typer.Option(help='rise of the resistivity of the core per kelvin, 1/K')
+    ] = None,
+    held_out: Annotated[
+        list[float] | None,
+        typer.Option('--held-out-temperature', help='degC; recordings there only judge the compensation'),
+    ] = None,
+    columns: Columns = None,
+    base: Base = None,
+    name: Name = '',
+    out: Out = None,
+    json_file: JsonFile = None,
+    figure: Figure = None,
+) -> None:
+    """Fit the gap curves L_0.2 and i_20 (Fig. 4) to coil ripple recorded at known gaps.
+
+    The temperature with most recordings is that of the curves. With recordings at a second one the
+    compensation is measured, else it is stated from the conductivity's coefficient and the base's force law.
+    """
+    from mount_identification.coil.inductance import GapOrder, calibrate_inductance
+    from mount_identification.rack.recordings import read_ripple
+    from mount_identification.specimen import check_targets, with_gap_curves
+    from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
+    from mount_models.specimen import chosen_specimen
+
+    console = terminal()
+    check_targets(out, json_file, figure)
+    starting = chosen_specimen(str(base) if base else '')
+    order = GapOrder(
+        rest_current=_positive(rest_current, '--rest-current', 'A') or starting.rest_current,
+        crossing_inductance=1e-3 * (_positive(crossing_inductance, '--crossing-inductance', 'mH') or 0.0)
+        or starting.crossing_inductance,
+        coefficient=CONDUCTIVITY_COEFFICIENT if coefficient is None else coefficient,
+        held_out=tuple(held_out or ()),
+    )
+    area = _positive(turns_area, '--turns-area', 'm^2') or starting.turns_area
+    given = _given_ripple(files, gaps or [], temperatures or [])
+    with progress_bar(console, transient=True) as progress:
+        task = progress.add_task('reading', total=2)
+        recordings = read_ripple(files, _columns(columns or []), given, area)
+        progress.update(task, description='fitting', completed=1)
+        result = calibrate_inductance(recordings, starting.force_law, order)
+        progress.update(task, completed=2)
+    from dataclasses import replace
+
+    starting = replace(
+        starting, rest_current=order.rest_current, crossing_inductance=order.crossing_inductance
+    )
+    specimen = with_gap_curves(
+        starting, name, result.calibration, result.compensation, result.compensated_by, area, files
+    )
+    for table in result.tables():
+        console.print(table)
+    for sentence in result.sentences():
+        console.print(sentence, soft_wrap=True)
+    for warning in result.warnings:
+        note(console, warning, 'warning')
+    if figure is not None:
+        from mount_identification.calibration_figure import draw_gap_curves
+
+        draw_gap_curves(result, order, figure)
+        console.print(f'figure     {figure}', soft_wrap=True)
+    _write(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)
+
+
+@app.command(epilog=_RACK_EPILOG)
+def rack(
+    out: Annotated[Path, typer.Option(metavar='FOLDER', help='folder for the recordings')],
+    seed: Annotated[int, typer.Option(help='seed of the noise, and of the actuator with --drawn')] = 0,
+    noise: Annotated[float, typer.Option(help='relative standard deviation of each sensor')] = 0.01,
+    drawn: Annotated[
+        bool, typer.Option('--drawn', help='another actuator with other pads, drawn around the default ones')
+    ] = False,
+    celsius: Annotated[
+        list[float] | None, typer.Option(help='coil temperature of the ripple, degC; may be repeated')
+    ] = None,
+) -> None:
+    """Write recordings of the simulated rack: force.csv, ripple at 16 fixed gaps, friction of the pads."""
+    from dataclasses import replace
+
+    from mount_models.friction.coefficient import FrictionCoefficients
+    from mount_models.friction.contact import FrictionContact
+    from mount_sim.rack.coil import Rack, drawn_rack, write_force, write_ripple
+    from mount_sim.rack.friction import drawn_friction, write_friction
+
+    console = terminal()
+    chosen = replace(drawn_rack(seed) if drawn else Rack(seed=seed), noise=noise)
+    pads = drawn_friction(seed) if drawn else (FrictionContact(), FrictionCoefficients())
+    out.mkdir(parents=True, exist_ok=True)
+    with progress_bar(console, transient=True) as progress:
+        each = tuple(celsius or (20.0,))
+        task = progress.add_task('measuring', total=2 + len(each))
+        written = [write_force(chosen, out / 'force.csv')]
+        progress.advance(task)
+        for temperature in each:
+            written += write_ripple(chosen, out, temperature=temperature)
+            progress.advance(task)
+        written += write_friction(out, *pads, noise, seed)
+        progress.advance(task)
+    console.print(f'{len(written)} recordings in {out}', soft_wrap=True)
+
+
+_FLOOR = 0.006  # chosen: weights as 2 N of 330 N
+
+
+def _orders(text: str) -> tuple[int, int, int, int, int]:
+    parts = text.replace(' ', '').split(',')
+    if len(parts) != 5 or not all(part.isdigit() for part in parts):
+        raise typer.BadParameter(f'--orders {text}: write five numbers, as in 4,4,4,2,4')
+    a, b, c, d, e = (int(part) for part in parts)
+    return a, b, c, d, e
+
+
+def _columns(settings: list[str]) -> dict[str, str]:
+    chosen = {}
+    for setting in settings:
+        name, equals, header = setting.partition('=')
+        if not (equals and name and header):
+            raise typer.BadParameter(f'--column {setting}: write NAME=HEADER:UNIT, as in gap=Spalt:um')
+        if name not in _CHANNELS:
+            raise typer.BadParameter(f'--column {setting}: {name!r} is none of {", ".join(_CHANNELS)}')
+        chosen[name] = header
+    return chosen
+
+
+_CHANNELS = ('gap', 'current', 'force', 'inductance', 'current_rate', 'flux_rate', 'coil_temperature')
+
+
+def _per_file(settings: list[str], files: list[Path], option: str, factor: float) -> dict[Path, float]:
+    """Return {file: value} of FILE=VALUE settings; files are meant by path or by name."""
+    values = {}
+    for setting in settings:
+        named, equals, text = setting.rpartition('=')
+        meant = [file for file in files if str(file) == named or file.name == named]
+        if not equals or len(meant) != 1:
+            what = 'no file' if not meant else f'{len(meant)} files'
+            raise typer.BadParameter(
+                f'{option} {setting}: {named!r} is {what} of those given; write FILE=VALUE'
+            )
+        values[meant[0]] = _number(text, f'{option} {setting}') * factor
+    for file, value in values.items():
+        if option == '--gap' and not 20e-6 <= value <= 5e-3:
+            guess = '; was it meant in mm?' if 20e-6 <= value * 1e3 <= 5e-3 else ''
+            raise typer.BadParameter(
+                f'--gap {file.name}={value / factor:g}: an air gap must lie within 20 .. 5000 um{guess}'
+            )
+    return values
+
+
+def _given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) -> Any:
+    from mount_identification.rack.recordings import GivenValues
+
+    single = [setting for setting in temperatures if '=' in setting]
+    common = [_number(text, f'--coil-temperature {text}') for text in temperatures if '=' not in text]
+    if len(common) > 1:
+        raise typer.BadParameter('--coil-temperature without FILE= holds for all files: give it once')
+    celsius = _per_file(single, files, '--coil-temperature', 1.0)
+    for value in (*celsius.values(), *common):
+        if not -60.0 <= value <= 250.0:
+            raise typer.BadParameter(
+                f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
+            )
+    return GivenValues(_per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None)
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise typer.BadParameter(f'{where}: {text!r} is no number')
+    return value
+
+
+def _positive(value: float | None, option: str, unit: str) -> float | None:
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise typer.BadParameter(f'{option} ({value:g} {unit}) must be above 0')
+    return value
+
+
+def _split(values: Any, orders: tuple[int, ...]) -> dict[str, list[float]]:
+    parts, start = {}, 0
+    for number, order in enumerate(orders, 1):
+        parts[f'a{number}'] = [float(value) for value in values[start : start + order]]
+        start += order
+    return parts
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _write(
+    console: Console, specimen: 'Specimen', figures: dict[str, Any], json_file: Path | None, out: Path | None
+) -> None:
+    """Write figures and specimen where they are wanted, and say which parts are of other specimens."""
+    from mount_identification.specimen import foreign_parts
+    from mount_models.specimen import save_specimen
+    from mount_report.drive.summary import write_json
+
+    if json_file is not None:
+        write_json(figures, json_file)
+    if out is not None:
+        save_specimen(specimen, out)
+        console.print(f'specimen   {out}', soft_wrap=True)
+    note_foreign(console, foreign_parts(specimen), specimen.name)
+
+
+def note_foreign(console: Console, parts: list[str], name: str) -> None:
+    command = {
+        'force_law': 'calibrate actuator',
+        'gap_curves': 'calibrate inductance',
+        'friction': 'identify friction',
+    }
+    for part in parts:
+        note(
+            console,
+            f'{part} is not yet that of {name!r} but of its base; run engine-mount {command[part]} with this '
+            'file as --base',
+        )

@@ -1,0 +1,86 @@
+"""`engine-mount compare`: what is different between two recordings, in words."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mount_bringup.terminal import note, refuse, terminal
+from mount_cli.commands.options import JsonFile
+
+EPILOG = """Examples:
+
+`engine-mount compare bags/before bags/after` - to the bit
+
+`engine-mount compare A B --tolerance current=0.01 --tolerance switching=0.002 --tolerance 0.1%`
+
+`engine-mount compare bags/long bags/cut --common --figure difference.png`
+"""
+_NOT_COMPARED = 2
+
+
+def compare(
+    a: Annotated[Path, typer.Argument(metavar='A', help='folder of a recording or run, or an MCAP file')],
+    b: Annotated[Path, typer.Argument(metavar='B', help='the other one')],
+    tolerances: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--tolerance',
+            metavar='NAME=VALUE',
+            help='signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
+            'also topic=, topic.signal=, mount_left/topic.signal=',
+        ),
+    ] = None,
+    common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
+    json_file: JsonFile = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar='FILE', help='draw the most important differences (PNG)')
+    ] = None,
+) -> None:
+    """Tell in words how recording B differs from recording A.
+
+    Exit code 0: equal to the bit, or within the tolerances; 1: different; 2: not compared, as where A or B is
+    no recording.
+    """
+    try:
+        equal = _told(a, b, tolerances or [], common, json_file, figure)
+    except (ValueError, OSError) as error:
+        refuse(error)
+        raise typer.Exit(_NOT_COMPARED) from None
+    if not equal:
+        raise typer.Exit(1)
+
+
+def _told(
+    a: Path, b: Path, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
+) -> bool:
+    """Compare, print and write what differs; return whether all is equal."""
+    from mount_bags.compare.compare import compare as compare_recordings
+    from mount_bags.compare.tolerances import Tolerances
+    from mount_bags.compare.words import as_json, as_table, sentences
+    from mount_bags.run.place import open_run
+
+    console = terminal()
+    recordings = open_run(a), open_run(b)
+    comparison = compare_recordings(*recordings, Tolerances(tolerances), common_only=common)
+    console.print(f'A {comparison.name_a}, B {comparison.name_b}', soft_wrap=True)
+    for sentence in sentences(comparison):
+        console.print(f'- {sentence}', soft_wrap=True)
+    if comparison.differing:
+        console.print(as_table(comparison))
+    console.print(
+        f'Times are from the first displacement sample of A; {comparison.alignments.sentence}.',
+        soft_wrap=True,
+    )
+    for recording in recordings:
+        for warning in recording.warnings:
+            note(console, f'{recording.path}: {warning}')
+    if json_file is not None:
+        json_file.write_text(json.dumps(as_json(comparison), indent=2, allow_nan=False) + '\n')
+    if figure is not None:
+        from mount_report.compare_figure import draw_comparison
+
+        draw_comparison(comparison, *recordings, figure)
+        console.print(f'figure {figure}', soft_wrap=True)
+    return comparison.equal

@@ -1,0 +1,143 @@
+"""`engine-mount drive`: the simulated car through the whole graph."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mount_bringup.terminal import note, terminal
+from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
+
+EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
+control was active, no fault, and the recording whole; 1 when one of these did not hold, or nothing was
+driven, with the reason; 2 for a wrong use of the command; 130 when interrupted.
+
+Times are in s from the first displacement sample, as in `report`, `cut` and `compare`.
+
+Examples:
+
+`engine-mount drive` - a gap in the motorway, in real time
+
+`engine-mount drive --scenario bench --lockstep --duration 10` - 8 Hz, 1 mm, as fast as it goes
+
+`engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount in the seat
+
+`engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
+
+`engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
+
+`engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.damper=viscous_3000`
+"""
+
+
+def drive(
+    scenario: Annotated[str, typer.Option(help='motorway, bench, sweep or recorded')] = 'motorway',
+    mount: Annotated[
+        str, typer.Option(help='friction, friction_off, friction_always_on, hydro or elastomer')
+    ] = '',
+    file: Annotated[
+        Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
+    ] = None,
+    column: Annotated[
+        str,
+        typer.Option(help='recorded: column (CSV, JSON), signal.number (NPY), field of the message (MCAP)'),
+    ] = '',
+    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV, JSON)')] = '',
+    topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
+    scale: Annotated[
+        float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
+    ] = None,
+    lockstep: Annotated[
+        bool, typer.Option('--lockstep', help='the electronics wait for each answer: deterministic, faster')
+    ] = False,
+    apart: Annotated[
+        bool,
+        typer.Option('--apart', help='lock-step: each node in its own process, as in the car; slower'),
+    ] = False,
+    core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
+    duration: Annotated[
+        float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help='seed of noise and road')] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option('--set', metavar='NODE.NAME=VALUE', help='any parameter of any node; may be repeated'),
+    ] = None,
+    out: NewFolder = None,
+    json_file: JsonFile = None,
+    report: Annotated[
+        bool, typer.Option('--report/--no-report', help='draw the figure and write the page about the run')
+    ] = True,
+    on_full: Annotated[
+        str, typer.Option(help='full disk: stop the run, or continue without recording')
+    ] = 'stop',
+    split: Split = None,
+    snapshot: Snapshot = '',
+    priority: Annotated[
+        int,
+        typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
+    ] = 10,
+    domain: Domain = None,
+    namespace: Namespace = '',
+) -> None:
+    """Drive the simulated car through the whole graph, record it and print what happened."""
+    from mount_bringup.graph.domain import chosen_domain
+    from mount_bringup.mount_choice import with_control_of_mount
+    from mount_bringup.settings import SettingError, checked_settings, settings_of_options
+    from mount_replay.drive.drive import DriveOrder, record_drive, recorder_parameters
+    from mount_replay.drive.recorder_options import recorder_options
+    from mount_report.drive.summary import write_json
+    from mount_report.drive.telling import tell_drive, tell_snapshots
+
+    if lockstep and core:
+        raise typer.BadParameter('choose --lockstep or --core, not both')
+    if apart and not lockstep:
+        raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
+    try:
+        parameters = settings_of_options(settings or [])
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
+    given = {
+        'scenario': scenario,
+        'mount': mount or None,
+        'seed': seed,
+        'timeline.duration': duration,
+        'recorded.file': str(file.absolute()) if file else None,
+        'recorded.column': column or None,
+        'recorded.time_column': time_column or None,
+        'recorded.topic': topic or None,
+        'recorded.scale': scale,
+    }
+    sim = parameters.setdefault('mount_sim', {})
+    sim.update({name: value for name, value in given.items() if value is not None})
+    recorder = recorder_options(split or [], snapshot)
+    if on_full != 'stop':
+        recorder['on_full'] = on_full
+    if recorder:
+        parameters.setdefault('mount_recorder', {}).update(recorder)
+    parameters = with_control_of_mount(checked_settings(parameters))
+    if core and parameters.get('mount_recorder', {}).get('snapshot'):
+        raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
+    mode = 'core' if core else 'lock-step' if lockstep else 'real time'
+    chosen = chosen_domain(domain)
+    order = DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart)
+    console = terminal()
+    folder, run, complaints = record_drive(order, console)
+    recorder = recorder_parameters(order)
+    if recorder.snapshot:
+        told = tell_snapshots(folder, recorder, run, console)
+    else:
+        told = tell_drive(folder, parameters, run, console, report=report)
+    complaints += told.complaints
+    if json_file is not None:
+        write_json(told.figures, json_file)
+    if folder.figure.exists():
+        console.print(f'figure     {folder.figure}', soft_wrap=True)
+    if folder.report.exists():
+        console.print(f'report     {folder.report}', soft_wrap=True)
+    for place in told.recordings:
+        console.print(f'recording  {place}', soft_wrap=True)
+    for complaint in complaints:
+        note(console, complaint)
+    if complaints:
+        raise typer.Exit(1)

@@ -1,0 +1,77 @@
+"""`engine-mount experiment`: repeats the paper's experiments and says where they do not come out."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mount_bringup.terminal import terminal
+
+EPILOG = """Examples:
+
+`engine-mount experiment --list` - which there are
+
+`engine-mount experiment sawtooth --json sawtooth.json` - one of them
+
+`engine-mount experiment sawtooth --set sawtooth.friction.b_offset=-14` - with other pads
+
+`engine-mount experiment all --page docs/experiments.md` - all, with the page and its pictures
+"""
+
+
+def experiment(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar='NAME...', help='one, several, or all; see --list')
+    ] = None,
+    show: Annotated[bool, typer.Option('--list', help='tell which experiments there are')] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar='FOLDER', help='pictures and recordings; default: a new one in bags'),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='write the figures; of several, by name')
+    ] = None,
+    graph: Annotated[
+        bool, typer.Option('--graph', help='through the real nodes, where controller and plant take part')
+    ] = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option('--set', metavar='OWNER.NAME=VALUE', help='a parameter of the experiment or of a node'),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(metavar='FILE', help='write the page, and the pictures into figures beside it'),
+    ] = None,
+) -> None:
+    """Repeat experiments of the paper, each figure beside what the paper says.
+
+    A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
+    """
+    from mount_bringup.progress_bar import progress_bar
+    from mount_bringup.settings import SettingError
+    from mount_experiments.orders import orders, run_all
+    from mount_experiments.page import print_outcome, write_page
+    from mount_experiments.registry import EXPERIMENTS, experiments_named
+    from mount_report.drive.summary import write_json
+
+    console = terminal()
+    if show:
+        for known in EXPERIMENTS.values():
+            console.print(f'{known.name:22}{known.reference:15}{known.title}', soft_wrap=True)
+        return
+    if not names:
+        raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')
+    try:
+        given = orders(experiments_named(names), settings or [], out, graph=graph)
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
+    with progress_bar(console) as progress:
+        outcomes = run_all(given, progress)
+    for known, outcome in outcomes:
+        print_outcome(known, outcome, console)
+    if json_file is not None:
+        figures = {known.name: outcome.figures for known, outcome in outcomes}
+        write_json(figures if len(figures) > 1 else next(iter(figures.values())), json_file)
+    if page is not None:
+        write_page(outcomes, page)
+        console.print(f'page       {page}', soft_wrap=True)

@@ -1,0 +1,36 @@
+"""`engine-mount merge`: several pieces of one drive as one recording."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mount_bringup.terminal import note, terminal
+
+EPILOG = 'Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`'
+
+
+def merge(
+    recordings: Annotated[list[Path], typer.Argument(help='folders of recordings or runs, or MCAP files')],
+    out: Annotated[Path, typer.Option(help='folder to create')],
+    different_sessions: Annotated[
+        bool, typer.Option('--different-sessions', help='merge recordings of different drives, too')
+    ] = False,
+) -> None:
+    """Join recordings by log time; what stands in more than one of them is written once."""
+    from mount_bags.edit.merge import merge as merge_recordings
+    from mount_bags.run.place import open_run
+
+    opened = [open_run(path) for path in recordings]
+    done = merge_recordings(opened, out, different_sessions=different_sessions)
+    console = terminal()
+    console.print(
+        f'{done.messages} messages; {done.repeated} stood in more than one part and were written once\n'
+        f'recording  {done.folder}',
+        soft_wrap=True,
+    )
+    warnings = [warning for recording in opened for warning in recording.warnings]
+    for sentence in (*warnings, *done.holes, *done.losses):
+        note(console, sentence)
+    if done.losses:
+        raise typer.Exit(1)

@@ -1,0 +1,55 @@
+"""`engine-mount recover`: a sound recording out of a cut or damaged one."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mount_bringup.terminal import note, terminal
+
+INCOMPLETE = 3
+
+EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when
+something is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the
+command.
+
+Examples:
+
+`engine-mount recover bags/2026-11-20_18-03-11_motorway/recording`
+
+`engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
+
+All chunks whose checksum holds are kept, with topics, times, session, attachments, metadata and what the
+recorder says of its own losses. Of a last chunk that was cut off,
+whole messages are kept where its compression lets its beginning be read; no checksum vouches for
+these, and the new recording says so each time it is opened. The original is not touched.
+"""
+
+
+def recover(
+    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
+    out: Annotated[
+        Path | None, typer.Option(help='folder of the new recording; default: beside it, `..._recovered`')
+    ] = None,
+) -> None:
+    """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
+    from mount_bags.edit.recover import recover as recovered
+    from mount_bags.run.place import recording_place
+    from mount_bringup.progress_bar import progress_bar
+
+    console = terminal()
+    source = recording_place(recording)
+    target = out if out is not None else _beside(source)
+    with progress_bar(console, transient=True) as bar:
+        task = bar.add_task('recovering', total=None)
+        result = recovered(source, target, lambda done, of: bar.update(task, completed=done, total=of))
+    for sentence in result.notes:
+        note(console, sentence)
+    console.print(f'{result}; it stands in {result.folder}', soft_wrap=True)
+    if not result.complete:
+        raise typer.Exit(INCOMPLETE)
+
+
+def _beside(recording: Path) -> Path:
+    whole = recording.absolute()
+    return whole.with_name(f'{whole.name if whole.is_dir() else whole.stem}_recovered')

@@ -1,0 +1,156 @@
+"""`engine-mount replay`: a recorded displacement through the same controller again."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from mount_bringup.terminal import terminal
+from mount_cli.commands.options import Domain, JsonFile, NewFolder
+
+EPILOG = """Examples:
+
+`engine-mount replay bags/2026-11-20_18-03-11_motorway/recording` - equal to what was recorded?
+
+`engine-mount replay RECORDING --lockstep` - the same through the real nodes over topics
+
+`engine-mount replay RECORDING --set switch_on_level=0.0006 --set damper=viscous_3000` - what if?
+
+`engine-mount replay drive.mcap --map displacement=/suspension/pot.range --scale 0.001` - a foreign one
+
+`engine-mount replay RECORDING --live --rate 2` - to look at with rviz, plotjuggler, ros2 topic echo
+"""
+
+
+def replay(
+    recording: Annotated[
+        Path, typer.Argument(help='folder of a recording, or MCAP file; with --map CSV, NPY and JSON too')
+    ],
+    core: Annotated[
+        bool, typer.Option('--core', help='through the controller as function calls; the default')
+    ] = False,
+    lockstep: Annotated[
+        bool, typer.Option('--lockstep', help='through the real nodes over topics, sample by sample')
+    ] = False,
+    live: Annotated[
+        bool, typer.Option('--live', help='publish the recorded topics by the wall clock, to look at')
+    ] = False,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set',
+            metavar='NAME=VALUE',
+            help='a parameter other than recorded, of mount_control, or NODE.NAME; may be repeated',
+        ),
+    ] = None,
+    table: Annotated[
+        str, typer.Option(help='current-force table of another RECORDING, or "default": calculated')
+    ] = '',
+    maps: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--map',
+            metavar='NAME=/TOPIC.FIELD',
+            help='foreign recording: displacement, or engine_displacement and chassis_displacement',
+        ),
+    ] = None,
+    scale: Annotated[float, typer.Option(help='foreign recording: factor to m, engine minus chassis')] = 1.0,
+    offset: Annotated[
+        str, typer.Option(help='foreign recording: what is subtracted after --scale, in m, or mean')
+    ] = 'mean',
+    out: NewFolder = None,
+    json_file: JsonFile = None,
+    rate: Annotated[float, typer.Option(help='live: factor on the speed of time')] = 1.0,
+    start: Annotated[float, typer.Option('--from', help='live: where to begin, s')] = 0.0,
+    topic_names: Annotated[
+        str, typer.Option('--topics', help='live: names separated by commas, or all')
+    ] = '',
+    with_control: Annotated[
+        bool,
+        typer.Option('--with-control', help='live: mount_control answers, not the recording'),
+    ] = False,
+    domain: Domain = None,
+    namespace: Annotated[str, typer.Option(help='live: namespace of the published topics')] = '',
+) -> None:
+    """Replay a recorded displacement through the same controller and tell whether its answers are the same.
+
+    Exit code 1 if nothing was changed and the setpoints are not equal to the recorded ones to the last bit.
+    """
+    from mount_bringup.graph.domain import chosen_domain
+
+    if core + lockstep + live > 1:
+        raise typer.BadParameter('choose one of --core, --lockstep and --live')
+    console = terminal()
+    changes = _changes(settings or [])
+    if live:
+        from mount_replay.live.live import LiveOrder, play_live
+
+        if maps or table or out or json_file:
+            raise typer.BadParameter('--live only shows; --map, --table, --out and --json do not go with it')
+        order = LiveOrder(
+            recording, rate, start, topic_names, with_control, changes, chosen_domain(domain), namespace
+        )
+        play_live(order, console)
+        return
+    if rate != 1.0 or start or topic_names or with_control or namespace:
+        raise typer.BadParameter('--rate, --from, --topics, --with-control and --namespace go with --live')
+    if not maps and (scale != 1.0 or offset != 'mean'):
+        raise typer.BadParameter('--scale and --offset go with --map')
+    foreign = _foreign(maps, scale, offset) if maps else None
+    _replay(recording, lockstep, changes, table, foreign, out, json_file, chosen_domain(domain), console)
+
+
+def _replay(
+    recording: Path,
+    lockstep: bool,
+    changes: dict[str, dict[str, Any]],
+    table: str,
+    foreign: Any,
+    out: Path | None,
+    json_file: Path | None,
+    domain: int,
+    console: Console,
+) -> None:
+    from mount_bringup.progress_bar import progress_bar
+    from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder
+    from mount_replay.replay import replay as run_replay
+    from mount_replay.summary import print_replay, replay_figures
+    from mount_report.drive.summary import write_json
+
+    mode = LOCKSTEP if lockstep else CORE
+    order = ReplayOrder(recording, mode, changes, table, foreign, out, domain)
+    with progress_bar(console, transient=True) as progress:
+        task = progress.add_task(f'replaying ({mode})', total=1.0)
+        outcome = run_replay(order, lambda share: progress.update(task, completed=share))
+    figures = replay_figures(outcome)
+    print_replay(outcome, figures, console)
+    assert outcome.folder is not None
+    write_json(figures, outcome.folder.summary)
+    if json_file is not None:
+        write_json(figures, json_file)
+    console.print(f'recording  {outcome.folder.recording}', soft_wrap=True)
+    if not outcome.held:
+        raise typer.Exit(1)
+
+
+def _foreign(maps: list[str], scale: float, offset: str) -> Any:
+    from mount_replay.given.foreign import foreign_order
+
+    return foreign_order(maps, scale, offset)
+
+
+def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
+    from mount_bringup.settings import SettingError, setting_value
+    from mount_replay.replay import parsed_changes
+
+    values = {}
+    for setting in settings:
+        name, equals, text = setting.partition('=')
+        if not (equals and name):
+            raise typer.BadParameter(f'--set {setting}: write NAME=VALUE, as in quality=0.7')
+        try:
+            values[name] = setting_value(setting, text)
+        except SettingError as error:
+            raise typer.BadParameter(str(error)) from None
+    return parsed_changes(values)

@@ -1,0 +1,1 @@
+"""What experiments share: their contract, runs in closed loop, drawing, numbers."""

@@ -1,0 +1,1 @@
+"""The experiment `inductance_map`."""

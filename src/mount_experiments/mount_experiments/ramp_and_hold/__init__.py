@@ -1,0 +1,1 @@
+"""The experiment `ramp_and_hold`."""

@@ -1,0 +1,104 @@
+"""Many runs of the closed loop side by side, each in a process of its own; nothing is recorded."""
+
+import multiprocessing
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mount_bringup.chosen import Parameters
+from mount_experiments.sweep.evaluation import (
+    BELOW_ISOLATION,
+    FIRST_FREQUENCY,
+    ISOLATION_BANDS,
+    RATE,
+    peak_in,
+    rms_in,
+)
+from mount_init.initialisation import InitialisationResult
+from mount_models.sampling import SAMPLE_TIME
+from mount_replay.loop.messages import Samples
+from mount_replay.loop.run import run_core_into
+from mount_report.sections.periodic import harmonics, whole_periods
+from mount_sim.plant.plant import TRUTH
+
+FloatArray = npt.NDArray[np.float64]
+
+_NICENESS = 10  # chosen: who works at the machine comes first
+_ORDERS = 8
+_PERIODS = 16
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: its key in the results, and the parameters of all nodes."""
+
+    key: tuple[Any, ...]
+    parameters: Mapping[str, Mapping[str, Any]]
+
+
+class TruthOnly:
+    """Keeps displacement, force and chassis acceleration of a run, nothing else."""
+
+    def __init__(self) -> None:
+        self._pieces: list[FloatArray] = []
+
+    def write_samples(self, samples: Samples) -> None:
+        """Take the block's truths and empty it."""
+        truth = samples.truths[: samples.count].view(TRUTH)[:, 0]
+        names = ('displacement', 'mount_force', 'chassis_acceleration')
+        self._pieces.append(np.stack([truth[name] for name in names]))
+        samples.count = 0
+
+    def write_result(self, stamp: int, result: InitialisationResult) -> None:
+        """Let the initialisation's result pass: the controller has it."""
+
+    def write_off(self, stamp: int) -> None:
+        """Let the last setpoint pass."""
+
+    def signals(self, start: float) -> FloatArray:
+        """Return (3, n): displacement (m), force (N), acceleration (m/s^2) from `start` (s) on."""
+        return np.concatenate(self._pieces, axis=1)[:, round(start / SAMPLE_TIME) :]
+
+
+def run_all(jobs: Sequence[Job], workers: int, told: Callable[[int], None]) -> dict[tuple[Any, ...], Any]:
+    """Return {key: figures} of all jobs; `told` takes how many are done. 0 workers: one for each core."""
+    count = min(workers or len(os.sched_getaffinity(0)), len(jobs))
+    found: dict[tuple[Any, ...], Any] = {}
+    # spawned, not forked: this process may hold threads of middleware and compiler
+    context = multiprocessing.get_context('spawn')
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=os.nice, initargs=(_NICENESS,))
+    try:
+        waiting = [pool.submit(run_job, job) for job in jobs]
+        for done in as_completed(waiting):
+            key, figures = done.result()
+            found[key] = figures
+            told(len(found))
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return found
+
+
+def run_job(job: Job) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Run one job through the same closed loop as every drive in core; return its key and its figures."""
+    truth = TruthOnly()
+    outcome = run_core_into(truth, job.parameters)
+    displacement, force, acceleration = truth.signals(outcome.excitation_start)
+    if job.parameters['mount_sim']['scenario'] == 'bench':
+        return job.key, _of_bench(force, job.parameters)
+    frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(displacement.size)
+    return job.key, {
+        'peak_m': peak_in(frequency, displacement, BELOW_ISOLATION),
+        'rms': [rms_in(frequency, acceleration, band) for band in ISOLATION_BANDS],
+    }
+
+
+def _of_bench(force: FloatArray, parameters: Parameters) -> dict[str, Any]:
+    frequency = float(parameters['mount_sim']['bench.frequency'])
+    time = SAMPLE_TIME * np.arange(force.size)
+    part, _ = whole_periods(time, frequency, _PERIODS)
+    return {'harmonics_n': harmonics(time[part], force[part], frequency, _ORDERS).tolist()}

@@ -1,0 +1,16 @@
+from setuptools import find_packages, setup
+
+name = 'mount_experiments'
+
+setup(
+    name=name,
+    version='0.1.0',
+    description="The paper's experiments, repeated and told beside what the paper says.",
+    license='Apache-2.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/mount_experiments']),
+        ('share/mount_experiments', ['package.xml', 'README.md']),
+    ],
+    install_requires=['setuptools'],
+)

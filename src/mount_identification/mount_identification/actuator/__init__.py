@@ -1,0 +1,1 @@
+"""The current-force law fitted to measured points."""

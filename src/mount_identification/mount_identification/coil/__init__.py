@@ -1,0 +1,1 @@
+"""The ripple inductance over current, gap and temperature, fitted to recordings."""

@@ -1,0 +1,1 @@
+"""How the friction drifts from drive to drive."""

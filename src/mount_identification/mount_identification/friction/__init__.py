@@ -1,0 +1,1 @@
+"""The friction model fitted to recordings, beside simpler laws."""

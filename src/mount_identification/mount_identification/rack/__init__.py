@@ -1,0 +1,1 @@
+"""Recordings of a rack as files: columns, units, samples."""

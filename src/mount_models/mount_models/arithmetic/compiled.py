@@ -1,0 +1,69 @@
+"""Compile a law to machine code once per change of its source, and keep the result on disk.
+
+numba's own cache watches only the file of the compiled function: after a change in a law that
+this function calls, it would go on running the old law without a word. Here the folder of the
+cache carries a digest of all sources of the function's package, of the packages of this project that
+its file imports, and of `mount_models`, which every package may call, so a change anywhere leads to a
+new folder.
+"""
+
+import functools
+import hashlib
+import importlib.util
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import config as numba_config
+
+F = TypeVar('F', bound=Callable[..., Any])
+
+_MODELS = Path(__file__).resolve().parents[1]
+_OURS = re.compile(r'^\s*(?:from|import)\s+(mount_\w+)', re.MULTILINE)
+
+
+def compiled(function: F) -> F:
+    """Return `function` compiled by numba on its first call and cached on disk."""
+    file = Path(function.__code__.co_filename).resolve()
+    config: Any = numba_config  # numba reads the folder when it decorates
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(_cache_root() / _sources_digest(_packages_behind(file)))
+    try:
+        return cast(F, numba.njit(cache=True, error_model='numpy')(function))
+    finally:
+        config.CACHE_DIR = before
+
+
+def _package_folder(file: Path) -> Path:
+    folder = file.parent
+    while (folder.parent / '__init__.py').exists():
+        folder = folder.parent
+    return folder
+
+
+@functools.cache
+def _packages_behind(file: Path) -> tuple[Path, ...]:
+    """Return the folders of all packages whose code a function in `file` may call."""
+    folders = {_package_folder(file), _MODELS}
+    for name in set(_OURS.findall(file.read_text(encoding='utf-8'))):
+        spec = importlib.util.find_spec(name)
+        if spec is not None and spec.origin is not None:
+            folders.add(Path(spec.origin).resolve().parent)
+    return tuple(sorted(folders))
+
+
+@functools.cache
+def _sources_digest(packages: tuple[Path, ...]) -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for folder in packages:
+        for source in sorted(folder.rglob('*.py')):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_root() -> Path:
+    base = os.environ.get('XDG_CACHE_HOME') or str(Path.home() / '.cache')
+    return Path(base) / 'engine_mount' / 'compiled'

@@ -1,0 +1,1 @@
+"""One simulated drive: in real time, in lock-step, or without middleware."""

@@ -1,0 +1,209 @@
+"""One simulated drive, from the first node to the recording."""
+
+import contextlib
+import math
+import zlib
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
+
+from mount_bags.recorder.parameters import RecorderParameters, split_of
+from mount_bags.run.folder import RunFolder, make_run_folder
+from mount_bags.run.versions import versions
+from mount_bringup.chosen import Parameters
+from mount_bringup.graph.domain import domain_lock
+from mount_bringup.graph.ending_signals import ending_signals
+from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph.supervisor import Supervisor, session_text
+from mount_bringup.keyboard import MARK_KEYS, Keyboard
+from mount_bringup.progress_bar import progress_bar
+from mount_bringup.terminal import note
+from mount_control.diagnosis import fault_sentence
+from mount_models.quantity import with_flattened
+from mount_replay.drive.preflight import preflight
+from mount_replay.loop.recording import record_core
+from mount_sim.diagnosis import FINISHED, beyond_range_sentence
+from mount_sim.excitation.excitation import Excitation
+
+# A ROS domain has 250 UDP ports from 7400 on (RTPS 2.2, section 9.6.1.1), of which two for each participant
+# are in use. The bus takes one behind them: higher up the kernel gives them to anybody, and the bus would not
+# open.
+_FIRST_PORT, _PORTS_OF_DOMAIN = 7530, 250  # behind 59 participants
+_PLACES = 119  # namespaces told apart by their ports
+_SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
+
+
+@dataclass(frozen=True)
+class DriveOrder:
+    """What the user wants."""
+
+    scenario: str
+    mode: str  # 'real time', 'lock-step' or 'core'
+    parameters: dict[str, dict[str, Any]]
+    domain: int = 0
+    namespace: str = ''
+    out: Path | None = None
+    priority: int = 0
+    apart: bool = False  # in lock-step too every node has a process of its own
+
+
+def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[str, Any], list[str]]:
+    """Drive and record; return the folder, what the run itself knows, and what was not as it should be.
+
+    Raises `Interrupted`, `GraphError` or a `ValueError` with the reason.
+    """
+    excitation = preflight(order.parameters)
+    for remark in excitation.notes:
+        note(console, remark)
+    folder = make_run_folder(order.out, order.scenario)
+    complaints: list[str] = []
+    if order.mode == 'core':
+        return folder, _drive_in_core(order, excitation, folder, console, complaints), complaints
+    return folder, _drive_graph(order, excitation, folder, console, complaints), complaints
+
+
+def recorder_parameters(order: DriveOrder) -> RecorderParameters:
+    """Return the parameters of the recorder in a drive."""
+    return with_flattened(RecorderParameters(), order.parameters.get(RECORDER.name, {}))
+
+
+def _drive_graph(
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
+) -> dict[str, Any]:
+    lockstep = order.mode == 'lock-step'
+    settings = GraphSettings(
+        namespace=order.namespace,
+        domain=order.domain,
+        parameters=_node_parameters(order, folder),
+        together=_together(order),
+        priority=0 if lockstep else order.priority,
+    )
+    supervisor = Supervisor(SIMULATED, settings, folder.logs)
+    with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
+        try:
+            with console.status('starting') as status:
+                supervisor.start(
+                    lambda all_parameters: _session(order, all_parameters),
+                    lambda what: status.update(Text(what)),
+                )
+            duration = excitation.start + excitation.duration
+            limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
+            _watch_drive(order, supervisor, limit, console)
+            figures = supervisor.figures(SIM)
+            complaints += _beyond_range(int(figures['beyond_range']), float(figures['first_beyond_range_s']))
+            complaints += _control_faults(int(supervisor.figures(CONTROL).get('faults', 0)))
+        finally:
+            recorder = supervisor.figures(RECORDER)
+            if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
+                supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
+            complaints += supervisor.stop()
+            for sentence in supervisor.notes:
+                note(console, sentence)
+    return {
+        'scenario': order.scenario,
+        'mode': order.mode,
+        'samples': int(figures['samples']),
+        'excitation_start': float(figures['excitation_start_s']),
+        'real_time_factor': float(figures['real_time_factor']),
+        'latency_median_s': float(figures['latency_median_s']),
+        'latency_p99_s': float(figures['latency_p99_s']),
+    }
+
+
+def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, console: Console) -> None:
+    # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
+    keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
+    with keyboard as keys, progress_bar(console) as progress:
+        set_mark = supervisor.mark_setter(lambda answer: console.print(answer, soft_wrap=True))
+        hint = '; m or space: mark' if keys is not None and keys.present else ''
+        task = progress.add_task(f'driving ({order.scenario}{hint})', total=1.0)
+
+        def finished() -> bool:
+            figures = supervisor.figures(SIM)
+            share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
+            progress.update(task, completed=share)
+            for key in keys.wait(0.0) if keys is not None else ():
+                if key in MARK_KEYS:
+                    set_mark()
+            return figures.get('sentence') == FINISHED
+
+        supervisor.wait_until(finished, limit, 'the end of the drive')
+
+
+def _drive_in_core(
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
+) -> dict[str, Any]:
+    with progress_bar(console) as progress:
+        task = progress.add_task(f'driving ({order.scenario})', total=1.0)
+        outcome = record_core(
+            folder.recording,
+            order.parameters,
+            _session(order, order.parameters),
+            lambda share: progress.update(task, completed=share),
+            excitation=excitation,
+            namespace=order.namespace,
+            split=split_of(recorder_parameters(order)),
+        )
+    complaints += _beyond_range(outcome.beyond_range.samples, outcome.beyond_range.first)
+    complaints += _control_faults(outcome.control_faults)
+    return {
+        'scenario': order.scenario,
+        'mode': order.mode,
+        'samples': outcome.samples,
+        'excitation_start': outcome.excitation_start,
+        'real_time_factor': outcome.simulated / outcome.wall_time,
+        'latency_median_s': float('nan'),
+        'latency_p99_s': float('nan'),
+    }
+
+
+def _beyond_range(samples: int, first: float) -> list[str]:
+    return [beyond_range_sentence(samples, first)] if samples else []
+
+
+def _control_faults(faults: int) -> list[str]:
+    return [fault_sentence(faults)] if faults else []
+
+
+def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
+    lockstep = order.mode == 'lock-step'
+    can = {'interface': 'virtual' if _together(order) else 'udp_multicast', 'port': _port(order)}
+    added: dict[str, dict[str, Any]] = {
+        'mount_recorder': {'uri': str(folder.recording)},
+        'mount_driver': can,
+        'mount_sim': can,
+        # Nothing but a stalled process may end a ramp in lock-step.
+        'mount_init': {'silence_timeout': 10.0} if lockstep else {},
+        'mount_control': {},
+    }
+    return {
+        name: {'lockstep': lockstep, **values, **order.parameters.get(name, {})}
+        for name, values in added.items()
+    }
+
+
+def _together(order: DriveOrder) -> bool:
+    return order.mode == 'lock-step' and not order.apart
+
+
+def _port(order: DriveOrder) -> int:
+    """Return the UDP port of the CAN bus: one for each domain and namespace."""
+    name = order.namespace.strip('/')
+    place = 1 + zlib.crc32(name.encode()) % _PLACES if name else 0
+    return _FIRST_PORT + _PORTS_OF_DOMAIN * order.domain + place
+
+
+def _session(order: DriveOrder, parameters: Parameters) -> str:
+    return session_text(
+        {
+            'scenario': order.scenario,
+            'mode': order.mode,
+            'started': datetime.now().astimezone().isoformat(timespec='seconds'),
+            'parameters': {node: dict(values) for node, values in parameters.items()},
+            'versions': versions(),
+        }
+    )

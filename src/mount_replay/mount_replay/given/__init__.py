@@ -1,0 +1,1 @@
+"""What a replay is given: samples, ramps and parameters of a recording, ours or foreign."""

@@ -1,0 +1,1 @@
+"""A recording published by the wall clock."""

@@ -1,0 +1,65 @@
+"""The closed loop without middleware, many samples in one compiled call.
+
+It calls, in the order of the wire, what the simulated mount, the bus and the controller do anyway; there
+is no law in it. Samples that need a judgement end it: the caller takes them one by one.
+"""
+
+import math
+
+from mount_control import controller
+from mount_driver.quantisation import (
+    quantised_coil_current,
+    quantised_current_rate,
+    quantised_displacement,
+    quantised_flux_rate,
+    quantised_setpoint_current,
+)
+from mount_models.arithmetic.compiled import compiled
+from mount_sim.plant import plant
+
+
+@compiled
+def over_the_bus(displacement, coil_current, current_rate, flux_rate):
+    """Return a reading (m, A, A/s, T/s) as it arrives; NaN where it has no place in the message."""
+    current_rate = quantised_current_rate(current_rate)
+    flux_rate = quantised_flux_rate(flux_rate)
+    if math.isnan(current_rate) or math.isnan(flux_rate):
+        current_rate = flux_rate = math.nan  # the two slopes share one validity bit
+    return (
+        quantised_displacement(displacement),
+        quantised_coil_current(coil_current),
+        current_rate,
+        flux_rate,
+    )
+
+
+@compiled
+def run(ahead, memory, believable, pending, readings, setpoints, truths, traces):
+    """Take samples until one displacement is not believable; return (number taken, setpoints in A).
+
+    The two setpoints are the one that has arrived for the next sample and the one taken over last.
+
+    `ahead` is what the plant gives for n samples, `memory` that of the controller, `believable` the
+    largest displacement (m), `pending` the setpoint (A) that arrived before the first sample. Filled for
+    each sample taken: `readings` (n, 4) as they arrive, `setpoints` (n,) in A as they leave,
+    `truths` and `traces` (n, bytes of their records).
+    """
+    last, mount = pending, ahead.memory
+    for index in range(len(setpoints)):
+        displacement, coil_current, current_rate, flux_rate = plant.read(
+            mount.plant, mount.state, truths[index], ahead.noise[index]
+        )
+        reading = over_the_bus(displacement, coil_current, current_rate, flux_rate)
+        if not abs(reading[0]) <= believable:  # also NaN
+            return index, pending, last
+        setpoint = controller.step(
+            memory.law, memory.tables, memory.state, memory.window, traces[index], reading[0], 0
+        )
+        for place in range(4):
+            readings[index, place] = reading[place]
+        setpoints[index] = setpoint
+        current = 0.0 if ahead.driver_open else pending
+        values, forces = ahead.values[index], ahead.engine_forces[index]
+        plant.advance(mount.plant, mount.state, mount.seat, values, forces, current, mount.step_time)
+        last, pending = pending, quantised_setpoint_current(setpoint)
+    return len(setpoints), pending, last

@@ -1,0 +1,134 @@
+"""The messages of a run without middleware: those that the nodes would publish, packed many at a time."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from numpy.typing import NDArray
+
+from mount_control.controller import TRACE
+from mount_init.initialisation import OFF, InitialisationResult
+from mount_models.sampling import SAMPLE_TIME
+from mount_ros import topics
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.force_table import to_message
+from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
+from mount_ros.messages.temperature import temperature_layout
+from mount_ros.topics import Topic
+from mount_sim.electronics.electronics import STATUS_EVERY
+from mount_sim.node import level_imu
+from mount_sim.plant.plant import TRUTH
+
+_STATUS_PERIOD = round(STATUS_EVERY * SAMPLE_TIME * 1e9)  # ns
+
+Write = Callable[[Topic, bytes, int], None]
+"""Takes (topic, serialised message, stamp ns)."""
+Columns = Sequence[tuple[Topic, Rows]]
+"""For each topic one serialised message per sample, all of one length; in the order within a sample."""
+WriteColumns = Callable[[Columns, NDArray[np.int64]], None]
+"""Takes the messages of some samples and the samples' stamps (ns)."""
+
+
+class Samples:
+    """Answered samples in a row; what stands behind `count` is not valid."""
+
+    def __init__(self, capacity: int):
+        self.count = 0
+        self.stamps = np.zeros(capacity, np.int64)  # ns
+        self.readings = np.zeros((capacity, 4))  # as they arrive: m, A, A/s, T/s
+        self.setpoints = np.zeros(capacity)  # A
+        self.truths = np.zeros((capacity, TRUTH.itemsize), np.uint8)  # records `TRUTH`
+        self.traces = np.zeros((capacity, TRACE.itemsize), np.uint8)  # records `TRACE`, where `traced`
+        self.traced = np.zeros(capacity, bool)
+
+    @property
+    def room(self) -> int:
+        """How many more samples there is room for."""
+        return len(self.stamps) - self.count
+
+
+class CoreMessages:
+    """Packs samples and results and hands them on in the order of the stamps."""
+
+    def __init__(self, write: Write, coil_celsius: float, write_columns: WriteColumns | None = None):
+        """Without `write_columns` every message goes to `write`; `coil_celsius` is what each status says."""
+        self._coil_celsius = coil_celsius
+        self._write = write
+        self._write_columns = write_columns or self._one_by_one
+        self._displacement = ScalarsLayout(topics.DISPLACEMENT)
+        self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
+        self._temperature = temperature_layout()
+        self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
+        self._air_gap = ScalarsLayout(topics.AIR_GAP)
+        self._trace = ScalarsLayout(topics.CONTROL_TRACE)
+        self._truth = ScalarsLayout(topics.SIM_TRUTH)
+        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
+        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+
+    def write_samples(self, samples: Samples) -> None:
+        """Write all samples and empty the block."""
+        stamps = samples.stamps[: samples.count]
+        for begin, end in _alike(samples.traced[: samples.count]):
+            part = slice(begin, end)
+            self._write_with_temperatures(self._columns(samples, part), stamps[part])
+        samples.count = 0
+
+    def write_off(self, stamp: int) -> None:
+        """Write the setpoint of a controller that is switched off."""
+        self._write(topics.CURRENT_SETPOINT, self._setpoint.pack(stamp, (OFF,)), stamp)
+
+    def write_result(self, stamp: int, result: InitialisationResult) -> None:
+        """Write what an initialisation found."""
+        numbers = [getattr(result, name) for name in self._air_gap.names]
+        self._write(topics.AIR_GAP, self._air_gap.pack(stamp, numbers), stamp)
+        table = serialised(to_message(stamp, result.table))
+        self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
+
+    def _write_with_temperatures(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
+        """Write the columns up to each sample with a status, then the temperature of that, and go on."""
+        begin = 0
+        for end in (np.flatnonzero(stamps % _STATUS_PERIOD == 0) + 1).tolist():
+            self._write_columns([(topic, rows[begin:end]) for topic, rows in columns], stamps[begin:end])
+            stamp = int(stamps[end - 1])
+            self._write(topics.COIL_TEMPERATURE, self._temperature.pack(stamp, self._coil_celsius), stamp)
+            begin = end
+        if begin < len(stamps):
+            self._write_columns([(topic, rows[begin:]) for topic, rows in columns], stamps[begin:])
+
+    def _columns(self, samples: Samples, part: slice) -> Columns:
+        stamps, readings = samples.stamps[part], samples.readings[part]
+        truth = samples.truths[part].view(TRUTH)[:, 0]
+        unknown = np.full(len(stamps), math.nan)
+        ripple = self._ripple.pack_rows(stamps, np.stack([readings[:, 1], unknown], 1), readings[:, 2:])
+        columns = [
+            (topics.DISPLACEMENT, self._displacement.pack_rows(stamps, readings[:, :1])),
+            (topics.COIL_RIPPLE, ripple),
+            (topics.CURRENT_SETPOINT, self._setpoint.pack_rows(stamps, samples.setpoints[part, None])),
+            (topics.SIM_TRUTH, self._truth.pack_rows(stamps, _numbers(samples.truths[part]))),
+            (
+                topics.SIM_CHASSIS_ACCELERATION,
+                self._acceleration.pack_rows(stamps, truth['chassis_acceleration']),
+            ),
+            (topics.SIM_MOUNT_FORCE, self._force.pack_rows(stamps, truth['mount_force'])),
+        ]
+        if samples.traced[part.start]:
+            traces = self._trace.pack_rows(stamps, _numbers(samples.traces[part]))
+            columns.append((topics.CONTROL_TRACE, traces))
+        return columns
+
+    def _one_by_one(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
+        for place, stamp in enumerate(stamps.tolist()):
+            for topic, rows in columns:
+                self._write(topic, rows[place].tobytes(), stamp)
+
+
+def _numbers(records: NDArray[np.uint8]) -> NDArray[np.float64]:
+    return records.view(np.float64)
+
+
+def _alike(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yield (begin, end) of the stretches of equal flags."""
+    changes = (np.flatnonzero(np.diff(flags)) + 1).tolist()
+    if len(flags):
+        yield from zip([0, *changes], [*changes, len(flags)], strict=True)

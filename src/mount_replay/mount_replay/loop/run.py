@@ -1,0 +1,164 @@
+"""A simulated drive without middleware; its recording holds the same data topics as that of the graph."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mount_bringup.chosen import Parameters
+from mount_control.controller import Controller
+from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
+from mount_init.initialisation import OFF, InitialisationResult
+from mount_models.quantity import with_flattened
+from mount_replay.loop import compiled_loop as loop
+from mount_replay.loop.chain import CoreChain
+from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
+from mount_sim.electronics.electronics import STATUS_EVERY, Reading
+from mount_sim.excitation.excitation import Excitation
+from mount_sim.excitation.scenario import build_excitation
+from mount_sim.parameters import SimParameters
+from mount_sim.plant.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
+
+_SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
+_BLOCK = 1000  # samples, chosen: packed and written together
+
+
+@dataclass(frozen=True)
+class CoreOutcome:
+    """What a core run did; times in s."""
+
+    samples: int
+    excitation_start: float
+    simulated: float
+    wall_time: float
+    result: InitialisationResult | None
+    beyond_range: BeyondRange
+    control_faults: int = 0  # times that the controller found its memory spoiled
+
+
+class Sink(Protocol):
+    """What takes the samples of a run; `write_samples` empties the block that it is given."""
+
+    def write_samples(self, samples: Samples) -> None: ...
+
+    def write_result(self, stamp: int, result: InitialisationResult) -> None: ...
+
+    def write_off(self, stamp: int) -> None: ...
+
+
+def run_core(
+    parameters: Parameters,
+    write: Write,
+    progress: Callable[[float], None] = lambda share: None,
+    write_columns: WriteColumns | None = None,
+    excitation: Excitation | None = None,
+) -> CoreOutcome:
+    """Run the scenario in `parameters` to its end and hand every message to `write`.
+
+    With `write_columns` those of the samples go there, many at a time. `excitation` is that of the scenario
+    where it is built already.
+    """
+    messages = CoreMessages(write, _coil_temperature(_sim_parameters(parameters)), write_columns)
+    return run_core_into(messages, parameters, progress, excitation)
+
+
+def run_core_into(
+    messages: Sink,
+    parameters: Parameters,
+    progress: Callable[[float], None] = lambda share: None,
+    excitation: Excitation | None = None,
+) -> CoreOutcome:
+    """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
+    sim = _sim_parameters(parameters)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
+    chain = CoreChain(parameters)
+    celsius = _coil_temperature(sim)
+    samples = Samples(_BLOCK)
+    pending: float | None = None
+    begin = time.monotonic()
+    while not mount.finished:
+        if not samples.room:
+            messages.write_samples(samples)
+            progress(mount.sample / mount.run.samples)
+        if pending is not None and chain.controller is not None and chain.expects(_stamp(mount)):
+            taken, pending = _take_many(mount, chain, chain.controller, samples, pending)
+            if taken:
+                continue
+        if mount.sample % STATUS_EVERY == 0:
+            chain.take_temperature(_stamp(mount), celsius)
+        pending = _take_one(mount, chain, samples, pending)
+        if chain.result is not None and not chain.controlled:
+            messages.write_samples(samples)
+            messages.write_result(_stamp(mount) - _SAMPLE_NANOSECONDS, chain.result)
+    setpoint = samples.setpoints[samples.count - 1]
+    messages.write_samples(samples)
+    if chain.controlled and setpoint != OFF:
+        messages.write_off(_stamp(mount) - _SAMPLE_NANOSECONDS)  # as mount_control when it is deactivated
+    return CoreOutcome(
+        samples=mount.sample,
+        excitation_start=mount.run.excitation_start * SAMPLE_TIME,
+        simulated=mount.time,
+        wall_time=time.monotonic() - begin,
+        result=chain.result,
+        beyond_range=mount.beyond_range,
+        control_faults=chain.controller.faults if chain.controller is not None else 0,
+    )
+
+
+def _sim_parameters(parameters: Parameters) -> SimParameters:
+    return with_flattened(SimParameters(), parameters.get('mount_sim', {}))
+
+
+def _coil_temperature(sim: SimParameters) -> float:
+    """Return the coil temperature (degC) as the electronics' status tells it."""
+    return quantised_coil_temperature(sim.electronics.coil_temperature)
+
+
+def _stamp(mount: SimulatedMount) -> int:
+    return mount.sample * _SAMPLE_NANOSECONDS
+
+
+def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float | None) -> float:
+    """Take one sample and return the setpoint (A) as it arrives for the next."""
+    place, stamp = samples.count, _stamp(mount)
+    reading = Reading(*loop.over_the_bus(*mount.measure()))
+    setpoint = chain.answer(stamp, reading)
+    samples.stamps[place] = stamp
+    samples.readings[place] = reading
+    samples.setpoints[place] = setpoint
+    samples.truths[place] = np.frombuffer(mount.truth_bytes, np.uint8)
+    samples.traced[place] = chain.traced
+    if chain.traced and chain.controller is not None:
+        samples.traces[place] = np.frombuffer(chain.controller.trace_bytes, np.uint8)
+    samples.count += 1
+    mount.advance(pending)
+    return quantised_setpoint_current(setpoint)
+
+
+def _take_many(
+    mount: SimulatedMount, chain: CoreChain, controller: Controller, samples: Samples, pending: float
+) -> tuple[int, float]:
+    """Take samples while nothing is doubtful; return how many, and the setpoint (A) for the next."""
+    ahead = mount.ahead(samples.room)
+    part = slice(samples.count, samples.count + len(ahead.values))
+    taken, arrived, last = loop.run(
+        ahead,
+        controller.memory,
+        chain.displacement_range,
+        pending,
+        samples.readings[part],
+        samples.setpoints[part],
+        samples.truths[part],
+        samples.traces[part],
+    )
+    if taken:
+        stamps = _stamp(mount) + _SAMPLE_NANOSECONDS * np.arange(taken)
+        part = slice(samples.count, samples.count + taken)
+        samples.stamps[part] = stamps
+        samples.traced[part] = True
+        samples.count += taken
+        chain.follow(int(stamps[-1]), taken)
+        mount.skip(taken, last)
+    return taken, arrived

@@ -1,0 +1,67 @@
+"""What a drive says of its recorder, without the graph."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from mount_bags.run.folder import make_run_folder
+from mount_bringup.graph.nodes import CONTROL, RECORDER
+from mount_replay.drive import drive
+from mount_replay.drive.drive import DriveOrder
+from mount_sim.diagnosis import FINISHED
+from mount_sim.excitation.excitation import Excitation, Seat
+
+SENTENCE = 'the run goes on without recording: no space left'
+
+
+class Graph:
+    """A graph whose recorder has failed, looked at a thousand times until the simulator has finished."""
+
+    def __init__(self, *_):
+        self.notes = []
+
+    def start(self, session, status):
+        pass
+
+    def interrupt(self):
+        pass
+
+    def mark_setter(self, tell):
+        return lambda: None
+
+    def wait_until(self, condition, limit, what):
+        for _ in range(1000):
+            condition()
+
+    def figures(self, node):
+        if node is RECORDER:
+            return {'failed': 'True', 'fatal': 'False', 'sentence': SENTENCE}
+        if node is CONTROL:
+            return {}
+        figures = ('samples', 'excitation_start_s', 'real_time_factor', 'latency_median_s', 'latency_p99_s')
+        unshaken = {'beyond_range': '0', 'first_beyond_range_s': 'nan'}
+        return {'sentence': FINISHED, **unshaken, **dict.fromkeys(figures, '1')}
+
+    def stop(self):
+        return []
+
+
+@pytest.mark.parametrize('mode', ['real time', 'lock-step'])
+def test_a_drive_that_goes_on_without_its_recording_says_so_once(tmp_path, monkeypatch, mode):
+    monkeypatch.setattr(drive, 'Supervisor', Graph)
+    console = Console(record=True, file=io.StringIO())
+    folder = make_run_folder(tmp_path / 'run', 'bench')
+    order = DriveOrder('bench', mode, {}, domain=0)
+    drive._drive_graph(order, Excitation(Seat.BENCH, [], 5e-5, 0.0), folder, console, [])
+    assert console.export_text().count('goes on without recording') == 1
+
+
+def test_each_domain_and_namespace_has_a_bus_of_its_own_where_nobody_else_is_given_a_port():
+    orders = [
+        DriveOrder('bench', 'real time', {}, domain, name) for domain in range(101) for name in ('', 'left')
+    ]
+    ports = [drive._port(order) for order in orders]
+    assert len(set(ports)) == len(orders)
+    assert max(ports) < 32768  # above, Linux gives ports to whoever asks for any
+    assert min((port - 7400) % 250 for port in ports) >= 130  # below are the participants of the domain

@@ -1,0 +1,1 @@
+"""Figures of a drive, pages and pictures about recordings."""

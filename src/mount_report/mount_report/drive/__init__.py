@@ -1,0 +1,1 @@
+"""The figures, the summary and the picture of one drive."""

@@ -1,0 +1,187 @@
+"""What a drive says at its end: the figures of `--json`, and the same for people."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from mount_bags.audit.audit import TopicAudit
+from mount_bags.audit.losses import Losses
+from mount_bags.audit.peak_current import peak_current
+from mount_bags.bag.recording import Recording
+from mount_bags.events.switching_changes import switching_times
+from mount_bags.recorder.parameters import RecorderParameters
+from mount_bringup.chosen import Parameters, chosen_damper, control_parameters
+from mount_bringup.mount_choice import seat_of
+from mount_report.drive.evaluation import Drive, excitation_stamp, tracking_error
+from mount_sim.plant.mounts import without_friction
+
+SUMMARISED = {'sim/truth': ('rest_gap', 'contact_gap')}
+"""Columns that `summarise` asks for beside those of `load_drive`, by topic."""
+
+_UM, _MM, _US = 1e6, 1e3, 1e6
+
+
+def summarise(
+    recording: Recording,
+    audits: Mapping[str, TopicAudit],
+    found: Losses,
+    drive: Drive,
+    parameters: Parameters,
+    run: dict[str, Any],
+) -> dict[str, Any]:
+    """Return the figures of a drive from its recording, its audit and its losses; `run` brings the others.
+
+    `run`: `scenario`, `mode`, `excitation_start`, `real_time_factor`, `latency_median_s`, `latency_p99_s`.
+    Times are s on the recording's time axis, from which `drive` counts too. Unknown or not applicable is
+    null.
+    """
+    gap = recording['air_gap']
+    truth = recording['sim/truth']
+    start = (excitation_stamp(recording, run['excitation_start']) - drive.zero) / 1e9
+    friction = _friction_figures(recording, audits, drive, parameters)
+    return {
+        'recording': str(recording.path),
+        'scenario': run['scenario'],
+        'mode': run['mode'],
+        'mount': seat_of(parameters),
+        'excitation_start_s': start,
+        'duration_s': float(drive.time[-1] - max(drive.time[0], start)),
+        'samples': found.samples,
+        'lost_samples': found.lost_samples,
+        'lost_messages': found.lost_messages,
+        'asked_samples': found.asked,
+        'unanswered_samples': found.unanswered,
+        'late_samples': found.late,
+        'faults': found.as_json()['faults'],
+        'real_time_factor': run['real_time_factor'],
+        'rest_gap_m': float(gap['rest_gap'][-1]),
+        'contact_gap_m': float(gap['contact_gap'][-1]),
+        'rest_gap_std_m': float(gap['rest_gap_std'][-1]),
+        'contact_gap_std_m': float(gap['contact_gap_std'][-1]),
+        'true_rest_gap_m': float(truth['rest_gap'][-1]),
+        'true_contact_gap_m': float(truth['contact_gap'][-1]),
+        'offset_current_a': float(gap['offset_current'][-1]),
+        'switch_on_s': friction.switch_on,
+        'switch_off_s': friction.switch_off,
+        'peak_displacement_m': float(np.nanmax(np.abs(drive.displacement))),
+        'peak_current_a': friction.peak_current,
+        'tracking_error_rms': friction.tracking_error,
+        'latency_median_s': _known(run['latency_median_s']),
+        'latency_p99_s': _known(run['latency_p99_s']),
+    }
+
+
+@dataclass(frozen=True)
+class _FrictionFigures:
+    """What the control did to the friction; all None with a mount in which it can do nothing."""
+
+    switch_on: list[float] | None = None
+    switch_off: list[float] | None = None
+    peak_current: float | None = None
+    tracking_error: float | None = None
+
+
+def _friction_figures(
+    recording: Recording, audits: Mapping[str, TopicAudit], drive: Drive, parameters: Parameters
+) -> _FrictionFigures:
+    if without_friction(seat_of(parameters)):
+        return _FrictionFigures()
+    trace = recording['control_trace']
+    order = np.argsort(trace.stamps, kind='stable')
+    time = (trace.stamps[order] - drive.zero) / 1e9
+    on, off = switching_times(time, trace['damping_active'][order])
+    error = tracking_error(drive, control_parameters(parameters), chosen_damper(parameters))
+    return _FrictionFigures(on.tolist(), off.tolist(), _known(peak_current(recording, audits)), _known(error))
+
+
+def summarise_snapshots(snapshots: list[Path], run: dict[str, Any]) -> dict[str, Any]:
+    """Return the figures of a drive that recorded only events: those of `run`, as in `summarise`."""
+    return {
+        'snapshots': [str(place) for place in snapshots],
+        'scenario': run['scenario'],
+        'mode': run['mode'],
+        'samples': run['samples'],
+        'real_time_factor': run['real_time_factor'],
+        'latency_median_s': _known(run['latency_median_s']),
+        'latency_p99_s': _known(run['latency_p99_s']),
+    }
+
+
+def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
+    """Return what a drive with `--snapshot` saved."""
+    if not count:
+        return 'No event came, so no snapshot was saved; m or space sets one by hand in real time.'
+    noun = 'snapshot was' if count == 1 else 'snapshots were'
+    return (
+        f'{count} {noun} saved, up to {parameters.snapshot:g} s before an event and '
+        f'{parameters.snapshot_after:g} s after it; figures of the drive need a full recording.'
+    )
+
+
+def write_json(figures: dict[str, Any], file: Path) -> None:
+    """Write the figures as JSON."""
+    file.write_text(json.dumps(figures, indent=2, allow_nan=False) + '\n')
+
+
+def print_summary(figures: dict[str, Any], found: Losses, console: Console) -> None:
+    """Print the figures as a table; times are s from the first displacement sample."""
+    table = Table(title=f'{figures["scenario"]}, {figures["mode"]}', show_header=False, title_justify='left')
+    table.add_column(style='bold')
+    table.add_column()
+    for name in ('rest', 'contact'):
+        measured, std = _UM * figures[f'{name}_gap_m'], _UM * figures[f'{name}_gap_std_m']
+        true = _UM * figures[f'true_{name}_gap_m']
+        table.add_row(f'{name} gap', f'{measured:.1f} ± {std:.1f} um measured, {true:.1f} um true')
+    table.add_row('excitation', f'from {figures["excitation_start_s"]:.2f} s on')
+    table.add_row('peak displacement', f'{_MM * figures["peak_displacement_m"]:.2f} mm')
+    for row in _friction_rows(figures):
+        table.add_row(*row)
+    for name, text in found.rows():
+        table.add_row(name, Text(text))
+    table.add_row('latency', _latency_text(figures))
+    table.add_row('speed', f'{figures["real_time_factor"]:.2f} x real time')
+    console.print(table)
+
+
+def _switching_text(figures: dict[str, Any]) -> str:
+    ons, offs = figures['switch_on_s'], figures['switch_off_s']
+    if not ons:
+        return 'never on'
+    pairs = [(on, next((off for off in offs if off > on), None)) for on in ons]
+    shown = [f'{on:.2f} s to {f"{off:.2f} s" if off is not None else "the end"}' for on, off in pairs]
+    more = f' and {len(shown) - 6} more' if len(shown) > 6 else ''
+    return 'on from ' + ', '.join(shown[:6]) + more
+
+
+def _friction_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    if reason := without_friction(figures['mount']):
+        return [('friction', f'not applicable: {reason}')]
+    peak = figures['peak_current_a']
+    return [
+        ('damping switched', _switching_text(figures)),
+        ('peak current', 'unknown' if peak is None else f'{peak:.2f} A'),
+        ('friction force error', _percent(figures['tracking_error_rms'], 'rms of the peak wanted force')),
+    ]
+
+
+def _latency_text(figures: dict[str, Any]) -> str:
+    median, p99 = figures['latency_median_s'], figures['latency_p99_s']
+    if median is None or p99 is None:
+        return 'none (no middleware)'
+    return f'{_US * median:.0f} us median, {_US * p99:.0f} us in 99 of 100 (sample sent to setpoint back)'
+
+
+def _percent(value: float | None, of_what: str) -> str:
+    return 'damping was never on' if value is None else f'{100 * value:.1f} % {of_what}'
+
+
+def _known(value: float) -> float | None:
+    return None if value is None or math.isnan(value) else float(value)

@@ -1,0 +1,76 @@
+"""Writes the page and the pictures of a report, with a progress bar."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from mount_bags.bag.recording import Recording
+from mount_bags.compare.alignment import ComparisonError
+from mount_bags.compare.compare import compare
+from mount_bringup.progress_bar import progress_bar
+from mount_bringup.terminal import note
+from mount_report.report import ReportError, make_report, subjects_of
+from mount_report.run_facts import run_facts
+
+PAGE = 'report.html'
+
+
+def default_page(path: Path) -> Path:
+    """Return where the page of the recording or run at `path` goes: into the run's folder, else beside it."""
+    if (path / 'recording').is_dir():
+        return path / PAGE
+    if path.name == 'recording' and path.is_dir():
+        return path.absolute().parent / PAGE
+    return path.absolute().with_name(f'{path.absolute().name if path.is_dir() else path.stem}_{PAGE}')
+
+
+def default_pictures(page: Path) -> Path:
+    """Return the folder of the PNGs beside `page`: its name without `.html`."""
+    named = page.name.removesuffix('.html')
+    return page.with_name(named if named != page.name else f'{named}_pictures')
+
+
+def write_report(
+    recordings: Sequence[Recording],
+    other: Recording | None,
+    file: Path,
+    pictures: Path | None,
+    console: Console,
+) -> list[Path]:
+    """Write the page to `file` and its figures into `pictures` unless that is None; return those files.
+
+    With `other`, it shares the figures and its differences from the first recording are told. What could
+    not be made of the page is printed. Raises `ReportError`.
+    """
+    with progress_bar(console, transient=True) as progress:
+        task = progress.add_task('reading', total=1.0)
+
+        def on_step(what: str, share: float) -> None:
+            progress.update(task, description=what, completed=share)
+
+        together = [*recordings, *([other] if other is not None else [])]
+        subjects = subjects_of(together, run_facts)
+        on_step('comparing', 0.2)
+        comparison = _comparison(recordings[0], other)
+        made = make_report(subjects, comparison, lambda what, share: on_step(what, 0.2 + 0.4 * share))
+        for failure in made.failures:
+            note(console, failure)
+        on_step('writing the page', 0.6)
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            made.write_page(file)
+            if pictures is None:
+                return []
+            return made.write_pictures(pictures, lambda what, share: on_step(what, 0.7 + 0.3 * share))
+        except OSError as error:
+            raise ReportError(
+                f'{error.filename or file} cannot be written: {error.strerror}; choose another --out'
+            ) from None
+
+
+def _comparison(first: Recording, other: Recording | None):
+    try:
+        return None if other is None else compare(first, other)
+    except ComparisonError as error:
+        raise ReportError(f'{error}; without --compare both can share a page') from None

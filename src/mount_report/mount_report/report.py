@@ -1,0 +1,142 @@
+"""The report of one or several recordings: all sections, the page, and the pictures."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
+from mount_bags.bag.recording import Recording
+from mount_bags.compare.alignment import ComparisonError, align
+from mount_bags.compare.compare import Comparison
+from mount_report.drawing.interactive import POINTS
+from mount_report.drawing.page import page
+from mount_report.sections import run_sections
+from mount_report.sections import signal_sections as sections
+from mount_report.sections.section import Section
+from mount_report.sections.subject import RunFacts, Subject
+from mount_report.signals import Signals
+
+OnStep = Callable[[str, float], None]
+"""Hears what is being done, and the share of all that is done."""
+
+_TOGETHER = 6  # recordings in one report: more colours cannot be told apart
+
+
+class ReportError(ValueError):
+    """A report cannot be made; the text says why."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A finished report, to be written."""
+
+    title: str
+    sections: Sequence[Section]
+    points: int
+    failures: Sequence[str] = ()  # a sentence for each section that could not be made
+
+    def write_page(self, file: Path) -> None:
+        """Write the HTML page; raises `OSError`."""
+        file.write_text(page(self.title, self.sections, self.points), encoding='utf-8')
+
+    def write_pictures(self, folder: Path, on_picture: OnStep = lambda what, share: None) -> list[Path]:
+        """Write each chart as a PNG of its name into `folder`, and return their paths; raises `OSError`."""
+        from mount_report.drawing.picture import draw_chart  # what draws takes a second to load
+
+        folder.mkdir(parents=True, exist_ok=True)
+        charts = [section.chart for section in self.sections if section.chart is not None]
+        files = []
+        for place, chart in enumerate(charts):
+            on_picture(f'drawing {chart.name}.png', place / len(charts))
+            files.append(folder / f'{chart.name}.png')
+            draw_chart(chart, files[-1])
+        return files
+
+
+def subjects_of(
+    recordings: Sequence[Recording], facts: Callable[[Signals], RunFacts] = lambda signals: RunFacts()
+) -> list[Subject]:
+    """Return the recordings as subjects of one report, on one time axis.
+
+    Each has its own time axis; a recording whose stamps are those of the first one, such as a
+    cut or a replay, keeps its place on the first one's axis. Raises `ReportError` for too many.
+    """
+    if len(recordings) > _TOGETHER:
+        raise ReportError(
+            f'{len(recordings)} recordings in one report are too many to tell apart; at most {_TOGETHER}'
+        )
+    first = Signals(recordings[0], _names(recordings)[0])
+    all_signals = [first]
+    for recording, name in zip(recordings[1:], _names(recordings)[1:], strict=True):
+        zero = first.zero if _shares_stamps(recordings[0], recording) else None
+        all_signals.append(Signals(recording, name, zero))
+    return [Subject(signals, facts(signals)) for signals in all_signals]
+
+
+def make_report(
+    subjects: Sequence[Subject],
+    comparison: Comparison | None = None,
+    on_step: OnStep = lambda what, share: None,
+) -> Report:
+    """Return the report of `subjects`; a `comparison` adds the differences that it found.
+
+    In the place of a section that could not be made stands why.
+    """
+    audits, found = [], []
+    for place, subject in enumerate(subjects):
+        on_step(f'auditing {subject.name}', 0.3 * place / len(subjects))
+        audits.append(audit(subject.signals.recording))
+        found.append(losses(subject.signals.recording, audits[-1]))
+    makers: list[tuple[str, Callable[[], Section | None]]] = [
+        ('traces', lambda: sections.traces(subjects)),
+        ('signals', lambda: sections.plain(subjects)),
+        ('switching', lambda: sections.switching(subjects)),
+        ('loops', lambda: sections.loops(subjects)),
+        ('harmonics', lambda: sections.harmonic_content(subjects)),
+        ('spectra', lambda: sections.spectra(subjects)),
+        ('sweep', lambda: sections.sweep_view(subjects)),
+        ('coil', lambda: run_sections.coil(subjects)),
+        ('tracking', lambda: run_sections.tracking(subjects)),
+        ('losses', lambda: run_sections.losses(subjects, audits, found)),
+        ('differences', lambda: None if comparison is None else run_sections.differences(comparison)),
+        ('parameters', lambda: run_sections.parameters(subjects)),
+    ]
+    made: list[Section] = []
+    failures: list[str] = []
+    for place, (what, make) in enumerate(makers):
+        on_step(what, 0.3 + 0.7 * place / len(makers))
+        made += _section_or_reason(what, make, failures)
+    # Last, for it also says what the others looked for in vain.
+    overview = _section_or_reason(
+        'overview', lambda: run_sections.overview(subjects, audits, found), failures
+    )
+    title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
+    return Report(title, [*overview, *made], POINTS // len(subjects), failures)
+
+
+def _section_or_reason(what: str, make: Callable[[], Section | None], failures: list[str]) -> list[Section]:
+    try:
+        section = make()
+    except Exception as error:  # whatever it stumbles over: the other sections are worth having
+        reason = str(error) or type(error).__name__
+        failures.append(f'section {what} could not be made: {reason}')
+        return [Section(what, what.capitalize(), [f'Section {what} could not be made: {reason}'])]
+    return [] if section is None else [section]
+
+
+def _names(recordings: Sequence[Recording]) -> list[str]:
+    """Return short names that differ."""
+    names = [recording.path.absolute() for recording in recordings]
+    for parts in (1, 2, 3):
+        short = ['/'.join([each for each in path.parts if each != 'recording'][-parts:]) for path in names]
+        if len(set(short)) == len(short):
+            return short
+    return [f'{number}: {path}' for number, path in enumerate(names, 1)]
+
+
+def _shares_stamps(first: Recording, other: Recording) -> bool:
+    try:
+        return align(first, other).first.same_stamps
+    except ComparisonError:
+        return False

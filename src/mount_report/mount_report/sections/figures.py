@@ -1,0 +1,217 @@
+"""The charts of a report, each from plain arrays in SI units; several series of one kind share a chart.
+
+Whoever measures something may draw it with these: no recording is needed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Bars, Chart, Curve, Level, Panel, Span
+
+_MM = 1e3
+TIME_LABEL = 'time from the first sample (s)'
+
+
+@dataclass(frozen=True)
+class Named:
+    """A series of numbers `y` over `x` with the name that the legend gives it; empty: only one is drawn."""
+
+    name: str
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Switching levels (m) and limit of the current (A); None where they are not known."""
+
+    switch_on: float | None = None
+    switch_off: float | None = None
+    current_limit: float | None = None
+
+
+def time_traces(
+    displacements: Sequence[Named],
+    currents: Sequence[Named],
+    levels: Levels,
+    damping: Sequence[tuple[float, float]] = (),
+    title: str = 'Displacement and current',
+    name: str = 'time_traces',
+    limits: tuple[float, float] | None = None,
+) -> Chart:
+    """Return displacement (m) with both switching levels above current (A), over time (s), as in Fig. 15.
+
+    `damping` are the stretches in which damping is on.
+    """
+    panels = []
+    if displacements:
+        panels.append(
+            Panel(
+                'displacement (mm)',
+                [_curve(series, place, 'displacement', _MM) for place, series in enumerate(displacements)],
+                levels=_switching_levels(levels),
+                share=1.5,
+            )
+        )
+    if currents:
+        panels.append(
+            Panel('current (A)', [_curve(series, place, 'current') for place, series in enumerate(currents)])
+        )
+    return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', limits)
+
+
+def hysteresis_loops(
+    mount_forces: Sequence[Named],
+    friction_forces: Sequence[Named],
+    title: str = 'Loss hysteresis',
+    name: str = 'hysteresis',
+) -> Chart:
+    """Return mount force and friction force (N) over displacement (m), as in Fig. 13 left."""
+    panels = [
+        Panel(label, [_curve(series, place, short, x_factor=_MM) for place, series in enumerate(group)])
+        for label, short, group in (
+            ('mount force (N)', 'mount force', mount_forces),
+            ('friction force (N)', 'friction force', friction_forces),
+        )
+        if group
+    ]
+    return Chart(name, title, 'displacement (mm)', panels)
+
+
+def harmonics_bars(
+    amplitudes: Sequence[tuple[str, Array]],
+    title: str = 'Harmonics of the mount force',
+    name: str = 'harmonics',
+) -> Chart:
+    """Return the amplitudes (N) of harmonics 1, 2, ..., as in Fig. 13 right; logarithmic."""
+    count = max(len(values) for _, values in amplitudes)
+    bars = [
+        Bars(each or 'mount force', np.arange(1.0, len(values) + 1.0), values, place)
+        for place, (each, values) in enumerate(amplitudes)
+    ]
+    ticks = tuple(float(number) for number in range(1, count + 1))
+    return Chart(name, title, 'harmonic', [Panel('amplitude (N)', bars=bars, log=True)], ticks=ticks)
+
+
+def spectra(
+    groups: Sequence[tuple[str, Sequence[Named]]],
+    highest: float = 60.0,
+    title: str = 'Spectra',
+    name: str = 'spectra',
+) -> Chart:
+    """Return amplitude spectral densities over frequency (Hz); each group is a panel with its own label."""
+    panels = [
+        Panel(
+            label,
+            [_curve(_within(series, highest), place, label) for place, series in enumerate(group)],
+            log=True,
+        )
+        for label, group in groups
+    ]
+    return Chart(name, title, 'frequency (Hz)', panels, limits=(0.0, highest))
+
+
+def sweep_bands(
+    peaks: Sequence[Named],
+    accelerations: Sequence[Named] = (),
+    level: float | None = None,
+    title: str = 'Sweep',
+    name: str = 'sweep',
+) -> Chart:
+    """Return the peak displacement (m) of each band of frequency (Hz), below it the rms acceleration (m/s^2).
+
+    The x of a series are the lower edges of its bands; as in Fig. 14. `level` (m) is that of switching on.
+    """
+    levels = [] if level is None else [Level(f'switch-on level, {_MM * level:g} mm', _MM * level)]
+    panels = [
+        Panel(
+            'peak displacement (mm)',
+            [
+                _curve(_held(series), place, 'displacement', _MM, steps=True)
+                for place, series in enumerate(peaks)
+            ],
+            levels=levels,
+        )
+    ]
+    if accelerations:
+        panels.append(
+            Panel(
+                'chassis acceleration,\nrms (m/s²)',
+                [
+                    _curve(_held(series), place, 'acceleration', steps=True)
+                    for place, series in enumerate(accelerations)
+                ],
+            )
+        )
+    return Chart(name, title, 'frequency of the excitation (Hz)', panels)
+
+
+def tracking(
+    wanted: Sequence[Named],
+    actual: Sequence[Named],
+    damping: Sequence[tuple[float, float]] = (),
+    limits: tuple[float, float] | None = None,
+    title: str = 'Friction force against the wanted one',
+    name: str = 'tracking',
+) -> Chart:
+    """Return wanted and true friction force (N) over time (s), and their difference."""
+    forces = [_curve(series, 2 * place, 'wanted', dash=DASHED) for place, series in enumerate(wanted)]
+    forces += [_curve(series, 2 * place + 1, 'true') for place, series in enumerate(actual)]
+    errors = [
+        _curve(Named(one.name, other.x, other.y - np.interp(other.x, one.x, one.y)), 2 * place + 1, 'error')
+        for place, (one, other) in enumerate(zip(wanted, actual, strict=True))
+    ]
+    panels = [Panel('friction force (N)', forces, share=1.6), Panel('true minus wanted (N)', errors)]
+    return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', limits)
+
+
+def plain_traces(
+    groups: Sequence[tuple[str, Sequence[Named]]], title: str = 'Recorded signals', name: str = 'signals'
+) -> Chart:
+    """Return any signals over time (s), each group with its label in a panel of its own."""
+    panels = [
+        Panel(label, [_curve(series, place, label) for place, series in enumerate(group)])
+        for label, group in groups
+    ]
+    return Chart(name, title, TIME_LABEL, panels)
+
+
+def _curve(
+    series: Named,
+    colour: int,
+    what: str,
+    factor: float = 1.0,
+    x_factor: float = 1.0,
+    dash: str = SOLID,
+    steps: bool = False,
+) -> Curve:
+    named = f'{what}, {series.name}' if series.name else what
+    return Curve(named, x_factor * series.x, factor * series.y, colour, dash, steps)
+
+
+def _switching_levels(levels: Levels) -> list[Level]:
+    return [
+        Level(f'{name}, {_MM * value:g} mm', _MM * value, dash, both=True)
+        for name, value, dash in (
+            ('switch-on level', levels.switch_on, DASHED),
+            ('switch-off level', levels.switch_off, DOTTED),
+        )
+        if value is not None
+    ]
+
+
+def _spans(stretches: Sequence[tuple[float, float]]) -> list[Span]:
+    return [Span(begin, end) for begin, end in stretches]
+
+
+def _within(series: Named, highest: float) -> Named:
+    shown = (series.x > 0.0) & (series.x <= highest)
+    return Named(series.name, series.x[shown], series.y[shown])
+
+
+def _held(series: Named) -> Named:
+    """Return the series with the end of its last band, so that steps show all of it."""
+    width = float(np.min(np.diff(series.x))) if len(series.x) > 1 else 1.0
+    return Named(series.name, np.append(series.x, series.x[-1] + width), np.append(series.y, series.y[-1]))

@@ -1,0 +1,311 @@
+"""The sections of a report about the run itself: figures, coil, tracking, losses, differences, parameters."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from mount_bags.audit.audit import TopicAudit
+from mount_bags.audit.losses import Losses
+from mount_bags.audit.peak_current import peak_current
+from mount_bags.audit.report import sentences as audit_sentences
+from mount_bags.compare.compare import Comparison
+from mount_bags.compare.quantity_text import quantity_text, time_text
+from mount_bags.compare.words import by_importance
+from mount_bags.compare.words import sentences as comparison_sentences
+from mount_bags.run.session_differences import session_values
+from mount_report.sections import figures
+from mount_report.sections.coil_load import CoilLoad, coil_load
+from mount_report.sections.figures import Named
+from mount_report.sections.section import Section, Table
+from mount_report.sections.subject import Subject
+from mount_report.sections.wording import Sentences
+from mount_report.signals import Signal
+from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, SIM_TRUTH
+
+_COVERING = 0.95  # chosen: this share of the longest counts as all
+_ROWS = 25  # of the table of differences
+_HEAD_OF_SESSION = ('scenario', 'mode', 'started')
+
+
+Audits = Sequence[dict[str, TopicAudit]]
+
+
+def overview(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses]) -> Section:
+    """Return the figures that one wants to see first, and what the recordings lack, in words."""
+    columns = [_figures(*each) for each in zip(subjects, audits, found, strict=True)]
+    rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
+    words, said = [], Sentences(subjects)
+    for subject in subjects:
+        prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
+        words += [f'{prefix}{warning}.' for warning in subject.signals.recording.warnings]
+        if subject.signals.missing:
+            said.say(subject, f'missing: {"; ".join(subject.signals.missing)}')
+    words += said.told()
+    return Section(
+        'overview', 'Overview', words, None, [Table(('', *(each.name for each in subjects)), rows)]
+    )
+
+
+def coil(subjects: Sequence[Subject]) -> Section:
+    """Return current and heat of the coil."""
+    said, rows = Sentences(subjects), []
+    for subject in subjects:
+        prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
+        if subject.facts.without_friction:
+            said.say(subject, f'not applicable: {subject.facts.without_friction}')
+            continue
+        current, what = _current(subject)
+        if current is None:
+            said.say(subject, 'no current was recorded')
+            continue
+        said.say(subject, f'{what}; {subject.facts.resistance_remark}')
+        setpoint = subject.signals.signal(CURRENT_SETPOINT.name, 'coil_current')
+        for stretch, inside in _stretches(subject, current):
+            load = _load(subject, current, inside, setpoint)
+            rows.append((f'{prefix}{stretch}', *_load_cells(load)))
+    head = (
+        '', 'time (s)', 'rms current (A)', 'highest (A)', 'heat R i² (W)', 'heat (J)', 'at the limit (%)',
+    )  # fmt: skip
+    return Section(
+        'coil', 'Current and load of the coil', said.told(), None, [Table(head, rows)] if rows else []
+    )
+
+
+def tracking(subjects: Sequence[Subject]) -> Section:
+    """Return the true friction force against the one that the chosen damper would have."""
+    wanted, actual, said = [], [], Sentences(subjects)
+    damping: list[tuple[float, float]] = []
+    for subject in subjects:
+        found = subject.facts.tracking
+        if found is None:
+            said.say(subject, subject.facts.tracking_remark)
+            continue
+        name = subject.name if len(subjects) > 1 else ''
+        wanted.append(Named(name, found.time, found.wanted))
+        actual.append(Named(name, found.time, found.actual))
+        damping = damping or subject.signals.damping() or []
+        error = (
+            'damping was never on, so there is no error to tell'
+            if math.isnan(found.error)
+            else f'rms error while damping is on: {100.0 * found.error:.1f} % of the peak wanted force'
+        )
+        said.say(subject, error)
+        said.say(subject, subject.facts.tracking_remark)
+    chart = figures.tracking(wanted, actual, damping, _around(damping)) if wanted and damping else None
+    return Section('tracking', 'Tracking error against the truth', said.told(), chart)
+
+
+def losses(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses]) -> Section:
+    """Return what is missing of each topic, and the faults."""
+    words, tables = [], []
+    for subject, topics, figure in zip(subjects, audits, found, strict=True):
+        prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
+        told = audit_sentences(topics, figure)
+        words.append(f'{prefix}{told[-1]}')
+        if figure.faults:
+            faults = [(time_text(fault.time), fault.node, fault.sentence) for fault in figure.faults]
+            tables.append(Table(('time', 'node', 'fault'), faults, f'{prefix}faults'))
+        rows = [
+            (
+                name,
+                *(_count(value) for value in (entry.expected, entry.present, entry.lost, entry.duplicated)),
+                _scaled(entry.longest_gap_s, 1e3),
+                _scaled(entry.jitter_s, 1e6),
+                entry.remark,
+            )
+            for name, entry in topics.items()
+        ]
+        marked = frozenset(place for place, entry in enumerate(topics.values()) if not entry.sound)
+        head = (
+            'topic', 'expected', 'present', 'lost', 'twice', 'longest gap (ms)', 'jitter (µs)', 'remark',
+        )  # fmt: skip
+        tables.append(Table(head, rows, prefix.removesuffix(': '), marked))
+    return Section('losses', 'Losses and faults', words, None, tables)
+
+
+def differences(comparison: Comparison) -> Section:
+    """Return in words and figures how B differs from A."""
+    words = [
+        f'A is {comparison.name_a}, B is {comparison.name_b}; {comparison.alignments.sentence}.',
+        *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
+    ]
+    ordered = by_importance(comparison.signals)
+    rows = [
+        (
+            signal.name,
+            f'{signal.differing} of {signal.samples}',
+            '' if signal.first is None else time_text(signal.first.time),
+            'unknown'
+            if signal.largest is None
+            else quantity_text(abs(signal.largest.difference), signal.unit),
+            '' if signal.largest is None else time_text(signal.largest.time),
+            quantity_text(signal.rms, signal.unit),
+        )
+        for signal in ordered[:_ROWS]
+    ]
+    if len(ordered) > _ROWS:
+        words.append(f'{len(ordered) - _ROWS} more signals differ than the table holds.')
+    head = ('signal', 'samples that differ', 'first', 'largest', 'at', 'rms')
+    return Section('differences', 'Differences', words, None, [Table(head, rows)] if rows else [])
+
+
+def parameters(subjects: Sequence[Subject]) -> Section:
+    """Return parameters and versions, those that differ between the recordings marked."""
+    told = [session_values(subject.signals.session) for subject in subjects]
+    words = [
+        f'{subject.name}: the recording has no session message, so parameters and versions are not known.'
+        for subject, values in zip(subjects, told, strict=True)
+        if not values
+    ]
+    if any(told):
+        words.append('Parameters that a run without nodes does not list have their defaults.')
+    names = list(dict.fromkeys(name for values in told for name in values))
+    versions = [name for name in names if name.startswith('versions.')]
+    others = [name for name in names if name not in versions and name not in _HEAD_OF_SESSION]
+    heads = ('', *(subject.name for subject in subjects))
+    tables = [
+        _parameter_table(heads, group, told, title, folded)
+        for group, title, folded in ((versions, 'Versions', False), (others, 'Parameters', len(others) > 20))
+        if group
+    ]
+    return Section('parameters', 'Parameters and versions', words, None, tables)
+
+
+def _parameter_table(
+    heads: Sequence[str], names: Sequence[str], told: Sequence[dict], title: str, folded: bool
+) -> Table:
+    rows = [(name.removeprefix('versions.'), *(_value(values, name) for values in told)) for name in names]
+    marked = frozenset(place for place, row in enumerate(rows) if len(set(row[1:])) > 1)
+    return Table(heads, rows, title, marked, folded)
+
+
+def _value(values: dict, name: str) -> str:
+    if name not in values:
+        return '' if values else 'not known'
+    value = values[name]
+    return (
+        f'{value:g}'
+        if isinstance(value, float)
+        else ', '.join(map(str, value))
+        if isinstance(value, list)
+        else str(value)
+    )
+
+
+def _figures(subject: Subject, topics: dict[str, TopicAudit], found: Losses) -> dict[str, str]:
+    recording, session = subject.signals.recording, session_values(subject.signals.session)
+    moved = subject.displacement()
+    return {
+        'recording': str(recording.path),
+        **{name: str(session.get(name, 'not known')) for name in _HEAD_OF_SESSION},
+        'messages': str(recording.message_count),
+        'length': 'not known' if moved is None else quantity_text(float(np.ptp(moved.time)), 's', 5),
+        'peak displacement': _highest(moved, 'm'),
+        **_friction_figures(subject, topics),
+        **dict(found.rows()),
+    }
+
+
+def _friction_figures(subject: Subject, topics: dict[str, TopicAudit]) -> dict[str, str]:
+    if subject.facts.without_friction:
+        names = ('peak current', 'damping switched on', 'friction force error')
+        return dict.fromkeys(names, f'not applicable: {subject.facts.without_friction}')
+    spans = subject.signals.damping()
+    peak = peak_current(subject.signals.recording, topics)
+    error = subject.facts.tracking.error if subject.facts.tracking else math.nan
+    return {
+        'peak current': 'not recorded' if math.isnan(peak) else quantity_text(peak, 'A'),
+        'damping switched on': 'not recorded'
+        if spans is None
+        else f'{len(spans)} times'
+        if len(spans) != 1
+        else 'once',
+        'friction force error': 'not known'
+        if math.isnan(error)
+        else f'{100.0 * error:.1f} % rms of the peak wanted force',
+    }
+
+
+def _highest(signal: Signal | None, unit: str) -> str:
+    if signal is None or not np.isfinite(signal.values).any():
+        return 'not recorded'
+    return quantity_text(float(np.nanmax(np.abs(signal.values))), unit)
+
+
+def _current(subject: Subject) -> tuple[Signal | None, str]:
+    """Return the current that is known for most of the recording, and what it is; the truest of equals."""
+    found = [
+        (signal, what)
+        for topic, what in (
+            (SIM_TRUTH, 'the true coil current'),
+            (COIL_RIPPLE, 'the measured mean coil current'),
+            (CURRENT_SETPOINT, 'the current setpoint, for the current was not recorded throughout'),
+        )
+        if (signal := subject.signals.signal(topic.name, 'coil_current')) is not None
+    ]
+    lengths = [int(np.count_nonzero(np.isfinite(signal.values))) for signal, _ in found]
+    for (signal, what), length in zip(found, lengths, strict=True):
+        if length > 0 and length >= _COVERING * max(lengths):
+            return signal, what
+    return None, ''
+
+
+def _stretches(subject: Subject, current: Signal) -> list[tuple[str, np.ndarray]]:
+    """Return the parts of a recording over which the load is told, as masks of the samples."""
+    time = current.time
+    found = [('whole recording', np.full(len(time), True))]
+    begin = subject.active_from()
+    if math.isfinite(begin) and (time >= begin).any():
+        found.append(('while control was active', time >= begin))
+    on = np.zeros(len(time), bool)
+    for first, last in subject.signals.damping() or []:
+        on |= (time >= first) & (time < last)
+    if on.any():
+        found.append(('while damping was on', on))
+    return found
+
+
+def _load(
+    subject: Subject, current: Signal, inside: np.ndarray, setpoint: Signal | None
+) -> tuple[CoilLoad, float]:
+    """Return the load by the current, and the share of time at which the setpoint is at its limit."""
+    masked = np.where(inside, current.values, np.nan)
+    load = coil_load(current.time, masked, subject.facts.resistance, None)
+    if setpoint is None or subject.facts.levels.current_limit is None:
+        return load, math.nan
+    first, last = current.time[inside][0], current.time[inside][-1]
+    chosen = np.interp(setpoint.time, current.time, inside.astype(float)) > 0.5
+    within = chosen & (setpoint.time >= first) & (setpoint.time <= last)
+    asked = np.where(within, setpoint.values, np.nan)
+    limited = coil_load(setpoint.time, asked, subject.facts.resistance, subject.facts.levels.current_limit)
+    return load, limited.share_at_limit
+
+
+def _load_cells(found: tuple[CoilLoad, float]) -> tuple[str, ...]:
+    load, share = found
+    return (
+        f'{load.duration:.2f}',
+        _digits(load.rms_current, 3),
+        _digits(load.peak_current, 3),
+        _digits(load.mean_heat, 3),
+        _digits(load.energy, 2),
+        _digits(100.0 * share, 2),
+    )
+
+
+def _digits(value: float, digits: int) -> str:
+    return 'not known' if math.isnan(value) else f'{value:.{digits}f}'
+
+
+def _around(damping: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+    """Return limits that show the first time with damping on."""
+    return (damping[0][0] - 0.2, min(damping[0][1], damping[0][0] + 1.0) + 0.2) if damping else None
+
+
+def _count(value: int | None) -> str:
+    return '' if value is None else str(value)
+
+
+def _scaled(value: float, factor: float) -> str:
+    return '' if math.isnan(value) else f'{factor * value:.1f}'

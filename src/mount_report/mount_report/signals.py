@@ -1,0 +1,126 @@
+"""The signals of a recording as arrays over seconds, and what it lacks, in words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_bags.bag.origin import short_name
+from mount_bags.bag.recording import ReadingError, Recording
+from mount_bags.events.recorded_events import recorded_marks
+from mount_bags.events.switching_changes import switching_times
+from mount_bags.messages.series import Series, SeriesError
+from mount_bags.messages.time_axis import time_axis
+from mount_bags.run.session_differences import session_text
+from mount_report.drawing.chart import Array
+from mount_ros.messages.event import Mark
+from mount_ros.topics import (
+    COIL_RIPPLE,
+    CONTROL_TRACE,
+    CURRENT_SETPOINT,
+    DISPLACEMENT,
+    SIM_CHASSIS_ACCELERATION,
+    SIM_MOUNT_FORCE,
+    SIM_TRUTH,
+)
+
+# What a report may ask for, to be read in one pass. The first names stand for their topics.
+_SHOWN = {
+    DISPLACEMENT.name: ('mount',),
+    COIL_RIPPLE.name: ('coil_current',),
+    CURRENT_SETPOINT.name: ('coil_current',),
+    CONTROL_TRACE.name: (CONTROL_TRACE.names[0], 'damping_active', 'current'),
+    SIM_TRUTH.name: (
+        *('displacement', 'velocity', 'mount_force', 'friction_force'),
+        *('coil_current', 'road_height', 'chassis_acceleration'),
+    ),
+    SIM_MOUNT_FORCE.name: ('wrench.force.z',),
+    SIM_CHASSIS_ACCELERATION.name: ('linear_acceleration.z',),
+}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One signal: times in s on the recording's time axis, rising, and values in SI units."""
+
+    time: Array
+    values: Array
+
+
+class Signals:
+    """The signals of one recording. What is asked for and not there is noted in `missing`, in words."""
+
+    def __init__(self, recording: Recording, name: str = '', zero: int | None = None):
+        """Take a recording and what to call it; `zero` (ns): where time begins, if not as its axis says."""
+        self.recording = recording
+        self.name = name or short_name(recording)
+        self.missing: list[str] = []
+        self._found: dict[tuple[str, str], Signal | None] = {}
+        self._orders: dict[str, tuple[Array, slice | NDArray[np.int64]]] = {}  # times, places of the values
+        recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
+        self.axis = time_axis(recording)
+        self.zero = self.axis.zero if zero is None else zero
+
+    @property
+    def session(self) -> str:
+        """The text of its session message, empty where it has none."""
+        try:
+            return session_text(self.recording)
+        except (ReadingError, SeriesError):
+            return ''
+
+    def signal(self, topic: str, column: str) -> Signal | None:
+        """Return a column of a topic, None (and a note in `missing`) where it cannot be had."""
+        key = (topic, column)
+        if key not in self._found:
+            try:
+                series = self.recording[topic]
+                self._found[key] = self._ordered(series, series[column]) if len(series) else None
+                if not len(series):
+                    self._note(f'{topic} has no message')
+            except ReadingError:
+                self._note(self._absence(topic))
+                self._found[key] = None
+            except SeriesError as error:
+                self._note(f'not as this project records it: {error}')
+                self._found[key] = None
+        return self._found[key]
+
+    def damping(self) -> list[tuple[float, float]] | None:
+        """Return the stretches (s) in which damping was on, None where the recording does not tell."""
+        active = self.signal(CONTROL_TRACE.name, 'damping_active')
+        if active is None:
+            return None
+        on, off = switching_times(active.time, active.values)
+        ends = np.append(off, active.time[-1])
+        return [(float(begin), float(ends[np.searchsorted(ends, begin)])) for begin in on]
+
+    def marks(self) -> list[tuple[float, Mark]]:
+        """Return its marks with their times (s), none where there is no readable topic of them."""
+        shift = (self.axis.zero - self.zero) / 1e9
+        try:
+            return [
+                (self.axis.of_mark(mark.time, time) + shift, mark)
+                for marks in recorded_marks(self.recording).values()
+                for time, mark in marks
+            ]
+        except (ReadingError, SeriesError):
+            return []
+
+    def _ordered(self, series: Series, values: Array) -> Signal:
+        if series.topic not in self._orders:
+            stamps, first = np.unique(series.stamps, return_index=True)
+            in_order = np.array_equal(first, np.arange(len(series)))
+            self._orders[series.topic] = (stamps - self.zero) / 1e9, slice(None) if in_order else first
+        time, places = self._orders[series.topic]
+        return Signal(time, np.asarray(values, np.float64)[places])
+
+    def _absence(self, topic: str) -> str:
+        alike = [name for name in self.recording if name.endswith(f'/{topic}')]
+        if len(alike) > 1:
+            return f'{topic} is there more than once ({", ".join(alike)}); cut out one mount first'
+        return f'there is no topic {topic}'
+
+    def _note(self, sentence: str) -> None:
+        if sentence not in self.missing:
+            self.missing.append(sentence)

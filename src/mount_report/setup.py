@@ -1,0 +1,16 @@
+from setuptools import find_packages, setup
+
+name = 'mount_report'
+
+setup(
+    name=name,
+    version='0.1.0',
+    description='Figures of a drive, pages and pictures about recordings.',
+    license='Apache-2.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/mount_report']),
+        ('share/mount_report', ['package.xml', 'README.md']),
+    ],
+    install_requires=['setuptools'],
+)

@@ -1,0 +1,220 @@
+"""A lifecycle node that fails closed: every error ends in the safe state, with a sentence that says why."""
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+from mount_ros.data_path import DataPath, DataThread
+from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
+from mount_ros.nodes.parameter_gate import Change, ParameterGate
+from mount_ros.nodes.scheduling import calm_resending
+
+
+class ServedPath(Protocol):
+    """What carries the data of a node, as far as the lifecycle needs to know it."""
+
+    refused: int
+    refusal: str
+
+    @property
+    def failure(self) -> str:
+        """Why its thread has ended by itself; empty while it serves."""
+
+    def unmatched(self) -> list[str]:
+        """Return the names of the topics that nobody on the other side has been found for yet."""
+
+    def stop(self) -> None:
+        """End serving; safe to call twice."""
+
+
+class SafeLifecycleNode(LifecycleNode):
+    """Base of all nodes of the graph.
+
+    A node overrides `configure`, `activate`, `deactivate`, `cleanup` and `judge`; it raises an
+    exception with a clear sentence where a step cannot be done. `deactivate` must leave the coil at
+    0 A and is called on every way out of the active state.
+
+    Once it is configured its parameters stand still, except those in `run_time_parameters`.
+    """
+
+    run_time_parameters: frozenset[str] = frozenset()
+    """Names of the parameters that can be set on the configured node: `check_parameters`, `take_changes`."""
+
+    def __init__(self, name: str, **arguments):
+        super().__init__(name, **arguments)
+        self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
+        self._lockstep = bool(self.declare_parameter('lockstep', False).value)
+        self.data_path: ServedPath | None = None
+        self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
+        self.after_configure: Callable[[], None] = _nothing  # what a process wants done then
+        self.after_failure: Callable[[], None] = _nothing  # and when a thread of the node has ended by itself
+        self.ending = threading.Event()  # set when the process is told to end: long work must look at it
+        self._active = False
+        self._refusal = ''
+        self._diagnostics = Diagnostics(self, self._present_verdict)
+        self._diagnostics.start()
+
+    # What a node fills in.
+
+    def configure(self) -> None:
+        """Read and check the parameters, create what needs them."""
+
+    def activate(self) -> None:
+        """Begin to work."""
+
+    def deactivate(self) -> None:
+        """Stop working and leave 0 A behind."""
+
+    def cleanup(self) -> None:
+        """Release what `configure` made."""
+
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        """Raise a `ValueError` if the configured node could not go on with these values, {name: value}."""
+
+    def take_changes(self, changes: Mapping[str, Change]) -> None:
+        """Go on with the parameters as they are now; `changes` were set while the node was configured."""
+
+    def judge(self) -> Verdict:
+        """Return the verdict on the active node; must be quick and must not block."""
+        return Verdict(Level.OK, 'active')
+
+    # State.
+
+    @property
+    def sentence(self) -> str:
+        """What the node says of itself now."""
+        return self._present_verdict().sentence
+
+    @property
+    def active(self) -> bool:
+        """Whether the node is in its active state."""
+        return self._active
+
+    @property
+    def lockstep(self) -> bool:
+        """Whether time stands in the stamps alone; as it was when the node was configured."""
+        return self._lockstep
+
+    def open_data_path(self) -> DataPath:
+        """Create the data path of this node; the node starts it when all subscriptions stand."""
+        thread = self.data_thread or DataThread(self.context, self.tell_failure)
+        path = DataPath(self, lockstep=self.lockstep, thread=thread)
+        self.data_path = path
+        return path
+
+    def tell_failure(self, sentence: str) -> None:
+        """Say that a thread of the node has ended by itself; the process ends the node then."""
+        self.get_logger().fatal(sentence)
+        self.after_failure()
+
+    def close(self) -> None:
+        """Leave the active state and release everything; called once at the end of the process."""
+        with self._diagnostics.pause:
+            if self._active:
+                self._leave_active()
+            self._release()
+
+    def destroy_node(self) -> None:
+        """Destroy the node at once; rclpy leaves it in the graph until nothing refers to its services."""
+        self._diagnostics.stop()
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
+
+    # Transitions.
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._lockstep = bool(self.get_parameter('lockstep').value)
+        outcome = self._attempt('configure', self.configure, undo=self._release)
+        if outcome == TransitionCallbackReturn.SUCCESS:
+            self._gate.close()
+        self.after_configure()
+        return outcome
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        calm_resending()
+        outcome = self._attempt('activate', self.activate, undo=self.deactivate)
+        self._active = outcome == TransitionCallbackReturn.SUCCESS
+        return outcome
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._leave_active()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._release()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _LifecycleNodeMixin__change_state(self, transition_id):  # noqa: N802
+        # rclpy lets a transition that is not valid in the present state end the process with an
+        # exception; a node that drives a coil answers "no" and goes on.
+        try:
+            with self._diagnostics.pause:
+                return super()._LifecycleNodeMixin__change_state(transition_id)  # type: ignore[misc]
+        except Exception as error:
+            self.get_logger().warning(f'transition {transition_id} refused: {error}')
+            return TransitionCallbackReturn.FAILURE
+
+    def _attempt(self, what, step, undo) -> TransitionCallbackReturn:
+        try:
+            step()
+        except Exception as error:
+            # The border of the node: whatever the reason, say it, be safe, stay alive.
+            known = isinstance(error, (ValueError, OSError))
+            self._refusal = str(error) if known else f'{type(error).__name__}: {error}'
+            self.get_logger().error(f'{what} failed: {self._refusal}')
+            self._diagnostics.publish(self._present_verdict())
+            self._make_safe(undo)
+            return TransitionCallbackReturn.FAILURE
+        self._refusal = ''
+        return TransitionCallbackReturn.SUCCESS
+
+    def _leave_active(self) -> None:
+        self._active = False
+        self._make_safe(self.deactivate)
+
+    def _release(self) -> None:
+        self._gate.open()
+        self._make_safe(self.cleanup)
+        path, self.data_path = self.data_path, None
+        if path is not None:
+            self._make_safe(path.stop)
+
+    def _make_safe(self, step) -> None:
+        try:
+            step()
+        except Exception as error:
+            self.get_logger().error(f'{step.__name__} failed: {type(error).__name__}: {error}')
+
+    def _present_verdict(self) -> Verdict:
+        path = self.data_path
+        verdict = self._verdict_without_path()
+        if path is not None and path.failure:
+            verdict = Verdict(Level.ERROR, path.failure, {**verdict.figures, 'fatal': True})
+        elif path is not None and path.refused and verdict.level is Level.OK:
+            sentence = f'errors in the data path ({path.refused}), the last: {path.refusal}'
+            verdict = Verdict(Level.WARN, sentence, verdict.figures)
+        unmatched = ', '.join(path.unmatched()) if path is not None else 'not configured'
+        state = 'active' if self._active else 'inactive'
+        figures = {**verdict.figures, 'state': state, 'unmatched': unmatched}
+        return Verdict(verdict.level, verdict.sentence, figures)
+
+    def _verdict_without_path(self) -> Verdict:
+        if self._refusal:
+            return Verdict(Level.ERROR, self._refusal)
+        if not self._active:
+            return Verdict(Level.OK, 'inactive')
+        return self.judge()
+
+
+def _nothing() -> None:
+    """No process of its own."""

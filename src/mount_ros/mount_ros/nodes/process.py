@@ -1,0 +1,148 @@
+"""The life of a process: nodes are made, served, and ended with exit code 0 on SIGINT and SIGTERM."""
+
+import contextlib
+import gc
+import os
+import signal
+import threading
+import traceback
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import rclpy
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from mount_ros.data_path import DataThread
+from mount_ros.environment import prepare_environment
+from mount_ros.nodes.leaving import end_process, leave_middleware
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+
+_SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
+
+Create = Callable[[], SafeLifecycleNode]
+
+
+def run_node(create: Create, args: list[str] | None = None) -> None:
+    """Run one lifecycle node until the process is told to end by SIGINT or SIGTERM."""
+    run_nodes([create], args)
+
+
+def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
+    """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's rest.
+
+    At the end they are closed in reverse order, so that who sends setpoints ends before who carries them.
+    An exception in one of them or in a thread of its data ends all in the same way, with exit code 1.
+    """
+    prepare_environment()
+    # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    nodes = [create() for create in creates]
+    data_thread = DataThread(nodes[0].context, nodes[0].tell_failure)
+    over = _Ending()
+    for node in nodes:
+        node.data_thread = data_thread
+        node.after_configure = _freeze
+        node.after_failure = over.tell_failure
+    over.listen(signal.SIGINT, signal.SIGTERM)
+    _freeze()
+    services = [_Service(node, over) for node in nodes]
+    over.wait()
+    for node in nodes:
+        node.ending.set()
+    # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
+    for service in services:
+        service.end()
+    for node in reversed(nodes):
+        node.close()
+    code = 1 if over.failed else 0
+    if not leave_middleware(partial(_take_down, nodes)) or code:
+        end_process(code)
+
+
+def _freeze() -> None:
+    """Collect garbage now, and never look again at what stands: a full collection takes tens of milliseconds.
+
+    Done when something large has been set up and nobody waits for an answer yet.
+    """
+    gc.collect()
+    gc.freeze()
+
+
+def wake(executor: Executor) -> None:
+    """End the `spin_once` of another thread; `Executor.wake` alone lets it look and sleep on."""
+    executor.create_task(_nothing)
+
+
+def _nothing() -> None:
+    """Something to do."""
+
+
+def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
+    for node in reversed(nodes):
+        node.destroy_node()
+    rclpy.try_shutdown()
+
+
+class _Ending:
+    """Lets the main thread sleep until a signal or a thread tells it that the process shall end.
+
+    By a pipe: a lock, as in `threading.Event`, is held for ever by a second signal that comes amid the first.
+    It is written to where the signal arrives, before Python knows of it: a handler in Python waits for the
+    main thread to go on, which one that falls asleep just then never does.
+    """
+
+    def __init__(self) -> None:
+        self._read, self._write = os.pipe()
+        os.set_blocking(self._write, False)
+        self.failed = False
+
+    def listen(self, *signals: int) -> None:
+        """Wake the main thread by these signals too."""
+        signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+        for number in signals:
+            signal.signal(number, lambda *_: None)
+
+    def tell(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # full: it has been told often enough
+            os.write(self._write, b'.')
+
+    def tell_failure(self) -> None:
+        self.failed = True
+        self.tell()
+
+    def wait(self) -> None:
+        os.read(self._read, 1)
+
+
+class _Service:
+    """The thread that serves the rest of a node: transitions, parameters, diagnostics.
+
+    It sleeps until something arrives: whatever wakes Python there takes the interpreter from the data path.
+    """
+
+    def __init__(self, node: SafeLifecycleNode, over: _Ending):
+        self._node = node
+        self._over = over
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._thread = threading.Thread(target=self._serve, name=node.get_name())
+        self._thread.start()
+
+    def end(self) -> None:
+        self._node.ending.set()
+        wake(self._executor)
+        self._thread.join()
+        self._executor.remove_node(self._node)
+        self._executor.shutdown()
+
+    def _serve(self) -> None:
+        try:
+            while rclpy.ok() and not self._node.ending.is_set():
+                self._executor.spin_once(_SPIN_PERIOD)
+        except Exception as error:
+            # The border of the process: nobody would close the nodes, and the others would live on alone.
+            traceback.print_exc()
+            self._node.tell_failure(f'{type(error).__name__}: {error}')
+        finally:
+            self._over.tell()

@@ -1,0 +1,119 @@
+"""The far end of the CAN bus: sends what the electronics measure, receives and judges setpoints."""
+
+import math
+import time
+from dataclasses import dataclass
+
+import can
+
+from mount_driver.bus import may_have_frames
+from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
+from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
+from mount_driver.frame import Frame
+from mount_sim.electronics.electronics import Reading
+
+_COUNTER_MASK = 0xFFFF
+_MICROSECOND_MASK = 0xFFFFFFFF
+_CREDIBLE_AGE = 10.0  # s, chosen: a frame's time stamp that is farther from now is of another clock
+
+
+@dataclass(frozen=True)
+class ReceivedSetpoint:
+    """A setpoint with the time of its arrival by the system clock (s), NaN where the bus does not tell it."""
+
+    setpoint: Setpoint
+    arrival: float
+
+    def answers(self, counter: int) -> bool:
+        """Whether it answers the sample with this counter."""
+        return self.setpoint.enable and self.setpoint.answered_counter == counter
+
+    def late(self, number: int) -> int:
+        """Return how many samples too late it is for sample `number`, which takes it over; it may be off.
+
+        0 for the answer to the sample before. One to a sample that is not yet taken is later than all others.
+        """
+        return (number - 1 - self.setpoint.answered_counter) & _COUNTER_MASK if self.setpoint.enable else 0
+
+
+class CanEnd:
+    """Electronics' side of `mount.dbc` on an open bus."""
+
+    def __init__(self, bus: can.BusABC):
+        self._bus = bus
+        self._codec = MountCodec()
+        self._measurement_alive = AliveCounter()
+        self._status_alive = AliveCounter()
+        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint, self._codec.setpoint)
+
+    @property
+    def failed_setpoints(self) -> int:
+        """Setpoint frames that failed their check and were not used: damaged, repeated, of wrong sequence."""
+        return self._receiver.failed
+
+    def measurement_frame(
+        self, number: int, microseconds: int, reading: Reading, enabled: bool
+    ) -> can.Message:
+        """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock.
+
+        What lies beyond the limits of its signal, and so of its sensor, is sent as not valid.
+        """
+        codec = self._codec
+        measurement = Measurement(
+            number & _COUNTER_MASK,
+            microseconds & _MICROSECOND_MASK,
+            codec.displacement.within(reading.displacement),
+            codec.coil_current.within(reading.coil_current),
+            codec.current_rate.within(reading.current_rate),
+            codec.flux_rate.within(reading.flux_rate),
+            enabled=enabled,
+        )
+        data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
+        return Frame(self._codec.measurement.frame_id, data)
+
+    def send_status(self, status: Status) -> None:
+        """Send the slow health message."""
+        data = self._codec.encode_status(status, self._status_alive.next())
+        self.send_frame(Frame(self._codec.status.frame_id, data))
+
+    def send_frame(self, frame: can.Message) -> None:
+        """Send a frame as it is."""
+        self._bus.send(frame)
+
+    def wait_for_answer(self, number: int, limit: float) -> ReceivedSetpoint | None:
+        """Return the setpoint that answers sample `number`, or None after `limit` s without it.
+
+        With a limit of 0 s it takes one frame if there is one. A frame that switches off answers none,
+        whatever number it carries.
+        """
+        if limit == 0.0 and not may_have_frames(self._bus):
+            return None
+        end = time.monotonic() + limit
+        while True:
+            remaining = end - time.monotonic()
+            frame = self._bus.recv(max(0.0, remaining))
+            received = None if frame is None else self._setpoint_in(frame)
+            if received is not None and received.answers(number & _COUNTER_MASK):
+                return received
+            if remaining <= 0.0:
+                return None
+
+    def newest(self) -> ReceivedSetpoint | None:
+        """Take all frames that have come since the last call and return the last sound setpoint in them."""
+        newest = None
+        while may_have_frames(self._bus) and (frame := self._bus.recv(0.0)) is not None:
+            newest = self._setpoint_in(frame) or newest
+        return newest
+
+    def close(self) -> None:
+        """End the bus; safe to call twice."""
+        self._bus.shutdown()
+
+    def _setpoint_in(self, frame: can.Message) -> ReceivedSetpoint | None:
+        if frame.arbitration_id != self._codec.setpoint.frame_id:
+            return None
+        setpoint = self._receiver.receive(frame.data)
+        if setpoint is None:
+            return None
+        credible = abs(time.time() - frame.timestamp) < _CREDIBLE_AGE
+        return ReceivedSetpoint(setpoint, frame.timestamp if credible else math.nan)

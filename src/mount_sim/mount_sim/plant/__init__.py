@@ -1,0 +1,1 @@
+"""The plant behind the electronics: coil, actuator, mount, vehicle."""

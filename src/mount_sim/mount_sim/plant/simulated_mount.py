@@ -1,0 +1,182 @@
+"""Electronics and plant together, sample by sample, without bus or clock."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
+from mount_models.sampling import SAMPLE_TIME
+from mount_sim.electronics.electronics import Noise, Reading
+from mount_sim.excitation.excitation import Excitation, Seat
+from mount_sim.plant.check import checked_plant
+from mount_sim.plant.plant import Memory, Plant, PlantSimulation
+
+FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
+"""Range of the displacement sensor to either side, m: that of its signal on the bus."""
+
+
+class DivergedError(ValueError):
+    """The simulated plant has no finite state any more; the text says since when and the remedy."""
+
+
+@dataclass
+class BeyondRange:
+    """Samples whose displacement lay beyond the sensor's range: sent as not valid, answered with 0 A."""
+
+    samples: int = 0
+    first: float = math.nan  # s
+
+    def note(self, time: float) -> None:
+        """Take one more, at `time` s."""
+        if not self.samples:
+            self.first = time
+        self.samples += 1
+
+
+@dataclass(frozen=True)
+class Run:
+    """Length of a simulated run in samples and where the excitation begins in it."""
+
+    samples: int
+    excitation_start: int
+
+
+class Ahead(NamedTuple):
+    """What the next n samples are made of.
+
+    The plant, excitation and force on the engine, both (n, steps), whether the coil's driver is open, and
+    numbers for the noise (n, 4).
+    """
+
+    memory: Memory
+    values: NDArray[np.float64]
+    engine_forces: NDArray[np.float64]
+    driver_open: bool
+    noise: NDArray[np.float64]
+
+
+class SimulatedMount:
+    """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again.
+
+    A setpoint takes effect at the sample instant after the one that it answers, as the electronics' own
+    sampled current loop takes it over. Without a setpoint for `setpoint_timeout`, counted from when the last
+    one was due, the current goes to 0 A.
+    """
+
+    def __init__(self, plant: Plant, excitation: Excitation, seed: int):
+        self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
+        checked_plant(plant, excitation.seat, excitation.step_time)
+        self._noise = Noise(seed)
+        self._steps = round(SAMPLE_TIME / excitation.step_time)
+        self.patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
+        """Samples without a setpoint after which the current goes to 0 A."""
+        start = round(excitation.start / SAMPLE_TIME)
+        self._values = _per_sample(excitation.values, start, self._steps)
+        self._engine_forces = None
+        if excitation.engine_forces is not None:
+            self._engine_forces = _per_sample(excitation.engine_forces, start, self._steps)
+        self._no_force = np.zeros(self._steps)
+        self._afterwards = np.full(self._steps, _afterwards(excitation))
+        self._driver_opens = plant.mount.driver_opens
+        self.run = Run(len(self._values), start)
+        self.sample = 0
+        self.beyond_range = BeyondRange()
+        self._silent = 0
+        self._current = 0.0
+
+    @property
+    def time(self) -> float:
+        """Simulated time in s."""
+        return self.sample * SAMPLE_TIME
+
+    @property
+    def finished(self) -> bool:
+        """Whether all samples of the run were taken."""
+        return self.sample >= self.run.samples
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the coil driver is on: setpoints come in time."""
+        return self._silent < self.patience
+
+    @property
+    def truth(self) -> np.void:
+        """What no sensor saw at the last `measure`."""
+        return self._plant.truth
+
+    @property
+    def truth_bytes(self) -> bytes:
+        """The same as little-endian float64 numbers in the order of `sim/truth`."""
+        return self._plant.truth_bytes
+
+    def measure(self) -> Reading:
+        """Return what the sensors read now; raises `DivergedError` where the plant has blown up."""
+        reading = Reading(*self._plant.read(self._noise.next()))
+        if not abs(reading.displacement) <= FARTHEST_DISPLACEMENT:
+            self._doubt(reading.displacement)
+        return reading
+
+    def advance(self, setpoint: float | None, late: int = 0) -> None:
+        """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
+
+        `late` is the number of samples since it was due. Behind the end of the run nothing shakes the mount
+        any more.
+        """
+        if setpoint is None:
+            self._silent += 1
+        else:
+            self._silent, self._current = late, setpoint
+        current = self._current if self.enabled and not self._driver_open else 0.0
+        values, forces = self._afterwards, self._no_force
+        if not self.finished:
+            values = self._values[self.sample]
+            forces = forces if self._engine_forces is None else self._engine_forces[self.sample]
+        self._plant.advance(values, forces, current)
+        self.sample += 1
+
+    def ahead(self, count: int) -> Ahead:
+        """Return what the next samples, at most `count`, need in a compiled loop; none of them is taken yet.
+
+        The loop does for each what `measure` and `advance` with a setpoint do; `skip` notes how far it came.
+        """
+        until_open = self.run.excitation_start - self.sample
+        if self._driver_opens and until_open > 0:
+            count = min(count, until_open)
+        part = slice(self.sample, self.sample + count)
+        values = self._values[part]
+        forces = np.zeros(values.shape) if self._engine_forces is None else self._engine_forces[part]
+        return Ahead(self._plant.memory, values, forces, self._driver_open, self._noise.ahead(len(values)))
+
+    def skip(self, count: int, setpoint: float) -> None:
+        """Note that a compiled loop took `count` samples and advanced the last one with `setpoint` (A)."""
+        self._noise.skip(count)
+        self._silent, self._current = 0, setpoint
+        self.sample += count
+
+    def _doubt(self, displacement: float) -> None:
+        if not math.isfinite(displacement):
+            raise DivergedError(
+                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
+                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
+            )
+        self.beyond_range.note(self.time)
+
+    @property
+    def _driver_open(self) -> bool:
+        return self._driver_opens and self.sample >= self.run.excitation_start
+
+
+def _afterwards(excitation: Excitation) -> float:
+    """Return what the excitation is behind its end: rack and road stay where they are."""
+    still = excitation.seat is Seat.ACCELERATED_CHASSIS or not len(excitation.values)
+    return 0.0 if still else float(excitation.values[-1])
+
+
+def _per_sample(series: NDArray[np.float64], start: int, steps: int) -> NDArray[np.float64]:
+    """Return the excitation as one row of values for each sample, with the rest before its start."""
+    whole = len(series) // steps
+    rows = series[: whole * steps].reshape(whole, steps)
+    return np.ascontiguousarray(np.vstack([np.zeros((start, steps)), rows]))
