@@ -40,6 +40,14 @@ def test_packages_import_only_what_lies_below_them(package: str):
     assert ours - {package} <= MAY_IMPORT[package]
 
 
+@pytest.mark.parametrize('package', MAY_IMPORT)
+def test_tests_of_a_package_import_only_what_lies_below_it(package: str):
+    """Else a build of all packages finds no order."""
+    modules = {module for file in (SOURCES / package / 'test').glob('*.py') for module in modules_of(file)}
+    ours = {module.split('.')[0] for module in modules} & set(MAY_IMPORT)
+    assert ours - {package} <= MAY_IMPORT[package]
+
+
 def test_no_module_needs_itself_by_way_of_others():
     files = module_files()
     needs = {module: set(modules_of(file)) & set(files) for module, file in files.items()}

@@ -11,11 +11,15 @@ import pytest
 from std_msgs.msg import String
 from typer.testing import CliRunner, Result
 
+import mount_bags
 from mount_bags.bag.writer import BagWriter
+from mount_bags.events.recorded_events import event_time, recorded_events
+from mount_bags.messages.time_axis import time_axis
 from mount_cli.command import app
 from mount_report.pages import default_pictures
 from mount_report.sections import run_sections
 from mount_report.sections import signal_sections as sections
+from mount_report.signals import Signals
 from mount_ros.messages.cdr import serialised
 
 REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
@@ -266,3 +270,26 @@ def test_a_browser_draws_every_figure_and_has_nothing_to_complain_about(browser,
     # the browser's own console; plotly.js draws curves as paths of this class
     assert not [line for line in shown.stderr.splitlines() if 'CONSOLE' in line]
     assert shown.stdout.count('class="js-line"') >= 10
+
+
+def test_a_moment_has_the_same_time_in_a_report_and_among_the_events(bench, tmp_path):
+    """However long before the first sample the session came, and whenever the moment was received."""
+    drive = mount_bags.open(bench / 'recording')
+    writer = BagWriter(tmp_path / 'late')
+    writer.add_topic('/event', 'std_msgs/msg/String')
+    for name in ('session', 'displacement', 'control_trace'):
+        series = drive[name]
+        writer.add_topic(f'/{name}', series.type)
+        shift = -3_000_000_000 if name == 'session' else 5_000_000
+        for message, log in zip(series.messages(), series.receive_times.tolist(), strict=True):
+            writer.write(f'/{name}', serialised(message), log + shift)
+    stamp = int(drive['displacement'].stamps[3000])
+    writer.write('/event', serialised(String(data=f'{{time: {stamp}, kind: bump}}')), stamp + 9_000_000)
+    writer.close()
+    late = mount_bags.open(tmp_path / 'late')
+    events = [(event.kind, event_time(event, time_axis(late))) for event in recorded_events(late)]
+    begins = [time for kind, time in events if kind == 'switch_on']
+    assert begins
+    assert [begin for begin, _ in Signals(late).damping()] == pytest.approx(begins, abs=1e-9)
+    assert [(mark.kind, time) for time, mark in Signals(late).marks()] == [('bump', pytest.approx(3.0))]
+    assert ('bump', pytest.approx(3.0)) in events

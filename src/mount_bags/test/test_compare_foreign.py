@@ -14,8 +14,7 @@ from mount_bags.bag.writer import BagWriter
 from mount_bags.compare.compare import compare
 from mount_bags.compare.tolerances import Tolerances
 from mount_bags.compare.words import sentences
-from mount_bags.events.recorded_events import recorded_events
-from mount_report.signals import Signals
+from mount_bags.events.recorded_events import recorded_events, recorded_marks
 
 COUNT = 50
 PERIOD = 10_000_000  # ns
@@ -169,7 +168,8 @@ def test_a_foreign_topic_called_event_is_none_of_ours(name, with_camera):
     recording = mount_bags.open(with_camera / name)
     kinds = [event.kind for event in recorded_events(recording)]
     assert kinds == (['mark', 'switch_on', 'switch_off'] if name == 'both' else [])
-    assert [mark.text for _, mark in Signals(recording).marks()] == ['a bump'] * (name == 'both')
+    texts = [mark.text for marks in recorded_marks(recording).values() for _, mark in marks]
+    assert texts == ['a bump'] * (name == 'both')
 
 
 def test_foreign_topics_called_like_ours_are_compared_as_foreign_ones(with_camera):
