@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from std_msgs.msg import String
 
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import session_text
 from mount_control.controller import ControlLaw
 from mount_control.force_to_current import resample
 from mount_control.parameters import ControlParameters

@@ -3,8 +3,8 @@
 import pytest
 from rich.console import Console
 
+from mount_bags.run.session import session_text
 from mount_bags.run.versions import versions
-from mount_bringup.graph.supervisor import session_text
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 from mount_replay.summary import print_replay, replay_figures

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from mount_bags.compare.signal_difference import Moment
 from mount_bags.events.switching_changes import Switching
-from mount_bags.run.versions import versions
+from mount_bags.run.versions import version_differences, versions, versions_sentence
 from mount_bringup.terminal import note
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.agreement import (
@@ -21,7 +21,6 @@ from mount_replay.agreement import (
 )
 from mount_replay.core import Replayed
 from mount_replay.given.input import ReplayInput
-from mount_replay.recorded_versions import version_differences, versions_sentence
 from mount_replay.replay import LOCKSTEP, ReplayOutcome
 
 _SHOWN = 8  # switchings in the printed summary

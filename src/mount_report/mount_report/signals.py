@@ -11,7 +11,7 @@ from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import switching_times
 from mount_bags.messages.series import Series, SeriesError
 from mount_bags.messages.time_axis import time_axis
-from mount_bags.run.session_differences import session_text
+from mount_bags.run.session import recorded_session
 from mount_report.drawing.chart import Array
 from mount_ros.messages.event import Mark
 from mount_ros.topics import (
@@ -65,7 +65,7 @@ class Signals:
     def session(self) -> str:
         """The text of its session message, empty where it has none."""
         try:
-            return session_text(self.recording)
+            return recorded_session(self.recording)
         except (ReadingError, SeriesError):
             return ''
 

@@ -3,7 +3,6 @@
 import math
 import os
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from mount_bags.edit.inherited_statement import sources_of
 from mount_bags.edit.messages import Messages, read_messages, write_messages
 from mount_bags.messages.series import registered_topic
 from mount_bags.messages.time_axis import ZERO_KEY, TimeAxis, time_axis
+from mount_bags.run.session import time_text
 from mount_ros.topics import EVENT, Delivery
 
 _ALL = slice(None)
@@ -146,6 +146,6 @@ def _step(recording: Recording, span: _Span, reason: str) -> dict[str, Any]:
         'from_s': span.begin,
         'to_s': span.end,
         ZERO_KEY: span.zero,
-        'made': datetime.now().astimezone().isoformat(timespec='seconds'),
+        'made': time_text(),
         **({'reason': reason} if reason else {}),
     }

@@ -4,7 +4,6 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from mount_bags.edit.beside_messages import lost_beside_messages
 from mount_bags.edit.inherited_statement import sources_of, united
 from mount_bags.edit.messages import Messages, joined_payloads, read_messages, write_messages
 from mount_bags.messages.series import Times, registered_topic
+from mount_bags.run.session import time_text
 from mount_bags.run.session_differences import session_differences
 from mount_ros.topics import SESSION, Delivery
 
@@ -69,7 +69,7 @@ def merge(
     step = {
         'did': 'merge',
         'recordings': [short_name(recording) for recording in recordings],
-        'made': datetime.now().astimezone().isoformat(timespec='seconds'),
+        'made': time_text(),
     }
     distros = [recording.information.ros_distro for recording in recordings if recording.information]
     sources = united(map(sources_of, recordings, read))

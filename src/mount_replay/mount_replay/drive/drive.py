@@ -4,7 +4,6 @@ import contextlib
 import math
 import zlib
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +12,12 @@ from rich.text import Text
 
 from mount_bags.recorder.parameters import RecorderParameters, split_of
 from mount_bags.run.folder import RunFolder, make_run_folder
-from mount_bags.run.versions import versions
+from mount_bags.run.session import new_session, session_text
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
-from mount_bringup.graph.supervisor import Supervisor, session_text
+from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.progress_bar import progress_bar
 from mount_bringup.terminal import note
@@ -198,12 +197,5 @@ def _port(order: DriveOrder) -> int:
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
-    return session_text(
-        {
-            'scenario': order.scenario,
-            'mode': order.mode,
-            'started': datetime.now().astimezone().isoformat(timespec='seconds'),
-            'parameters': {node: dict(values) for node, values in parameters.items()},
-            'versions': versions(),
-        }
-    )
+    told = {node: dict(values) for node, values in parameters.items()}
+    return session_text(new_session({'scenario': order.scenario, 'mode': order.mode, 'parameters': told}))
