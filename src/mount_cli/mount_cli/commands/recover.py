@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 INCOMPLETE = 3
 
@@ -35,7 +35,7 @@ def recover(
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
     from mount_bags.edit.recover import recover as recovered
     from mount_bags.run.place import recording_place
-    from mount_bringup.progress_bar import progress_bar
+    from mount_cli.screen import progress_bar
 
     console = terminal()
     source = recording_place(recording)
