@@ -30,9 +30,6 @@ from mount_bags.messages.definitions import Definition
 from mount_bags.messages.series import Column, Payloads, Series, Times
 from mount_bags.messages.topic_times import TimesCollector, TopicTimes
 
-# Key of the custom data in which `engine-mount recover` says what it could not prove.
-RECOVERY_NOTE = 'recovered_unchecked'
-
 
 class ReadingError(ValueError):
     """A recording, or what was asked of it, cannot be read; the text says why."""
@@ -62,7 +59,6 @@ class Recording:
         self.missing: dict[str, int] = self._missing()
         self._definitions: dict[str, tuple[Definition | None, str]] = {}
         self._check_topics()
-        self._note_recovery()
         self._series: dict[str, Series] = {}
 
     @property
@@ -228,11 +224,6 @@ class Recording:
             if sentence and declared.information.message_count:
                 what = 'the installed one is used' if definition else 'only its raw bytes can be read'
                 self.warnings.append(f'{name}: {sentence}; {what}')
-
-    def _note_recovery(self) -> None:
-        custom = self.information.custom_data if self.information else {}
-        if custom.get(RECOVERY_NOTE):
-            self.warnings.append(custom[RECOVERY_NOTE])
 
     # Reading.
 

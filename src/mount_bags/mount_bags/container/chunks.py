@@ -232,20 +232,6 @@ def messages_at(
     return Contents(data, offsets, _heads(data, offsets), declarations, whole)
 
 
-def stored_parts(data: bytes, compression: str) -> bytes:
-    """Return what the beginning of packed bytes holds; the rest may be missing, nothing is proven."""
-    try:
-        if compression == 'zstd':
-            return zstandard.ZstdDecompressor().decompressobj().decompress(data)
-        if compression == 'lz4':
-            import lz4.frame
-
-            return lz4.frame.LZ4FrameDecompressor().decompress(data)
-    except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError):
-        return b''
-    return b'' if compression else data
-
-
 def _extents(chunk: Chunk) -> set[int]:
     return {end - chunk.begin for end in chunk.ends}
 

@@ -163,10 +163,6 @@ class McapFile:
                 self._warn('the checksum of its data section is wrong: some byte of the file is damaged')
         return self._data_proof
 
-    def tail_bytes(self) -> bytes:
-        """Return what is there of the chunk that the end of the file cuts off."""
-        return b'' if self.tail is None else self._data[self.tail.begin : self.tail.end]
-
     # A file with a sound summary.
 
     def _take_summary(self) -> bool:

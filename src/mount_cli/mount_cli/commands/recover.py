@@ -20,9 +20,7 @@ Examples:
 `engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
 
 All chunks whose checksum holds are kept, with topics, times, session, attachments, metadata and what the
-recorder says of its own losses. Of a last chunk that was cut off,
-whole messages are kept where its compression lets its beginning be read; no checksum vouches for
-these, and the new recording says so each time it is opened. The original is not touched.
+recorder says of its own losses. A last chunk that was cut off is lost. The original is not touched.
 """
 
 
