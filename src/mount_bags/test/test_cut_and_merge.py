@@ -244,8 +244,8 @@ def test_types_that_nobody_installed_are_cut_with_their_definition(place):
     piece = _cut(mount_bags.open(folder), place(), 2.0, 5.0)
     original = _messages(mount_bags.open(folder))['/thing']
     assert _messages(piece) == {'/thing': original[2:5]}
-    (schema,) = piece.files[0].schemas.values()
-    assert (schema.name, schema.data) == ('strange_msgs/msg/Thing', b'int32 number')
+    (topic,) = piece.files[0].topics.values()
+    assert (topic.type, topic.definition) == ('strange_msgs/msg/Thing', b'int32 number')
 
 
 # Time.

@@ -14,7 +14,8 @@ from mount_bags.audit.answers import NO_TIMES, Answers, Control, Setpoints, judg
 from mount_bags.audit.latency import Latency, setpoint_latency
 from mount_bags.audit.node_reports import NodeReport, node_reports
 from mount_bags.bag.recording import Recording
-from mount_bags.bag.statement import RECORDER_RECORD, read_statement
+from mount_bags.bag.statement import read_statement
+from mount_bags.container.stored import RECORDER_RECORD
 from mount_bags.messages.series import Times, registered_topic
 from mount_bags.messages.stamps import missing_samples, regular_rate, stamp_jitter, stamp_statistics
 from mount_bags.messages.time_axis import TimeAxis, time_axis

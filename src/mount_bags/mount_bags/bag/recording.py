@@ -17,14 +17,12 @@ from mount_bags.bag.metadata import (
     read_metadata,
 )
 from mount_bags.bag.piece_topics import (
-    BagFile,
     Declared,
     declared_topics,
     readable_definition,
     repeated_topics,
 )
-from mount_bags.container.chunks import MESSAGE_HEAD, Contents
-from mount_bags.container.mcap_file import McapFileError
+from mount_bags.container.stored import HEAD, StorageError, StoredFile, StoredMessages
 from mount_bags.messages.columns import ColumnCollector
 from mount_bags.messages.definitions import Definition
 from mount_bags.messages.series import Column, Payloads, Series, Times
@@ -51,7 +49,7 @@ class Recording:
         self.path = path
         self.warnings: list[str] = []
         self.information: BagInformation | None = None
-        self.files: list[BagFile] = self._open()
+        self.files: list[StoredFile] = self._open()
         self._declared: dict[str, Declared] = declared_topics(self.files, self.information)
         self.topics: dict[str, TopicInformation] = {
             name: declared.information for name, declared in self._declared.items()
@@ -159,7 +157,7 @@ class Recording:
 
     # Opening.
 
-    def _open(self) -> list[BagFile]:
+    def _open(self) -> list[StoredFile]:
         try:
             found = find_pieces(self.path)
         except BagFolderError as error:
@@ -171,7 +169,7 @@ class Recording:
         for path in found.paths:
             try:
                 files.append(open_piece(path))
-            except McapFileError as error:
+            except StorageError as error:
                 reasons.append(str(error))
         if not files:
             raise ReadingError('; '.join(reasons) or f'{self.path} holds no MCAP file')
@@ -184,7 +182,7 @@ class Recording:
             self._read_embedded(files)
         return files
 
-    def _read_embedded(self, files: list[BagFile]) -> None:
+    def _read_embedded(self, files: list[StoredFile]) -> None:
         text = files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
         if text:
             try:
@@ -241,13 +239,13 @@ class Recording:
         return found
 
     def _load(self, names: Sequence[str]) -> dict[str, Series]:
-        blocks: dict[str, list[Contents]] = {name: [] for name in names}
+        blocks: dict[str, list[StoredMessages]] = {name: [] for name in names}
         for name, block in self._blocks(names) if names else ():
             blocks[name].append(block)
         return {name: self._series_of(name, found) for name, found in blocks.items()}
 
-    def _series_of(self, name: str, blocks: list[Contents]) -> Series:
-        head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, MESSAGE_HEAD)
+    def _series_of(self, name: str, blocks: list[StoredMessages]) -> Series:
+        head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, HEAD)
         self._note_damage(name, len(head))
         return self._made(name, Payloads([block.payloads() for block in blocks]), head)
 
@@ -278,9 +276,9 @@ class Recording:
             name,
             self.topics[name].type,
             payloads,
-            head['log_time'].astype(np.int64),
-            head['publish_time'].astype(np.int64),
-            sequences=head['sequence'].astype(np.uint32),
+            np.ascontiguousarray(head['log_time']),
+            np.ascontiguousarray(head['publish_time']),
+            sequences=np.ascontiguousarray(head['sequence']),
             columns=columns,
             stamps=stamps,
             definition=definition,
@@ -294,27 +292,23 @@ class Recording:
             self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
             self.missing[name] = expected - present
 
-    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, Contents]]:
+    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, StoredMessages]]:
         """Yield the messages of topics, without those that a piece repeats from the one before."""
         last: dict[str, tuple[bytes, int]] = {}
         watched = frozenset().union(*repeated_topics(self.files))
         for file, repeated in zip(self.files, repeated_topics(self.files), strict=True):
-            channels = {name: np.array(self._declared[name].channels_of(file), np.int64) for name in names}
-            channels = {name: numbers for name, numbers in channels.items() if numbers.size}
+            topics = {name: np.array(self._declared[name].numbers_in(file), np.int64) for name in names}
+            topics = {name: numbers for name, numbers in topics.items() if numbers.size}
             heads = set(repeated)
-            for block in file.blocks([int(number) for numbers in channels.values() for number in numbers]):
-                for name, numbers in channels.items():
-                    found = block.of(numbers) if len(channels) > 1 else block
-                    if not found.offsets.size:
+            for block in file.blocks([int(number) for numbers in topics.values() for number in numbers]):
+                for name, numbers in topics.items():
+                    found = block.of(numbers) if len(topics) > 1 else block
+                    if not len(found):
                         continue
-                    if name in heads and _first(found) == last.get(name):
+                    if name in heads and found.message(0) == last.get(name):
                         found = found.behind_first()
                     heads.discard(name)
-                    if found.offsets.size:
+                    if len(found):
                         if name in watched:
                             last[name] = found.message(-1)
                         yield name, found
-
-
-def _first(block: Contents) -> tuple[bytes, int]:
-    return block.message(0)

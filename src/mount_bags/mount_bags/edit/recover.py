@@ -15,9 +15,9 @@ from pathlib import Path
 from mount_bags.bag.metadata import NO_TIME
 from mount_bags.bag.piece_topics import repeated_topics
 from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.bag.statement import RECORDER_RECORD, read_statement
-from mount_bags.container.chunks import Contents
+from mount_bags.bag.statement import read_statement
 from mount_bags.container.mcap_file import McapFile
+from mount_bags.container.stored import RECORDER_RECORD, StoredMessages
 from mount_bags.edit.beside_messages import copy_beside_messages, lost_beside_messages
 from mount_bags.edit.inherited_statement import inherited_statement, sources_of
 from mount_bags.edit.verbatim import VerbatimBag
@@ -111,30 +111,28 @@ def _copy(recording: Recording, bag: VerbatimBag, progress: Progress) -> int:
     last: dict[str, tuple[bytes, int]] = {}
     watched = frozenset().union(*repeated_topics(recording.files))
     for file, repeated in zip(recording.files, repeated_topics(recording.files), strict=True):
-        targets = {number: bag.channel(file, number) for number in file.channels}
-        names = {number: channel.topic for number, channel in file.channels.items()}
+        targets = {number: bag.topic(topic) for number, topic in file.topics.items()}
         pending = set(repeated)
-        for contents in file.blocks(file.channels.keys()):
-            for channel, raw, log_time, publish_time, sequence in _messages(contents):
+        for block in file.blocks(file.topics.keys()):
+            for number, raw, log_time, publish_time, sequence in _messages(block):
                 stored += 1
-                name = names[channel]
+                name = file.topics[number].name
                 if name in watched:
                     is_first, same = name in pending, last.get(name) == (raw, publish_time)
                     pending.discard(name)
                     last[name] = raw, publish_time
                     if is_first and same:
                         continue
-                bag.write(targets[channel], raw, log_time, publish_time, sequence)
+                bag.write(targets[number], raw, log_time, publish_time, sequence)
             progress(bag.kept + bag.pending, expected)
     return stored
 
 
-def _messages(contents: Contents) -> Iterator[tuple[int, bytes, int, int, int]]:
-    heads = contents.heads
-    raws = map(bytes, contents.payloads())
-    columns = (heads[name].tolist() for name in ('channel', 'log_time', 'publish_time', 'sequence'))
-    for channel, log_time, publish_time, sequence, raw in zip(*columns, raws, strict=True):
-        yield channel, raw, log_time, publish_time, sequence
+def _messages(block: StoredMessages) -> Iterator[tuple[int, bytes, int, int, int]]:
+    raws = map(bytes, block.payloads())
+    columns = (block.heads[name].tolist() for name in ('topic', 'log_time', 'publish_time', 'sequence'))
+    for number, log_time, publish_time, sequence, raw in zip(*columns, raws, strict=True):
+        yield number, raw, log_time, publish_time, sequence
 
 
 # What is kept and what is lost.
