@@ -16,6 +16,7 @@ from mount_bags.bag.metadata import (
     TopicInformation,
     read_metadata,
 )
+from mount_bags.bag.origin import ZERO_KEY, origin
 from mount_bags.bag.piece_topics import (
     Declared,
     declared_topics,
@@ -26,6 +27,7 @@ from mount_bags.container.stored import HEAD, StorageError, StoredFile, StoredMe
 from mount_bags.messages.columns import ColumnCollector
 from mount_bags.messages.definitions import Definition
 from mount_bags.messages.series import Column, Payloads, Series, Times
+from mount_bags.messages.time_axis import Arrivals, TimeAxis, axis_of
 from mount_bags.messages.topic_times import TimesCollector, TopicTimes
 
 
@@ -58,6 +60,7 @@ class Recording:
         self._definitions: dict[str, tuple[Definition | None, str]] = {}
         self._check_topics()
         self._series: dict[str, Series] = {}
+        self._time_axis: TimeAxis | None = None
 
     @property
     def message_count(self) -> int:
@@ -92,6 +95,19 @@ class Recording:
         """The first and the last receive time in ns, None without messages."""
         ranges = [found for found in (file.time_range() for file in self.files) if found is not None]
         return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
+
+    @property
+    def short_name(self) -> str:
+        """What a person calls it: with the folder of the run where its own is just `recording`."""
+        path = self.path.absolute()
+        return f'{path.parent.name}/{path.name}' if path.name == 'recording' else path.name
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """The time that people are told, read once: where `times` were read before, without messages."""
+        if self._time_axis is None:
+            self._time_axis = self._axis_of(self.__getitem__)
+        return self._time_axis
 
     def __contains__(self, name: str) -> bool:
         return len(self._candidates(name)) == 1
@@ -236,7 +252,14 @@ class Recording:
         found = {name: collector.times() for name, collector in collectors.items()}
         for name, times in found.items():
             self._note_damage(name, len(times))
+        self._time_axis = self._time_axis or self._axis_of(found.__getitem__)
         return found
+
+    def _axis_of(self, arrivals: Callable[[str], Arrivals]) -> TimeAxis:
+        steps = [step.get(ZERO_KEY) for step in origin(self.information)]
+        types = {name: topic.type for name, topic in self.topics.items() if topic.message_count}
+        first = self.time_range[0] if self.time_range else 0
+        return axis_of(types, arrivals, [zero for zero in steps if isinstance(zero, int)], first)
 
     def _load(self, names: Sequence[str]) -> dict[str, Series]:
         blocks: dict[str, list[StoredMessages]] = {name: [] for name in names}

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import yaml
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.bag.writer import BagWriter
 from mount_bags.compare.compare import compare
@@ -166,7 +165,7 @@ def _entry(run: Recording, reason: str, versions: Mapping[str, str], changes: li
     return {
         'date': time_text(),
         'reason': reason.strip(),
-        'recording': short_name(run),
+        'recording': run.short_name,
         'versions': dict(versions),
         'changes': changes or ['new reference'],
     }

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import Recording
 from mount_bags.compare.alignment import (
     Alignment,
@@ -137,8 +136,8 @@ def compare(
     marks_a, marks_b = _marks(a, {}), _marks(b, {other: name for name, other in pairs.items()})
     sessions = _sessions(a, b, pairs)
     return Comparison(
-        name_a=short_name(a),
-        name_b=short_name(b),
+        name_a=a.short_name,
+        name_b=b.short_name,
         alignments=alignments,
         topics=tuple(_compared(topic, tolerances, switching) for topic in matched),
         only_a=_lonely_topics(a, pairs, topics),

@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Payloads
-from mount_bags.messages.time_axis import time_axis
 from mount_bags.run.session import SessionError, recorded_session, session_content, session_parameters
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
@@ -132,7 +130,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     """
     recording.load(topic.name for topic in _READ if topic.name in recording)
     displacement = _displacement(recording)
-    notes = Notes(time_axis(recording).zero)
+    notes = Notes(recording.time_axis.zero)
     session = _session_of(recording, notes)
     parameters = _parameters_of(session, notes)
     gaps = measured_gaps(recording)
@@ -159,7 +157,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     messages = {topic.name: _messages(recording, topic) for topic in _INPUTS if has(recording, topic)}
     series = recording[topics.DISPLACEMENT.name]
     log_shift = int(series.receive_times[0] - series.stamps[0])
-    name = short_name(recording)
+    name = recording.short_name
     changes = recorded_changes(recording)
     return ReplayInput(
         name, parts, parameters, answers, messages, notes.zero, log_shift, session, notes, changes
