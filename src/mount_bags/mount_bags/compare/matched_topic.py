@@ -10,7 +10,7 @@ from mount_bags.compare.hidden_differences import Place, hidden_differences
 from mount_bags.compare.signal_difference import Column
 from mount_bags.messages.layout import OPTIONS
 from mount_bags.messages.series import STAMP, STAMP_BYTES, Series, SeriesError
-from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_bytes
+from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
 from mount_ros.topics import CURRENT_FORCE_TABLE, JOINT_STATE
 
 Places = NDArray[np.int64]
@@ -163,8 +163,8 @@ class MatchedTopic:
         if self.a.registered is not CURRENT_FORCE_TABLE or not self.samples:
             return None
         try:
-            a, b = (from_bytes(series.payloads[len(series) - 1]) for series in (self.a, self.b))
-        except ForceTableMessageError:
+            a, b = (from_message(series.message(len(series) - 1)) for series in (self.a, self.b))
+        except (ForceTableMessageError, SeriesError):
             return None
         return (a, b) if a.current.shape == b.current.shape else None
 
