@@ -74,7 +74,7 @@ class MatchedTopic:
         return signals
 
     @property
-    def lonely_signals(self) -> list[str]:
+    def unmatched_signals(self) -> list[str]:
         """The signals that one of the recordings lacks."""
         try:
             return sorted(set(self.a.names) ^ set(self.b.names)) if self.samples else []
@@ -123,7 +123,7 @@ class MatchedTopic:
     def _shown(self) -> set[Place]:
         """Return the places of what signals show, of one recording alone too, and of stamps and names."""
         if self.a.type != JOINT_STATE:
-            return {*STAMP, *((name, 0) for name in (*self.signals, *self.lonely_signals))}
+            return {*STAMP, *((name, 0) for name in (*self.signals, *self.unmatched_signals))}
         places = range(max(len(self.a.names), len(self.b.names)))
         shown = {*STAMP, *((f'name[{place}]', 0) for place in places)}
         if self._has_columns('position'):
@@ -138,7 +138,7 @@ class MatchedTopic:
         layouts = (self.a, self.a.layout), (self.b, self.b.layout)
         return all(layout and layout.numbers[part].count == len(series.names) for series, layout in layouts)
 
-    def lonely_samples(self) -> tuple[tuple[int, int], tuple[int, int]]:
+    def unmatched_samples(self) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return how many samples A and B have alone: (within the time that both cover, outside of it)."""
         both = (self.of_a.keys, self.of_b.keys)
         if not all(map(len, both)):
