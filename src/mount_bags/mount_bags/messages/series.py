@@ -56,7 +56,7 @@ class Series:
     the messages' headers), all in ns; `sequences` are the publisher's numbers, 0 where it gave none.
     `series[name]` is a column: of a `JointState` the position of
     that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
-    `time` and `values` are the same for all columns at once, as arrays to plot.
+    `time` is that of all columns, to plot.
     """
 
     def __init__(
@@ -149,19 +149,6 @@ class Series:
         if times.size and abs(int(times[0]) - self._zero) > _OTHER_CLOCK:
             return np.asarray(times * 1e-9, np.float64)
         return np.asarray((times - self._zero) * 1e-9, np.float64)
-
-    @property
-    def values(self) -> Column:
-        """All columns side by side, messages x names, in the units `units`; raises `SeriesError`."""
-        values = np.empty((len(self), len(self.names)))
-        for place, name in enumerate(self.names):
-            values[:, place] = self[name]
-        return values
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """The units of `values`, empty where the registry does not know one."""
-        return tuple(self.unit(name) for name in self.names)
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
