@@ -37,9 +37,9 @@ HEAD = """# Parameters
 
 Every parameter of every node, as `--set NODE.NAME=VALUE` of `engine-mount drive`, `ros2 param` and the files
 in `src/mount_bringup/config` take it. `python test/docs/parameters_page.py` writes this page from the
-declarations, and a test holds it against them. *Source* says where a default is from: the paper, a derivation,
-or a choice of this project. Every node has `lockstep` too (true: time stands in the stamps alone). What is
-text has its meaning in the README of the package.
+declarations, and a test holds it against them. *Source* says where a default is from: the paper, a
+derivation, or a choice of this project. Every node has `lockstep` too (true: time stands in the stamps
+alone). The meaning of texts stands in the README of the package.
 """
 
 

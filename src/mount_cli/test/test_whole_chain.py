@@ -1,6 +1,6 @@
 """From recordings of a rack to a drive: files all the way, and no truth of the plant in any of them.
 
-`python test_whole_chain.py SEED...` prints the errors of each step for other draws; what came of some stands in
+`python test_whole_chain.py SEED...` prints the errors of each step for other draws, as they stand in
 docs/explanation/identification.md.
 """
 

@@ -110,7 +110,7 @@ def run_control(
 ) -> ControlAnswers:
     """Return what mount_control answers to the samples of a run, activated with `gap`.
 
-    Samples that follow each other without a doubt pass the compiled controller at once; all others are
+    Samples that follow each other regularly pass the compiled controller at once; all others are
     judged one by one, as in the node. `changes` of its parameters act from the sample of their stamp on.
     """
     begun = changed(parameters, [change for change in changes if change.time <= run.stamps[0]])

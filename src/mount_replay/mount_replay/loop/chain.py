@@ -44,11 +44,11 @@ class CoreChain:
 
     @property
     def displacement_range(self) -> float:
-        """Displacements (m) up to here are believed."""
+        """Displacements (m) up to here are plausible."""
         return self._control.displacement_range
 
     def expects(self, stamp: int) -> bool:
-        """Whether a believable sample of time `stamp` (ns) just goes on where the last one ended."""
+        """Whether a plausible sample of time `stamp` (ns) follows the last one without a gap."""
         return self._watch.last_stamp == stamp - _PERIOD
 
     def follow(self, last_stamp: int, count: int) -> None:
