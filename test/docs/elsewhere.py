@@ -20,7 +20,8 @@ ELSEWHERE = {
     'ros2 service call /mount_right/mount_recorder/mark': _RECORD,
     'ros2 topic pub --once /mount_right/event': _RECORD,
     'ros2 param set /mount_right/mount_control': _SET,
-    'engine-mount record': _RECORD,
+    'engine-mount record --': _RECORD,
+    'engine-mount identify friction': 'it takes long; src/mount_cli/test/test_identify_friction.py',
 }
 """{beginning of the commands: where they are run}."""
 
