@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from mount_bags.audit.audit import TopicAudit
 from mount_bags.bag.recording import Recording
 from mount_bags.events.switching_changes import Switching
-from mount_bags.messages.time_axis import time_axis
 from mount_control import band_pass
 from mount_control.parameters import ControlParameters
 from mount_models.damper import DamperCurve
@@ -53,7 +52,7 @@ def load_drive(
     others = others or {}
     recording.load_columns({name: (*names, *others.get(name, ())) for name, names in _COLUMNS.items()})
     displacement, trace, truth = (recording[name] for name in _COLUMNS)
-    zero = time_axis(recording).zero
+    zero = recording.time_axis.zero
     if excitation_start is not None:
         zero = excitation_stamp(recording, excitation_start)
     shown, traced, seen = (np.argsort(series.stamps) for series in (displacement, trace, truth))

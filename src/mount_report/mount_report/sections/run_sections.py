@@ -13,7 +13,7 @@ from mount_bags.compare.compare import Comparison
 from mount_bags.compare.quantity_text import quantity_text, time_text
 from mount_bags.compare.words import by_importance
 from mount_bags.compare.words import sentences as comparison_sentences
-from mount_bags.run.session_differences import session_values
+from mount_bags.run.session import session_values
 from mount_report.sections import figures
 from mount_report.sections.coil_load import CoilLoad, coil_load
 from mount_report.sections.figures import Named
