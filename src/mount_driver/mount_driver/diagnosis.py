@@ -50,7 +50,7 @@ class Snapshot(NamedTuple):
 
 def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
     """Return what `exchange` has counted; `now_ns` and `started_ns` are on the steady clock."""
-    link, clock = exchange.link, exchange.clock
+    link, latest = exchange.link, exchange.link.latest
     return Snapshot(
         time=now_ns * 1e-9,
         frame_age=(now_ns - (exchange.last_received or started_ns)) * 1e-9,
@@ -70,14 +70,14 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         timeouts=link.timeouts,
         unsent=exchange.unsent,
         unsent_reason=exchange.unsent_reason,
-        restarts=clock.restarts,
-        gaps=clock.gaps,
+        restarts=link.clock.restarts,
+        gaps=link.clock.gaps,
         recoveries=exchange.recoveries,
         error_frames=exchange.error_frames,
-        latest_stamp=link.latest_stamp,
+        latest_stamp=latest.stamp if latest is not None else 0,
         last_refusal=link.last_refusal,
         driving=link.driving,
-        unheard=link.last_sample is not None and link.last_sample.setpoint_timeout,
+        unheard=latest is not None and latest.sample.setpoint_timeout,
         bus_off=exchange.bus_off,
         trouble=exchange.trouble,
         failure=exchange.failure,
