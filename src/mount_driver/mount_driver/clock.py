@@ -6,12 +6,13 @@
 import math
 from typing import Protocol
 
+from mount_models.sampling import SAMPLE_TIME_NS
+
 _WRAP = 1 << 32  # us: the counter wraps after 71.6 min
 _NS = 1000  # ns per us
 
 _GAP_US = 1_000_000  # chosen: after a second without samples a new mapping is started
 _BLOCK_US = 500_000  # chosen: 500 samples, of which at least one usually arrives without delay
-_SPACING_NS = 1_000_000  # ns, the period of the samples: the least distance across a restart
 
 # Second-order loop per block: share of the error corrected in the next block, and share that goes to the
 # estimated drift. Poles at 0.75 +- 0.19j: it settles in about 10 blocks without ringing. Chosen.
@@ -58,7 +59,7 @@ class CounterClock:
             self._base = 0
         elif step >= _WRAP // 2:
             self.restarts += 1
-            self._base = self._stamp + _SPACING_NS - microseconds * _NS
+            self._base = self._stamp + SAMPLE_TIME_NS - microseconds * _NS
         elif microseconds < self._microseconds:
             self._base += _WRAP * _NS
         self._microseconds = microseconds
@@ -132,7 +133,7 @@ class ElectronicsClock:
         return monotonic_ns
 
     def _begin(self, arrival: int) -> None:
-        self._stamp = max(arrival, self._stamp + _SPACING_NS) if self._running else arrival
+        self._stamp = max(arrival, self._stamp + SAMPLE_TIME_NS) if self._running else arrival
         self._running = True
         self._late_blocks = 0
         self._begin_block(0.0)

@@ -8,6 +8,7 @@ from mount_driver.e2e_receiver import Outcome
 from mount_driver.exchange import Exchange
 from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
+from mount_models.sampling import HIGHEST_CURRENT
 from mount_ros.nodes.diagnostics import Level, Verdict
 
 _PERIOD = 1.0  # s: rates are taken over this long
@@ -195,7 +196,9 @@ def _setpoint_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParam
     if now.driving and earlier.driving and now.unheard and earlier.unheard:
         found.append((Level.WARN, 'the electronics do not take the setpoints; check the bus'))
     if now.limited > earlier.limited:
-        text = f'{now.limited - earlier.limited} setpoints limited to 3 A in the last second'
+        text = (
+            f'{now.limited - earlier.limited} setpoints limited to {HIGHEST_CURRENT:g} A in the last second'
+        )
         found.append((Level.WARN, text))
     return found
 

@@ -18,6 +18,8 @@ from mount_driver.codec import (
     WrongCrcError,
     WrongLengthError,
 )
+from mount_driver.parameters import DriverParameters
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SETPOINT_TIMEOUT
 
 CODEC = MountCodec()
 DATABASE = cantools.database.load_file(DATABASE_FILE)
@@ -224,8 +226,18 @@ def test_the_dbc_tells_those_who_build_the_electronics_what_to_refuse():
     assert all(word in rule for word in ('repeated: not used', 'goes back: not used', 'E2ESyncFrames'))
     for layout in (CODEC.measurement, CODEC.setpoint, CODEC.status):
         assert (layout.max_delta_counter, layout.sync_frames) == (5, 3)
-    assert 'answers one of the last 20 samples' in SETPOINT.comment
     assert 'repeated, of wrong sequence' in STATUS.get_signal_by_name('E2EError').comment
+
+
+def test_the_dbc_agrees_with_what_both_ends_know_of_current_time_and_rate():
+    assert (CODEC.current.low, CODEC.current.high) == (0.0, HIGHEST_CURRENT)
+    assert [message.cycle_time for message in (MEASUREMENT, SETPOINT)] == [1e3 * SAMPLE_TIME] * 2
+    limit = f'{1e3 * SETPOINT_TIMEOUT:g} ms'
+    timeout = MEASUREMENT.get_signal_by_name('SetpointTimeout'), STATUS.get_signal_by_name('SetpointTimeout')
+    assert all(f'No valid setpoint for {limit}' in signal.comment for signal in timeout)
+    assert f'Without a valid frame for {limit}' in SETPOINT.comment
+    assert f'answers one of the last {round(SETPOINT_TIMEOUT / SAMPLE_TIME)} samples' in SETPOINT.comment
+    assert DriverParameters().setpoint_timeout == SETPOINT_TIMEOUT
 
 
 def test_a_dbc_without_a_needed_signal_is_refused(tmp_path):

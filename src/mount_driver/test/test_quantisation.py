@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mount_driver import quantisation
 from mount_driver.codec import Measurement, MountCodec, OutOfRangeError, Setpoint, Status
+from mount_models.sampling import HIGHEST_CURRENT
 
 CODEC = MountCodec()
 SAMPLE = Measurement(0, 0, 0.0, 0.0, 0.0, 0.0)
@@ -108,4 +109,4 @@ def test_step_and_limits_of_the_coil_temperature_are_those_of_the_dbc():
 
 def test_the_setpoint_limits_are_those_of_the_dbc():
     assert CODEC.current.steps == quantisation.SETPOINT_STEPS
-    assert (CODEC.current.low, CODEC.current.high) == (0.0, quantisation.SETPOINT_HIGHEST)
+    assert (CODEC.current.low, CODEC.current.high) == (0.0, HIGHEST_CURRENT)
