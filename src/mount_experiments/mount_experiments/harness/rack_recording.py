@@ -12,13 +12,13 @@ from geometry_msgs.msg import WrenchStamped
 
 from mount_bags.bag.writer import BagWriter
 from mount_bags.run.session import new_session, session_message, session_text
+from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import (
     COIL_RIPPLE,
     COIL_TEMPERATURE,
     DISPLACEMENT,
-    SAMPLE_RATE,
     SESSION,
     SIM_CLAMP_FORCE,
     SIM_MOUNT_FORCE,
@@ -31,7 +31,6 @@ FloatArray = npt.NDArray[np.float64]
 
 SUBSTEPS = 10
 """Steps of the simulation in each sample of an experiment's rack (chosen): 0.1 ms."""
-_SAMPLE_NANOSECONDS = round(1e9 / SAMPLE_RATE)
 _TOPICS = (SESSION, DISPLACEMENT, SIM_MOUNT_FORCE, SIM_CLAMP_FORCE)
 
 
@@ -52,7 +51,7 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
         channels = measured.displacement, measured.friction_force, measured.normal_force
         rows = zip(*(channel.tolist() for channel in channels), strict=True)
         for sample, (x, friction, clamp) in enumerate(rows):
-            stamp = sample * _SAMPLE_NANOSECONDS
+            stamp = sample * SAMPLE_TIME_NS
             at = begin + stamp
             writer.write(f'/{DISPLACEMENT.name}', positions.pack(stamp, (x,)), at)
             writer.write(f'/{SIM_MOUNT_FORCE.name}', forces.pack(stamp, friction), at)
@@ -88,7 +87,7 @@ def record_actuator_rack(
             current.tolist(), current_rate.tolist(), flux_rate.tolist(), normal_force.tolist(), strict=True
         )
         for sample, (i, of_current, of_flux, force) in enumerate(rows):
-            stamp = sample * _SAMPLE_NANOSECONDS
+            stamp = sample * SAMPLE_TIME_NS
             at = begin + stamp
             ripple = ripples.pack(stamp, (i, math.nan), (of_current, of_flux))
             writer.write(f'/{COIL_RIPPLE.name}', ripple, at)
