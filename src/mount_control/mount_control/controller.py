@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mount_control import band_pass, force_to_current, switching
 from mount_control.parameters import ControlParameters, checked_parameters
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.damper import DamperCurve, damper_force
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import check_friction
@@ -22,7 +22,7 @@ FADE_SAMPLES = 50
 distance from what the new law asks for then falls evenly to zero."""
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 
-TRACE = np.dtype(
+TRACE = record_type(
     [
         (name, 'f8')
         for name in (
@@ -44,7 +44,7 @@ TRACE = np.dtype(
 )
 """Every intermediate of one control step, SI; the fields of the topic `control_trace` in its order."""
 
-_STATE = np.dtype(
+_STATE = record_type(
     [
         ('band', band_pass.STATE),
         ('switching', switching.STATE),

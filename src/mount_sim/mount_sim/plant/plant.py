@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mount_models.actuator.closing import ClosingMechanics, checked_closing, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator, gap_flux_density
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.coil.ripple import RippleCoil
 from mount_models.elastomer import branch_step, elastomer_force
 from mount_models.energy import ACCOUNT, book_step, new_account
@@ -46,7 +46,7 @@ class Plant(NamedTuple):
 
 _PLANT = record_dtype(Plant)
 
-STATE = np.dtype(
+STATE = record_type(
     [
         ('vehicle', VEHICLE_STATE),
         ('engine', ENGINE_STATE),
@@ -75,7 +75,7 @@ STATE = np.dtype(
 )
 """What the plant remembers from step to step, SI."""
 
-TRUTH = np.dtype(
+TRUTH = record_type(
     [
         (name, 'f8')
         for name in (
