@@ -18,6 +18,7 @@ from mount_models.friction.full import full_step
 from mount_models.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_models.quantity import checked
 from mount_models.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
+from mount_ros.topics import SIM_TRUTH
 from mount_sim.electronics.electronics import ElectronicsParameters, advance_current, read_sensors
 from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
@@ -75,30 +76,8 @@ STATE = record_type(
 )
 """What the plant remembers from step to step, SI."""
 
-TRUTH = record_type(
-    [
-        (name, 'f8')
-        for name in (
-            'displacement',
-            'velocity',
-            'coil_current',
-            'current_setpoint',
-            'gap',
-            'flux_density',
-            'normal_force',
-            'friction_force',
-            'mount_force',
-            'road_height',
-            'engine_displacement',
-            'chassis_displacement',
-            'chassis_acceleration',
-            'rest_gap',
-            'contact_gap',
-            'setpoint_latency',
-        )
-    ]
-)
-"""What no sensor sees, SI; the fields of the topic `sim/truth` in its order."""
+TRUTH = record_type([(name, 'f8') for name in SIM_TRUTH.names])
+"""What no sensor sees, SI: the scalars of the topic `sim/truth` in its order."""
 
 
 class Memory(NamedTuple):
