@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import FloatArray, settings_of_run
+from mount_experiments.harness.closed_loop import settings_of_run
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -28,6 +28,7 @@ from mount_experiments.sweep.evaluation import BELOW_ISOLATION, FIRST_FREQUENCY,
 from mount_models.damper import damper_curve
 from mount_models.hydromount import Hydromount
 from mount_models.quantity import checked
+from mount_report.drive.signals import FloatArray
 
 NAME = 'sensitivity'
 _BENCH_FREQUENCY, _BENCH_AMPLITUDE, _BENCH_SECONDS = 8.0, 1e-3, 4.75

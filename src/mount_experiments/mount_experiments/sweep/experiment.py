@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.parameters import DEFAULT_DAMPER, ControlParameters
-from mount_experiments.harness.closed_loop import mode_of, ride
+from mount_experiments.harness.closed_loop import driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -66,8 +66,8 @@ def run(order: Order, progress: Progress) -> Outcome:
         progress(0.95 * number / len(mounts), f'sweep, {name}')
         idle = parameters.idle_amplitude if name in (FRICTION_IDLE, HYDRO_IDLE) else 0.0
         label = name.replace(', ', '_').replace(' ', '_')
-        ridden = ride(order, label, _own(parameters, mount, idle), NAME)
-        runs[name] = SweepRun(ridden, FIRST_FREQUENCY + RATE * ridden.time)
+        drive = driven(order, label, _own(parameters, mount, idle), NAME)
+        runs[name] = SweepRun(drive, FIRST_FREQUENCY + RATE * drive.truth.time)
     progress(0.95, 'pictures')
     figures = _figures(runs, parameters, mode_of(order), _switch_on_level(order))
     pictures = [
@@ -81,7 +81,7 @@ def run(order: Order, progress: Progress) -> Outcome:
                 runs[FRICTION_IDLE], runs[HYDRO_IDLE], title, order.out / 'sweep_engine_idling.png'
             )
         )
-    recordings = [each.ride.recording for each in runs.values()]
+    recordings = [each.drive.recording for each in runs.values()]
     return Outcome(figures, pictures, recordings, _statements(figures))
 
 
