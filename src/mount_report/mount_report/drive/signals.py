@@ -82,7 +82,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
         recording=recording.path,
         zero=zero,
         seen=_seen(recording, zero),
-        truth=Truth((truth.stamps[order] - zero) / _SECOND, *(truth[name][order] for name in scalars)),
+        truth=Truth((truth.stamps[order] - zero) * 1e-9, *(truth[name][order] for name in scalars)),
     )
 
 
