@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mount_experiments.bench import REFERENCE, TITLE
 from mount_experiments.bench.evaluation import (
     COULOMB,
     HYDRO,
@@ -208,8 +209,8 @@ def _listed(numbers: list[int]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Friction mount and hydromount on a test rack',
-    reference='Fig. 13',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The rack moves the mount on a sine, by default 8 Hz and 1 mm. Initialisation and controller run as '
         'in the car, once with each damper characteristic, once with 0 A, and once with the original '

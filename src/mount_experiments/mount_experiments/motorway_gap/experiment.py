@@ -16,6 +16,7 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_experiments.harness.numbers import numbers_of
+from mount_experiments.motorway_gap import REFERENCE, TITLE
 from mount_experiments.motorway_gap.evaluation import (
     FRICTION,
     HYDRO,
@@ -211,8 +212,8 @@ def _span(durations: list[float]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Over a gap in the motorway',
-    reference='Fig. 15',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'A car at 119 km/h on a good road meets a gap; the paper does not tell its size, so three depths are '
         'driven, each with the friction mount, the same without current, and the original hydromount. Times '

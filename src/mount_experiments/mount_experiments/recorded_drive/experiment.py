@@ -17,6 +17,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
+from mount_experiments.recorded_drive import REFERENCE, TITLE
 from mount_experiments.recorded_drive.evaluation import (
     BANDS,
     ELASTOMER,
@@ -213,8 +214,8 @@ def _lower(values: list[float]) -> Holds:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='A recorded drive',
-    reference='Sec. 7',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The vertical acceleration that a real car recorded moves the chassis side of the mount, with '
         'friction mount, original hydromount and elastomer alone in the seat. Spectra and bands come from '

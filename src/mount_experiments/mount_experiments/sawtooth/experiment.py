@@ -16,6 +16,7 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_experiments.harness.rack_recording import SUBSTEPS, record_friction_rack
+from mount_experiments.sawtooth import REFERENCE, TITLE
 from mount_experiments.sawtooth.evaluation import Run, evaluate
 from mount_identification.friction.recording import FloatArray
 from mount_identification.friction.slip_regions import slip_regions
@@ -251,8 +252,8 @@ def _rms(values: FloatArray) -> float:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Friction contact alone on a saw tooth',
-    reference='Figs. 8 to 11',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The simulated pads (full model) are moved between two turning points at constant speed and constant '
         'normal force; after every second turning point the speed grows by 1 mm/s. Displacement, friction '

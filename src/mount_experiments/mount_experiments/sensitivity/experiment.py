@@ -16,6 +16,7 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_experiments.harness.numbers import numbers_of
+from mount_experiments.sensitivity import REFERENCE, TITLE
 from mount_experiments.sensitivity.grid import Job, run_all
 from mount_experiments.sensitivity.maps import (
     Axes,
@@ -204,8 +205,8 @@ def _statements(maps: Maps, told: dict[str, str]) -> list[Statement]:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='What the comparison with the hydromount depends on',
-    reference='Figs. 13, 14',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The paper gives neither the road level nor whether the engine ran, and nothing of its hydromount. '
         'So the sweep is run with all combinations of road level, resistance of the decoupler, asymmetry of '

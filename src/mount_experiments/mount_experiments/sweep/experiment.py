@@ -15,6 +15,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
+from mount_experiments.sweep import REFERENCE, TITLE
 from mount_experiments.sweep.evaluation import (
     ALWAYS,
     DEFINED_PEAK,
@@ -218,8 +219,8 @@ def _on_noise(figures: dict[str, Any]) -> Statement:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Front wheels from 1 to 50 Hz',
-    reference='Fig. 14',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The road under the wheel is a sine whose frequency rises by 1 Hz per second at a constant amplitude '
         'of its velocity (chosen). The same sweep is driven with the friction mount, the original '
