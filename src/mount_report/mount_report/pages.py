@@ -38,9 +38,9 @@ def write_report(
     pictures: Path | None,
     console: Console,
 ) -> list[Path]:
-    """Write the page to `file` and its figures into `pictures` unless that is None; return those files.
+    """Write the page to `file` and its charts into `pictures` unless that is None; return those files.
 
-    With `other`, it shares the figures and its differences from the first recording are told. What could
+    With `other`, it shares the charts and its differences from the first recording are told. What could
     not be made of the page is printed. Raises `ReportError`.
     """
     with progress_bar(console, transient=True) as progress:

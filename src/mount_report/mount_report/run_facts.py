@@ -12,7 +12,7 @@ from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
 from mount_report.drive.evaluation import tracking_error, wanted_force
 from mount_report.drive.signals import load_drive
-from mount_report.sections.figures import Levels
+from mount_report.sections.charts import Levels
 from mount_report.sections.subject import RunFacts, Tracking
 from mount_report.signals import Signals
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH

@@ -40,7 +40,7 @@ _ODD = (2, 4, 6)  # places of the third, fifth and seventh
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Move every mount on the sine, record it, and evaluate the recordings."""
-    from mount_experiments.bench import figures as drawing
+    from mount_experiments.bench import pictures as drawn
 
     parameters = parameters_of(order, NAME, BenchParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
@@ -57,8 +57,8 @@ def run(order: Order, progress: Progress) -> Outcome:
     figures = _figures(loops, drives, parameters, mode_of(order))
     title = f'{parameters.frequency:g} Hz, {1e3 * parameters.amplitude:g} mm'
     pictures = [
-        drawing.draw_hysteresis(loops, names, title, order.out / 'bench_hysteresis.png'),
-        drawing.draw_harmonics(loops, parameters.damper, title, order.out / 'bench_harmonics.png'),
+        drawn.draw_hysteresis(loops, names, title, order.out / 'bench_hysteresis.png'),
+        drawn.draw_harmonics(loops, parameters.damper, title, order.out / 'bench_harmonics.png'),
     ]
     return Outcome(figures, pictures, [each.recording for each in drives.values()], _statements(figures))
 

@@ -15,7 +15,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
-from mount_experiments.harness.numbers import numbers_of
+from mount_experiments.harness.number_list import numbers_of
 from mount_experiments.motorway_gap import REFERENCE, TITLE
 from mount_experiments.motorway_gap.evaluation import (
     FRICTION,
@@ -48,7 +48,7 @@ class GapParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Drive every mount over gaps of several depths, record it, and evaluate the recordings."""
-    from mount_experiments.motorway_gap.figures import draw_gap
+    from mount_experiments.motorway_gap.pictures import draw_gap
 
     parameters = parameters_of(order, NAME, GapParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made

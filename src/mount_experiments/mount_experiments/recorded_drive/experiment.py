@@ -57,7 +57,7 @@ class RecordedDriveParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Drive every mount on the recording, and evaluate spectra and bands."""
-    from mount_experiments.recorded_drive import figures as drawing
+    from mount_experiments.recorded_drive import pictures as drawn
     from mount_experiments.recorded_drive.page import write_recorded_drive
 
     parameters = parameters_of(order, NAME, RecordedDriveParameters())
@@ -83,8 +83,8 @@ def run(order: Order, progress: Progress) -> Outcome:
     spectra = {name: spectra_of(each) for name, each in drives.items()}
     figures = _figures(drives, parameters, control, mode_of(order))
     pictures = [
-        drawing.draw_spectra(spectra, order.out / 'recorded_drive_spectra.png'),
-        drawing.draw_traces(drives, control, order.out / 'recorded_drive.png'),
+        drawn.draw_spectra(spectra, order.out / 'recorded_drive_spectra.png'),
+        drawn.draw_traces(drives, control, order.out / 'recorded_drive.png'),
     ]
     page = write_recorded_drive(figures, pictures, rate, order.out / f'{NAME}.md')
     recordings = [each.recording for each in drives.values()]

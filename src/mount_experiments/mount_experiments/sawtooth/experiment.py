@@ -53,7 +53,7 @@ class SawtoothParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Move the rack at every normal force, record it, and evaluate the recordings."""
-    from mount_experiments.sawtooth import figures
+    from mount_experiments.sawtooth import pictures as drawn
 
     parameters = parameters_of(order, NAME, SawtoothParameters())
     _check_order(parameters)
@@ -66,10 +66,10 @@ def run(order: Order, progress: Progress) -> Outcome:
     progress(0.95, 'pictures')
     shown = runs[int(np.argmin(np.abs(np.array(loads) - parameters.shown_normal_force)))]
     pictures = [
-        figures.draw_time(shown, order.out / 'sawtooth_force.png'),
-        figures.draw_lines(shown, order.out / 'sawtooth_mu_over_u.png'),
-        figures.draw_parameters(runs, parameters.friction, order.out / 'sawtooth_a_b.png'),
-        figures.draw_models(shown, order.out / 'sawtooth_models.png'),
+        drawn.draw_time(shown, order.out / 'sawtooth_force.png'),
+        drawn.draw_lines(shown, order.out / 'sawtooth_mu_over_u.png'),
+        drawn.draw_parameters(runs, parameters.friction, order.out / 'sawtooth_a_b.png'),
+        drawn.draw_models(shown, order.out / 'sawtooth_models.png'),
     ]
     results = _figures(runs, shown, parameters)
     return Outcome(results, pictures, recordings, _statements(results))

@@ -15,7 +15,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
-from mount_experiments.harness.numbers import numbers_of
+from mount_experiments.harness.number_list import numbers_of
 from mount_experiments.sensitivity import REFERENCE, TITLE
 from mount_experiments.sensitivity.grid import Job, run_all
 from mount_experiments.sensitivity.maps import (
@@ -38,7 +38,7 @@ _HIGHEST_LEVEL = 1.0  # m/s
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Run all combinations, and write maps and a page from the numbers."""
-    from mount_experiments.sensitivity import figures as drawing
+    from mount_experiments.sensitivity import pictures as drawn
     from mount_experiments.sensitivity.page import in_short, write_results
 
     parameters = parameters_of(order, NAME, SensitivityParameters())
@@ -54,8 +54,8 @@ def run(order: Order, progress: Progress) -> Outcome:
     progress(0.97, 'pictures')
     folder = order.out / 'figures'
     pictures = [
-        drawing.draw_peaks(maps, folder / 'sensitivity_displacement.png'),
-        drawing.draw_acceleration(maps, folder / 'sensitivity_acceleration.png'),
+        drawn.draw_peaks(maps, folder / 'sensitivity_displacement.png'),
+        drawn.draw_acceleration(maps, folder / 'sensitivity_acceleration.png'),
     ]
     page = write_results(maps, parameters, len(jobs), pictures, order.out / 'results.md')
     statements = _statements(maps, in_short(maps))

@@ -55,7 +55,7 @@ class SweepParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Drive every mount through the sweep, record it, and evaluate the recordings."""
-    from mount_experiments.sweep import figures as drawing
+    from mount_experiments.sweep import pictures as drawn
 
     parameters = parameters_of(order, NAME, SweepParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
@@ -72,13 +72,13 @@ def run(order: Order, progress: Progress) -> Outcome:
     progress(0.95, 'pictures')
     figures = _figures(runs, parameters, mode_of(order), _switch_on_level(order))
     pictures = [
-        drawing.draw_sweep(runs[FRICTION], runs[HYDRO], 'road alone (Fig. 14)', order.out / 'sweep.png'),
-        drawing.draw_peaks(runs, order.out / 'sweep_peaks.png'),
+        drawn.draw_sweep(runs[FRICTION], runs[HYDRO], 'road alone (Fig. 14)', order.out / 'sweep.png'),
+        drawn.draw_peaks(runs, order.out / 'sweep_peaks.png'),
     ]
     if FRICTION_IDLE in runs:
         title = f'road, and the engine idling with {parameters.idle_amplitude:g} N'
         pictures.append(
-            drawing.draw_sweep(
+            drawn.draw_sweep(
                 runs[FRICTION_IDLE], runs[HYDRO_IDLE], title, order.out / 'sweep_engine_idling.png'
             )
         )

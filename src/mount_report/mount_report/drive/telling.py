@@ -78,7 +78,7 @@ def tell_snapshots(
 
 
 def _draw(folder: RunFolder, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:
-    from mount_report.drive.figure import draw_drive  # after the drive: what draws takes a second to load
+    from mount_report.drive.picture import draw_drive  # after the drive: what draws takes a second to load
 
     control = control_parameters(parameters)
     title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
