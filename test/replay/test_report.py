@@ -124,7 +124,7 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 @pytest.mark.parametrize(
     ('broken', 'file'),
     [
-        ('mount_report.drive.figure.draw_drive', 'drive.png'),
+        ('mount_report.drive.picture.draw_drive', 'drive.png'),
         ('mount_report.pages.make_report', 'report.html'),
     ],
 )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mount_control import band_pass, force_to_current, switching
 from mount_control.settings import ControlSettings
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.damper import damper_force
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -21,7 +21,7 @@ FADE_SAMPLES = 50
 distance from what the new law asks for then falls evenly to zero."""
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 
-TRACE = np.dtype(
+TRACE = record_type(
     [
         (name, 'f8')
         for name in (
@@ -43,7 +43,7 @@ TRACE = np.dtype(
 )
 """Every intermediate of one control step, SI; the fields of the topic `control_trace` in its order."""
 
-_STATE = np.dtype(
+_STATE = record_type(
     [
         ('band', band_pass.STATE),
         ('switching', switching.STATE),

@@ -35,9 +35,9 @@ def write_report(
     pictures: Path | None,
     screen: Screen,
 ) -> list[Path]:
-    """Write the page to `file` and its figures into `pictures` unless that is None; return those files.
+    """Write the page to `file` and its charts into `pictures` unless that is None; return those files.
 
-    With `other`, it shares the figures and its differences from the first recording are told. What could
+    With `other`, it shares the charts and its differences from the first recording are told. What could
     not be made of the page is printed. Raises `ReportError`.
     """
     with screen.bar('reading', transient=True) as show:

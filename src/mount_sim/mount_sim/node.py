@@ -21,7 +21,6 @@ from mount_sim.electronics.faults import Fault
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.plant import TRUTH
 from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 
 _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
@@ -47,8 +46,6 @@ class MountSim(SafeLifecycleNode):
         self._excitation = build_excitation(self._settings)
         self._fault = Fault(self._settings.fault)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
-        if self._truth.names != TRUTH.names:
-            raise ValueError('sim/truth in the topic registry differs from what the plant gives')
         self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
         self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
         path = self.open_data_path()

@@ -80,7 +80,7 @@ def _told(
     if json_file is not None:
         json_file.write_text(json.dumps(as_json(comparison), indent=2, allow_nan=False) + '\n')
     if figure is not None:
-        from mount_report.compare_figure import draw_comparison
+        from mount_report.compare_picture import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
         console.print(f'figure {figure}', soft_wrap=True)

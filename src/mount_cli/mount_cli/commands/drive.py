@@ -66,7 +66,7 @@ def drive(
     out: NewFolder = None,
     json_file: JsonFile = None,
     report: Annotated[
-        bool, typer.Option('--report/--no-report', help='draw the figure and write the page about the run')
+        bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
     on_full: Annotated[
         str, typer.Option(help='full disk: stop the run, or continue without recording')

@@ -19,6 +19,7 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_experiments.harness.drawing import BLUE, RED, family, finish, new_figure
+from mount_experiments.inductance_map import REFERENCE, TITLE
 from mount_models.actuator.closing import ClosingMechanics, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.crossing import find_crossing
@@ -280,8 +281,8 @@ def _told(ranges: list[list[float]]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Incremental inductance over current and gap',
-    reference='Fig. 4',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'Thin lines: the gap of the simulated actuator is held on the rig and the current stepped; each '
         'point averages 50 ripples. Thick line: the current ramp of the initialisation on the assembled '
