@@ -1,6 +1,6 @@
 """No number of a node, a core run or a replay passes a function that differs from processor to processor.
 
-`docs/interface.md`, "The same bytes on every processor", says why; `test/replay/test_same_bytes.py` shows it
+`docs/explanation/same_bytes.md` says why; `test/replay/test_same_bytes.py` shows it
 for what it runs. This test also sees what that one does not run.
 """
 

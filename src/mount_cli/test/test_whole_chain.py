@@ -1,6 +1,7 @@
 """From recordings of a rack to a drive: files all the way, and no truth of the plant in any of them.
 
-`python test_whole_chain.py SEED...` prints the errors of each step for other draws (docs/identification.md).
+`python test_whole_chain.py SEED...` prints the errors of each step for other draws, as they stand in
+docs/explanation/identification.md.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
 """Replay through the real nodes over topics: each sample is sent when the one before it was answered.
 
 Player and nodes share this process and one data thread, in a namespace of their own, so that a graph which
-runs in the same domain neither hears nor disturbs them. A sample that is not answered ends the replay.
+runs in the same domain neither receives nor disturbs them. A sample that is not answered ends the replay.
 """
 
 import os

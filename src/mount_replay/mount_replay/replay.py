@@ -38,7 +38,7 @@ REPLAYED_NODES = ('mount_control', 'mount_init')
 
 @dataclass(frozen=True)
 class ReplayOrder:
-    """What the user wants; `changes` are parameters other than those recorded, {node: {parameter: value}}.
+    """What the user orders; `changes` are parameters other than those recorded, {node: {parameter: value}}.
 
     `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one.
     """

@@ -73,7 +73,7 @@ class MountSim(SafeLifecycleNode):
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
         if self.lockstep and interface == 'virtual':
-            # Both ends of the bus live in this process: whoever answers works in the data thread.
+            # Both ends of the bus are in this process: the answering node works in the data thread.
             self._path.attend(self._step)
         else:
             self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
@@ -96,7 +96,7 @@ class MountSim(SafeLifecycleNode):
     def _prepare_mount(self) -> None:
         self._mount = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
         rehearsal = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
-        rehearsal.measure()  # loads the compiled plant before time begins to run
+        rehearsal.measure()  # loads the compiled plant before simulated time begins
         rehearsal.advance(0.0)
 
     def _run(self) -> None:

@@ -15,7 +15,7 @@ EPILOG = """Examples:
 
 `engine-mount experiment sawtooth --set sawtooth.friction.b_offset=-14` - with other pads
 
-`engine-mount experiment all --page docs/experiments.md` - all, with the page and its pictures
+`engine-mount experiment all --page docs/explanation/experiments.md` - all, with the page and its pictures
 """
 
 

@@ -30,7 +30,7 @@ class CoreChain:
 
     @property
     def displacement_range(self) -> float:
-        """Displacements (m) up to here are believed."""
+        """Displacements (m) up to here are plausible."""
         return self._control.parameters.displacement_range
 
     def take_temperature(self, stamp: int, celsius: float) -> None:

@@ -140,7 +140,7 @@ def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending
 def _take_many(
     mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float
 ) -> tuple[int, float]:
-    """Take samples while nothing is doubtful; return how many, and the setpoint (A) for the next."""
+    """Take samples while all of them are plausible; return how many, and the setpoint (A) for the next."""
     controller = chain.answering.controller
     assert controller is not None
     ahead = mount.ahead(samples.room)
