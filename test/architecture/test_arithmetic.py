@@ -49,7 +49,7 @@ ALLOWED = {
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimation', 'np.sum'): 'whole numbers',
     ('mount_bags.container.writer', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.container.message_compression', 'np.cumsum'): 'whole numbers',
+    ('mount_bags.container.stored', 'np.cumsum'): 'whole numbers',
     ('mount_bags.signals.even_grid', 'np.mean'): 'shares of whole numbers',
     ('mount_bags.messages.stamps', 'np.cumsum'): 'whole numbers',
     ('mount_bags.messages.time_axis', 'np.interp'): 'times told to people',

@@ -34,12 +34,10 @@ from mount_ros.topics import (
     DIAGNOSTICS,
     RACK_TOPICS,
     SESSION,
-    SIM_TRUTH,
     TOPICS,
     Delivery,
     Topic,
 )
-from mount_sim.plant.plant import TRUTH
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
@@ -106,10 +104,6 @@ def test_only_experiments_use_the_topics_of_the_rack():
 
 def test_control_traces_what_the_registry_declares():
     assert TRACE.names == CONTROL_TRACE.names
-
-
-def test_the_plant_gives_what_the_registry_declares():
-    assert TRUTH.names == SIM_TRUTH.names
 
 
 def test_every_topic_that_a_source_names_is_registered():

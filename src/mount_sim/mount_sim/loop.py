@@ -7,15 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mount_driver.codec import Status
+from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import STATUS_EVERY, ElectronicsParameters
 from mount_sim.electronics.faults import Fault
-from mount_sim.plant.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
 _LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
 _REMEMBERED = 1024  # samples whose sending time is kept
-_MICROSECONDS = 1_000_000
+_NS = 1000  # ns per us
 
 
 class NoAnswerError(RuntimeError):
@@ -115,7 +116,7 @@ class ElectronicsLoop:
         taken = self._valid(received, now)
         reading = self._fault.reading(now, mount.measure())
         frame = self._can_end.measurement_frame(
-            number, number * round(SAMPLE_TIME * _MICROSECONDS), reading, mount.enabled
+            number, number * SAMPLE_TIME_NS // _NS, reading, mount.enabled
         )
         arriving = self._fault.frame(now, number, frame)
         self._sent_at[number % _REMEMBERED] = time.time()

@@ -11,6 +11,7 @@ from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.random_numbers import RandomNumbers
 from mount_models.coil.ripple import current_rate, flux_rate
 from mount_models.quantity import Quantity
+from mount_models.sampling import SETPOINT_TIMEOUT
 
 STATUS_EVERY = 100
 """Samples from one status to the next: 10 Hz; the first sample has one."""
@@ -24,7 +25,7 @@ class ElectronicsParameters(NamedTuple):
     ] = 400.0
     setpoint_timeout: Annotated[
         float, Quantity('s', 'without a setpoint for so long the electronics go to 0 A', 0.001, 1.0, 'chosen')
-    ] = 0.020
+    ] = SETPOINT_TIMEOUT
     displacement_noise: Annotated[
         float, Quantity('m', 'noise of the displacement sensor', 0.0, 1e-3, 'chosen')
     ] = 2e-6
