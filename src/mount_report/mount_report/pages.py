@@ -1,6 +1,7 @@
 """Writes the page and the pictures of a report, with a progress bar."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -52,8 +53,8 @@ def write_report(
         together = [*recordings, *([other] if other is not None else [])]
         subjects = subjects_of(together, run_facts)
         on_step('comparing', 0.2)
-        comparison = _comparison(recordings[0], other)
-        made = make_report(subjects, comparison, lambda what, share: on_step(what, 0.2 + 0.4 * share))
+        subjects[-1] = replace(subjects[-1], comparison=_comparison(recordings[0], other))
+        made = make_report(subjects, lambda what, share: on_step(what, 0.2 + 0.4 * share))
         for failure in made.failures:
             note(console, failure)
         on_step('writing the page', 0.6)
