@@ -4,7 +4,7 @@ import time
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from std_msgs.msg import String
 from mount_bags.bag.writer import BagWriter
 from mount_bags.run.versions import versions
 from mount_bringup.graph.supervisor import session_text
+from mount_models.quantity import Quantity
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import (
@@ -27,6 +28,11 @@ from mount_ros.topics import (
 from mount_sim.rack.friction import RackRecording
 
 FloatArray = npt.NDArray[np.float64]
+
+ForceNoise = Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)]
+DisplacementNoise = Annotated[
+    float, Quantity('m', 'standard deviation of the displacement sensor', 0.0, 1e-5)
+]
 
 SUBSTEPS = 10
 """Steps of the simulation in each sample of an experiment's rack (chosen): 0.1 ms."""
