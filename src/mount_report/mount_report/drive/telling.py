@@ -22,8 +22,8 @@ from mount_report.drive.summary import (
     snapshots_sentence,
     summarise,
     summarise_snapshots,
-    write_json,
 )
+from mount_report.json_file import write_json
 
 
 @dataclass
