@@ -14,7 +14,7 @@ from mount_report.sections.subject import RunFacts, Subject
 from mount_report.signals import Signals
 
 OnStep = Callable[[str, float], None]
-"""Hears what is being done, and the share of all that is done."""
+"""Called with what is being done, and the share of all that is done."""
 
 MakeSection = Callable[[Sequence[Subject]], Section | None]
 
@@ -95,7 +95,7 @@ def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda what, shar
     for place, make in enumerate(SECTIONS):
         on_step(make.__name__, place / len(SECTIONS))
         made += _section_or_reason(make, subjects, failures)
-    # Last, for it also says what the others looked for in vain.
+    # Last, because it also says what the others did not find.
     overview = _section_or_reason(run_sections.overview, subjects, failures)
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
     return Report(title, [*overview, *made], POINTS // len(subjects), failures)
@@ -105,7 +105,7 @@ def _section_or_reason(make: MakeSection, subjects: Sequence[Subject], failures:
     what = make.__name__
     try:
         section = make(subjects)
-    except Exception as error:  # whatever it stumbles over: the other sections are worth having
+    except Exception as error:  # of any kind: the other sections are still of use
         reason = str(error) or type(error).__name__
         failures.append(f'section {what} could not be made: {reason}')
         return [Section(what, what.capitalize(), [f'Section {what} could not be made: {reason}'])]
