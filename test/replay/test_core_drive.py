@@ -271,11 +271,11 @@ def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
 def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(run, monkeypatch):
     take_many, poisoned = core_run._take_many, []
 
-    def take_many_and_poison(mount, chain, controller, samples, pending):
+    def take_many_and_poison(mount, chain, samples, pending):
         if mount.time > 5.0 and not poisoned:
-            controller.memory.state.view(_STATE)['band']['z1'] = np.nan
+            chain.answering.controller.memory.state.view(_STATE)['band']['z1'] = np.nan
             poisoned.append(mount.sample)
-        return take_many(mount, chain, controller, samples, pending)
+        return take_many(mount, chain, samples, pending)
 
     monkeypatch.setattr(core_run, '_take_many', take_many_and_poison)
     recorded = run(BENCH)

@@ -106,7 +106,7 @@ def test_friction_has_the_harmonics_that_the_dead_zone_asks_for(rack, damper):
 
 
 def test_the_page_on_differences_tells_the_harmonics_of_the_law_and_of_this_rack(rack):
-    page = Path(__file__).parents[3] / 'docs' / 'differences.md'
+    page = Path(__file__).parents[3] / 'docs' / 'explanation' / 'differences.md'
     rows = re.findall(r'^\| (\d000) \| ([357]) \| ([\d.]+) \| ([\d.]+) \|', page.read_text(), re.MULTILINE)
     assert len(rows) == 12
     velocity = 2 * np.pi * 8e-3 * np.cos(2 * np.pi * np.arange(20000) / 20000)

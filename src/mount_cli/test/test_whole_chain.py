@@ -1,6 +1,7 @@
 """From recordings of a rack to a drive: files all the way, and no truth of the plant in any of them.
 
-`python test_whole_chain.py SEED...` prints the errors of each step for other draws (docs/identification.md).
+`python test_whole_chain.py SEED...` prints the errors of each step for other draws, as they stand in
+docs/explanation/identification.md.
 """
 
 import contextlib
@@ -16,7 +17,7 @@ import pytest
 from scipy.optimize import brentq
 
 from mount_bags.bag.recording import open_recording
-from mount_bringup.chosen import chosen_damper, control_parameters, friction_model
+from mount_bringup.chosen import chosen_control, chosen_damper, control_parameters
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
@@ -156,9 +157,9 @@ def test_a_drawn_actuator_with_drawn_pads_is_controlled_by_its_identified_files_
 
 
 def test_the_controller_takes_contact_and_coefficients_from_the_file(file):
-    taken = friction_model({'mount_control': {'parameters_file': str(file), 'specimen': 'drawn'}})
+    taken = chosen_control({'mount_control': {'parameters_file': str(file), 'specimen': 'drawn'}})
     told = load_specimen(file).friction
-    assert {**taken[0]._asdict(), **taken[1]._asdict()} == told
+    assert {**taken.friction._asdict(), **taken.contact._asdict()} == told
     for name, usual in FrictionContact()._asdict().items():
         assert told[name] != pytest.approx(usual, rel=0.04)  # a default that stood in would be seen
 

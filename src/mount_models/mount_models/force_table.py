@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.actuator.law import ForceLaw, checked_current_for_force, checked_force
+from mount_models.sampling import HIGHEST_CURRENT
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -51,7 +52,7 @@ def current_force_table(
     pad_stiffness: float,
     rest_gap: float,
     contact_gap: float,
-    current_high: float = 3.0,
+    current_high: float = HIGHEST_CURRENT,
     step: float = 0.5,
 ) -> FloatArray:
     """Return the current-force table, shape (2, N): rows current (A) and normal force on the pads (N).

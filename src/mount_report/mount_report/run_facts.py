@@ -1,10 +1,8 @@
 """What a recording's session tells of its run: levels, coil, damper. A report draws and computes with it."""
 
-from typing import Any
-
 import numpy as np
-import yaml
 
+from mount_bags.run.session import SessionError, session_content, session_parameters
 from mount_bringup.chosen import Parameters, chosen_damper, control_parameters
 from mount_bringup.mount_choice import seat_of
 from mount_control.parameters import DEFAULT_DAMPER
@@ -58,13 +56,9 @@ def run_facts(signals: Signals) -> RunFacts:
 def _parameters(session: str) -> Parameters | None:
     """Return the parameters by node, None where the session tells none."""
     try:
-        content: Any = yaml.safe_load(session)
-    except yaml.YAMLError:
+        return session_parameters(session_content(session)) or None
+    except SessionError:
         return None
-    found = content.get('parameters') if isinstance(content, dict) else None
-    if not isinstance(found, dict):
-        return None
-    return {str(node): values for node, values in found.items() if isinstance(values, dict)}
 
 
 def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None, str]:

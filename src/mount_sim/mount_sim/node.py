@@ -8,7 +8,7 @@ from sensor_msgs.msg import Imu
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
@@ -23,7 +23,6 @@ from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 
-_SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
 _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
 
 
@@ -74,7 +73,7 @@ class MountSim(SafeLifecycleNode):
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
         if self.lockstep and interface == 'virtual':
-            # Both ends of the bus live in this process: whoever answers works in the data thread.
+            # Both ends of the bus are in this process: the answering node works in the data thread.
             self._path.attend(self._step)
         else:
             self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
@@ -97,7 +96,7 @@ class MountSim(SafeLifecycleNode):
     def _prepare_mount(self) -> None:
         self._mount = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
         rehearsal = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
-        rehearsal.measure()  # loads the compiled plant before time begins to run
+        rehearsal.measure()  # loads the compiled plant before simulated time begins
         rehearsal.advance(0.0)
 
     def _run(self) -> None:
@@ -128,7 +127,7 @@ class MountSim(SafeLifecycleNode):
         self.get_logger().error(sentence)
 
     def _publish(self, number: int) -> None:
-        stamp = self._time_zero + number * _SAMPLE_NANOSECONDS
+        stamp = self._time_zero + number * SAMPLE_TIME_NS
         truth = self._mount.truth
         if self._loop is not None and not self.lockstep:
             truth['setpoint_latency'] = self._loop.last_latency

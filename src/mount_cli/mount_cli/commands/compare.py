@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, refuse, terminal
 from mount_cli.commands.options import JsonFile
+from mount_cli.terminal import note, refuse, terminal
 
 EPILOG = """Examples:
 
@@ -59,6 +59,7 @@ def _told(
     from mount_bags.compare.tolerances import Tolerances
     from mount_bags.compare.words import as_json, as_table, sentences
     from mount_bags.run.place import open_run
+    from mount_cli.screen import TerminalScreen
     from mount_report.json_file import write_json
 
     console = terminal()
@@ -68,7 +69,7 @@ def _told(
     for sentence in sentences(comparison):
         console.print(f'- {sentence}', soft_wrap=True)
     if comparison.differing:
-        console.print(as_table(comparison))
+        TerminalScreen(console).table(as_table(comparison))
     console.print(
         f'Times are from the first displacement sample of A; {comparison.alignments.sentence}.',
         soft_wrap=True,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import terminal
+from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
 
@@ -15,7 +15,7 @@ EPILOG = """Examples:
 
 `engine-mount experiment sawtooth --set sawtooth.friction.b_offset=-14` - with other pads
 
-`engine-mount experiment all --page docs/experiments.md` - all, with the page and its pictures
+`engine-mount experiment all --page docs/explanation/experiments.md` - all, with the page and its pictures
 """
 
 
@@ -54,8 +54,8 @@ def experiment(
         for name, reference, title in listed():
             console.print(f'{name:22}{reference:15}{title}', soft_wrap=True)
         return
-    from mount_bringup.progress_bar import progress_bar
     from mount_bringup.settings import SettingError
+    from mount_cli.screen import TerminalScreen
     from mount_experiments.orders import orders, run_all
     from mount_experiments.page import print_outcome, write_page
     from mount_report.json_file import write_json
@@ -66,10 +66,10 @@ def experiment(
         given = orders(experiments_named(names), settings or [], out, graph=graph)
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
-    with progress_bar(console) as progress:
-        outcomes = run_all(given, progress)
+    screen = TerminalScreen(console)
+    outcomes = run_all(given, screen)
     for known, outcome in outcomes:
-        print_outcome(known, outcome, console)
+        print_outcome(known, outcome, screen)
     if json_file is not None:
         figures = {known.name: outcome.figures for known, outcome in outcomes}
         write_json(figures if len(figures) > 1 else next(iter(figures.values())), json_file)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 EPILOG = """Examples:
 
@@ -44,13 +44,14 @@ def report(
     Several recordings share the charts. What a recording lacks stands in the page in words.
     """
     from mount_bags.run.place import open_run
+    from mount_cli.screen import TerminalScreen
     from mount_report.pages import default_page, default_pictures, write_report
 
     console = terminal()
     opened = [open_run(path) for path in recordings]
     compared = None if other is None else open_run(other)
     file = out or default_page(recordings[0])
-    files = write_report(opened, compared, file, pictures or default_pictures(file), console)
+    files = write_report(opened, compared, file, pictures or default_pictures(file), TerminalScreen(console))
     for recording in (*opened, *([compared] if compared else [])):
         for warning in recording.warnings:
             note(console, f'{recording.path}: {warning}')

@@ -173,7 +173,7 @@ def _on_harmonics(runs: dict[str, Any], family: list[str]) -> Statement:
         'Fig. 13, right; Sec. 7',
         'The friction mount has lower force harmonics than the original mount up to the 8th.',
         f'Lower than the simulated hydromount: {told}. The even ones prove nothing: the simulated hydromount '
-        'has them only through an assumed asymmetry of its upper chamber (see docs/results.md).',
+        'has them only through an assumed asymmetry of its upper chamber (see docs/explanation/results.md).',
         Holds.YES if everywhere else Holds.PARTLY if anywhere else Holds.NO,
     )
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from mount_bags.bag.recording import open_recording
+from mount_bags.run.screen import Screen
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.settings import defaults_of_nodes
-from mount_bringup.terminal import terminal
 from mount_experiments.harness.contract import ExperimentError, Order
 from mount_replay.drive.drive import DriveOrder, record_drive
 from mount_report.drive.signals import DriveSignals, load_drive
@@ -51,7 +51,7 @@ def driven(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], exper
         out=order.out / label,
     )
     # the experiments' own bar is on the screen
-    folder, run, complaints = record_drive(drive_order, terminal(file=io.StringIO()))
+    folder, run, complaints = record_drive(drive_order, Screen(io.StringIO()))
     recording = open_recording(folder.recording)
     complaints += recording.warnings
     if complaints:

@@ -2,24 +2,20 @@
 
 import time
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from geometry_msgs.msg import WrenchStamped
-from std_msgs.msg import String
 
 from mount_bags.bag.writer import BagWriter
-from mount_bags.run.versions import versions
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import new_session, session_message, session_text
 from mount_models.quantity import Quantity
-from mount_ros.messages.cdr import serialised
+from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import (
     DISPLACEMENT,
-    SAMPLE_RATE,
     SESSION,
     SIM_CLAMP_FORCE,
     SIM_MOUNT_FORCE,
@@ -36,7 +32,6 @@ DisplacementNoise = Annotated[
 
 SUBSTEPS = 10
 """Steps of the simulation in each sample of an experiment's rack (chosen): 0.1 ms."""
-_SAMPLE_NANOSECONDS = round(1e9 / SAMPLE_RATE)
 _TOPICS = (SESSION, DISPLACEMENT, SIM_MOUNT_FORCE, SIM_CLAMP_FORCE)
 
 
@@ -51,13 +46,13 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
     try:
         for topic in _TOPICS:
             writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
-        writer.write(f'/{SESSION.name}', _session(session), begin)
+        writer.write(f'/{SESSION.name}', session_message(session_text(new_session(session))), begin)
         positions = ScalarsLayout(DISPLACEMENT)
         forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
         channels = measured.displacement, measured.friction_force, measured.normal_force
         rows = zip(*(channel.tolist() for channel in channels), strict=True)
         for sample, (x, friction, clamp) in enumerate(rows):
-            stamp = sample * _SAMPLE_NANOSECONDS
+            stamp = sample * SAMPLE_TIME_NS
             at = begin + stamp
             writer.write(f'/{DISPLACEMENT.name}', positions.pack(stamp, (x,)), at)
             writer.write(f'/{SIM_MOUNT_FORCE.name}', forces.pack(stamp, friction), at)
@@ -65,8 +60,3 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
     finally:
         writer.close()
     return folder
-
-
-def _session(content: Mapping[str, Any]) -> bytes:
-    started = datetime.now().astimezone().isoformat(timespec='seconds')
-    return serialised(String(data=session_text({**content, 'started': started, 'versions': versions()})))

@@ -1,7 +1,6 @@
 """Fig. 4: incremental inductance over current, at held gaps and on the assembled actuator; its sections."""
 
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -9,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.run.versions import versions
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import new_session, session_text
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -114,18 +112,14 @@ def _record_ramp(order: Order, parameters: InductanceParameters, progress: Progr
         **flattened(parameters.coil, 'coil'),
         **flattened(parameters.mechanics, 'mechanics'),
     }
-    session = session_text(
-        {
-            'scenario': NAME,
-            'mode': 'core',
-            'started': datetime.now().astimezone().isoformat(timespec='seconds'),
-            'parameters': {NAME: flattened(parameters), 'mount_sim': sim},
-            'versions': versions(),
-        }
-    )
+    told = {NAME: flattened(parameters), 'mount_sim': sim}
+    session = new_session({'scenario': NAME, 'mode': 'core', 'parameters': told})
     folder = order.out / NAME
     outcome = record_core(
-        folder, {'mount_sim': sim}, session, lambda share: progress(0.2 + 0.6 * share, 'ramp of the actuator')
+        folder,
+        {'mount_sim': sim},
+        session_text(session),
+        lambda share: progress(0.2 + 0.6 * share, 'ramp of the actuator'),
     )
     if outcome.result is None:
         raise ValueError('the initialisation gave no result; the recording ends before it')

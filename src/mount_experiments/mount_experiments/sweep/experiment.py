@@ -183,7 +183,7 @@ def _on_damping(figures: dict[str, Any]) -> Statement:
         f'Largest displacement from 7 to 10 Hz in mm: {told}. So {share:.2f} of the hydromount; damping '
         f'always on leaves {undamped:.2f} of the undamped one. Counted as far higher '
         f'below {FAR_HIGHER:g} of the hydromount (chosen). Against the hydromount this depends on the '
-        'road level (docs/results.md).',
+        'road level (docs/explanation/results.md).',
         Holds.YES if share < FAR_HIGHER else Holds.PARTLY if share < 1.0 else Holds.NO,
     )
 
@@ -212,7 +212,8 @@ def _on_noise(figures: dict[str, Any]) -> Statement:
         reference,
         paper,
         f'Rms of the friction mount over that of the hydromount, {"; ".join(told)}. The paper does not say '
-        'whether the engine ran; both road level and idle force are assumed here (docs/results.md).',
+        'whether the engine ran; both road level and idle force are assumed here '
+        '(docs/explanation/results.md).',
         Holds.YES if all(lower) else Holds.PARTLY if any(lower) else Holds.NO,
     )
 
@@ -226,7 +227,7 @@ EXPERIMENT = Experiment(
         'of its velocity (chosen). The same sweep is driven with the friction mount, the original '
         'hydromount, the friction mount without current and with damping always on, and with an idling '
         'engine; displacement and chassis acceleration come from the recordings. Which of the two '
-        'mounts is better depends on what the paper does not give: docs/results.md.'
+        'mounts is better depends on what the paper does not give: docs/explanation/results.md.'
     ),
     defaults=SweepParameters(),
     run=run,

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
-from mount_bags.messages.time_axis import time_axis
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
 
 FloatArray = NDArray[np.float64]
@@ -73,7 +72,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
             SIM_TRUTH.name: (*scalars, *_AT_THE_END),
         }
     )
-    zero = time_axis(recording).zero
+    zero = recording.time_axis.zero
     if excitation_start is not None:
         zero = excitation_stamp(recording, excitation_start)
     truth = recording[SIM_TRUTH.name]

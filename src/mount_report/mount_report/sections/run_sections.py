@@ -10,7 +10,7 @@ from mount_bags.audit.report import sentences as audit_sentences
 from mount_bags.compare.quantity_text import quantity_text, time_text
 from mount_bags.compare.words import by_importance
 from mount_bags.compare.words import sentences as comparison_sentences
-from mount_bags.run.session_differences import session_values
+from mount_bags.run.session import session_values
 from mount_report.sections import charts
 from mount_report.sections.charts import Named
 from mount_report.sections.coil_load import CoilLoad, coil_load
