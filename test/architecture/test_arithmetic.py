@@ -44,7 +44,6 @@ ALLOWED = {
     ('mount_models.arithmetic.elementary', '**'): 'powers of whole numbers and fractions',
     ('mount_sim.plant.check', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_models.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
-    ('mount_models.vehicle', '**'): 'energy, which no run uses',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimation', 'np.sum'): 'whole numbers',

@@ -130,11 +130,6 @@ def resting_vehicle() -> npt.NDArray[Any]:
     return np.zeros(1, VEHICLE_STATE)
 
 
-def resting_engine() -> npt.NDArray[Any]:
-    """Return the state (1,) of an engine at rest; pass element 0 to `engine_step`."""
-    return np.zeros(1, ENGINE_STATE)
-
-
 def modes(vehicle: Vehicle, mount_stiffness: float | None = None) -> FloatArray:
     """Return the four undamped natural frequencies (Hz); `mount_stiffness` in N/m, k_e if not given."""
     mount = vehicle.elastomer.static_stiffness if mount_stiffness is None else mount_stiffness
@@ -146,28 +141,3 @@ def modes(vehicle: Vehicle, mount_stiffness: float | None = None) -> FloatArray:
     scale = 1.0 / np.sqrt(masses)
     squares = np.linalg.eigvalsh(stiffness * np.outer(scale, scale))
     return np.asarray(np.sqrt(squares) / (2.0 * np.pi), dtype=np.float64)
-
-
-def mechanical_energy(vehicle: Vehicle, state: Any, road_height: float = 0.0) -> float:
-    """Return the energy (J) of a record of `VEHICLE_STATE`: motion, springs, springs of the branches."""
-    elastomer = vehicle.elastomer
-    motion = (
-        vehicle.wheel_mass * state['wheel_velocity'] ** 2
-        + vehicle.body_mass * state['body_velocity'] ** 2
-        + vehicle.chassis_mass * state['chassis_velocity'] ** 2
-        + vehicle.engine_mass * state['engine_velocity'] ** 2
-    )
-    springs = (
-        vehicle.tyre_stiffness * (road_height - state['wheel_height']) ** 2
-        + vehicle.suspension_stiffness * (state['wheel_height'] - state['body_height']) ** 2
-        + vehicle.chassis_stiffness * (state['body_height'] - state['chassis_height']) ** 2
-        + elastomer.static_stiffness * (state['engine_height'] - state['chassis_height']) ** 2
-    )
-    branches = 0.0
-    for force, stiffness in (
-        (state['slow_force'], elastomer.slow_stiffness),
-        (state['middle_force'], elastomer.middle_stiffness),
-        (state['fast_force'], elastomer.fast_stiffness),
-    ):
-        branches += force**2 / stiffness if stiffness > 0.0 else 0.0
-    return float(0.5 * (motion + springs + branches))

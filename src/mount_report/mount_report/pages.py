@@ -1,6 +1,7 @@
 """Writes the page and the pictures of a report, with a progress bar."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mount_bags.bag.recording import Recording
@@ -44,8 +45,8 @@ def write_report(
         together = [*recordings, *([other] if other is not None else [])]
         subjects = subjects_of(together, run_facts)
         show(0.2, 'comparing')
-        comparison = _comparison(recordings[0], other)
-        made = make_report(subjects, comparison, lambda what, share: show(0.2 + 0.4 * share, what))
+        subjects[-1] = replace(subjects[-1], comparison=_comparison(recordings[0], other))
+        made = make_report(subjects, lambda what, share: show(0.2 + 0.4 * share, what))
         for failure in made.failures:
             screen.note(failure)
         show(0.6, 'writing the page')

@@ -369,7 +369,7 @@ def _write(
     """Write figures and specimen where they are wanted, and say which parts are of other specimens."""
     from mount_identification.specimen import foreign_parts
     from mount_models.specimen import save_specimen
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     if json_file is not None:
         write_json(figures, json_file)

@@ -87,8 +87,8 @@ def drive(
     from mount_cli.screen import TerminalScreen
     from mount_replay.drive.drive import DriveOrder, record_drive, recorder_parameters
     from mount_replay.drive.recorder_options import recorder_options
-    from mount_report.drive.summary import write_json
     from mount_report.drive.telling import tell_drive, tell_snapshots
+    from mount_report.json_file import write_json
 
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')

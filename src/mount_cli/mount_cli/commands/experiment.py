@@ -58,7 +58,7 @@ def experiment(
     from mount_cli.screen import TerminalScreen
     from mount_experiments.orders import orders, run_all
     from mount_experiments.page import print_outcome, write_page
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     if not names:
         raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')

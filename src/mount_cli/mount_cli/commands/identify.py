@@ -81,7 +81,7 @@ def friction(
     from mount_identification.friction.identify import IdentifyOrder, figures, identify
     from mount_identification.specimen import check_targets, foreign_parts, with_friction
     from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     console = terminal()
     check_targets(out, json_file, figure)
@@ -140,7 +140,7 @@ def drift(
     from mount_identification.drift.identify import figures, identify_drift
     from mount_identification.specimen import check_targets
     from mount_models.specimen import chosen_specimen
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     console = terminal()
     check_targets(json_file, figure)

@@ -12,6 +12,7 @@ from mount_experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
@@ -35,7 +36,7 @@ class ForceParameters(NamedTuple):
     """The load cell of the rig and the true actuator on it."""
 
     force_noise: Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)] = 0.5
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    seed: Seed = 1
     actuator: ReluctanceActuator = ReluctanceActuator()
 
 

@@ -15,6 +15,7 @@ from mount_experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
@@ -52,7 +53,7 @@ class InductanceParameters(NamedTuple):
     ripple_noise: Annotated[
         float, Quantity('1', 'relative standard deviation of the slopes of one ripple', 0.0, 0.5)
     ] = 0.01
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    seed: Seed = 1
     actuator: ReluctanceActuator = ReluctanceActuator()
     coil: RippleCoil = RippleCoil()
     mechanics: ClosingMechanics = ClosingMechanics()

@@ -12,10 +12,16 @@ from mount_experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
-from mount_experiments.harness.rack_recording import SUBSTEPS, record_friction_rack
+from mount_experiments.harness.rack_recording import (
+    SUBSTEPS,
+    DisplacementNoise,
+    ForceNoise,
+    record_friction_rack,
+)
 from mount_experiments.sawtooth import REFERENCE, TITLE
 from mount_experiments.sawtooth.evaluation import Run, evaluate
 from mount_identification.friction.recording import FloatArray
@@ -42,11 +48,9 @@ class SawtoothParameters(NamedTuple):
     highest_normal_force: Annotated[float, Quantity('N', 'last normal force', 10.0, 300.0, 'Sec. 4')] = 120.0
     normal_force_step: Annotated[float, Quantity('N', 'step between them', 1.0, 300.0)] = 20.0
     shown_normal_force: Annotated[float, Quantity('N', 'drawn in detail', 10.0, 300.0, 'Fig. 9')] = 100.0
-    force_noise: Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)] = 0.5
-    displacement_noise: Annotated[
-        float, Quantity('m', 'standard deviation of the displacement sensor', 0.0, 1e-5)
-    ] = 20e-9
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    force_noise: ForceNoise = 0.5
+    displacement_noise: DisplacementNoise = 20e-9
+    seed: Seed = 1
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
 

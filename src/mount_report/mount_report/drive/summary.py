@@ -1,6 +1,5 @@
 """What a drive says at its end: the figures of `--json`, and the same for people."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -120,11 +119,6 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
         f'{count} {noun} saved, up to {parameters.snapshot:g} s before an event and '
         f'{parameters.snapshot_after:g} s after it; figures of the drive need a full recording.'
     )
-
-
-def write_json(figures: dict[str, Any], file: Path) -> None:
-    """Write the figures as JSON."""
-    file.write_text(json.dumps(figures, indent=2, allow_nan=False) + '\n')
 
 
 def print_summary(figures: dict[str, Any], found: Losses, screen: Screen) -> None:

@@ -21,8 +21,8 @@ from mount_report.drive.summary import (
     snapshots_sentence,
     summarise,
     summarise_snapshots,
-    write_json,
 )
+from mount_report.json_file import write_json
 
 
 @dataclass
@@ -95,6 +95,6 @@ def _complaint(file: Path, make: Callable[[], None]) -> list[str]:
     """Make the picture or page of a drive; what prevents it is a complaint, for the recording is there."""
     try:
         make()
-    except Exception as error:  # whatever it stumbles over
+    except Exception as error:  # of any kind: the recording is there
         return [f'{file.name} could not be made: {str(error) or type(error).__name__}']
     return []

@@ -8,9 +8,9 @@ import numpy as np
 
 from mount_bags.compare.quantity_text import quantity_text
 from mount_report.drawing.chart import Array
-from mount_report.sections import charts
+from mount_report.sections import charts, periodic
 from mount_report.sections.charts import Levels, Named
-from mount_report.sections.periodic import Sine, cycle_work, distortion, harmonics, whole_periods
+from mount_report.sections.periodic import Sine, cycle_work, distortion, whole_periods
 from mount_report.sections.section import Section, Table
 from mount_report.sections.spectrum import amplitude_density, evenly
 from mount_report.sections.subject import Subject
@@ -29,6 +29,7 @@ OfSubject = Callable[[Subject], Signal | None]
 _LOOPS = 4  # periods drawn
 _PERIODS = 32  # evaluated
 _WITHOUT_PERIOD = 0.5  # s, chosen: stretch of a loop where nothing is periodic
+_FOREIGN = 6  # signals drawn of a recording that is not of this project
 _TOLD = 200  # switchings listed
 _LABEL = 24  # letters
 _LEAST_SAMPLES = 1000  # chosen: of a spectrum
@@ -98,7 +99,7 @@ def loops(subjects: Sequence[Subject]) -> Section:
     return Section('hysteresis', 'Loss hysteresis', said.told(), chart)
 
 
-def harmonic_content(subjects: Sequence[Subject]) -> Section:
+def harmonics(subjects: Sequence[Subject]) -> Section:
     """Return harmonics 1 to 8 of the mount force, its distortion and the work per cycle."""
     said = Sentences(subjects)
     bars, rows = [], []
@@ -142,7 +143,7 @@ def _harmonics_of(
     if len(time) < 2 or (time[-1] - time[0]) * sine.frequency < 3.0:
         return None
     inside, periods = whole_periods(time, sine.frequency, _PERIODS)
-    amplitudes = harmonics(time[inside], y[inside], sine.frequency)
+    amplitudes = periodic.harmonics(time[inside], y[inside], sine.frequency)
     cells = (
         f'{sine.frequency:.3f}',
         f'{1e3 * sine.amplitude:.3f}',
@@ -184,18 +185,18 @@ def spectra(subjects: Sequence[Subject]) -> Section:
     return Section('spectra', 'Spectra', words, chart)
 
 
-def sweep_view(subjects: Sequence[Subject]) -> Section | None:
+def sweep(subjects: Sequence[Subject]) -> Section | None:
     """Return peak displacement and chassis acceleration by frequency; None where nothing was swept."""
     said = Sentences(subjects)
     peaks, accelerations = [], []
     for subject in subjects:
-        sweep, moved, acceleration = subject.sweep(), subject.displacement(), _acceleration(subject)
-        if sweep is None or moved is None:
+        swept, moved, acceleration = subject.sweep(), subject.displacement(), _acceleration(subject)
+        if swept is None or moved is None:
             said.say(subject, 'the excitation is no sweep')
             continue
-        peaks.append(Named(_name(subjects, subject), *peak_per_band(sweep.at(moved.time), moved.values)))
+        peaks.append(Named(_name(subjects, subject), *peak_per_band(swept.at(moved.time), moved.values)))
         if acceleration is not None:
-            bands = rms_per_band(sweep.at(acceleration.time), acceleration.values)
+            bands = rms_per_band(swept.at(acceleration.time), acceleration.values)
             accelerations.append(Named(_name(subjects, subject), *bands))
     if not peaks:
         return None
@@ -210,14 +211,14 @@ def sweep_view(subjects: Sequence[Subject]) -> Section | None:
     return Section('sweep', 'Sweep', words, chart, [Table(head, rows, folded=True)])
 
 
-def plain(subjects: Sequence[Subject], most: int = 6) -> Section | None:
+def signals(subjects: Sequence[Subject]) -> Section | None:
     """Return a few signals of recordings that are not of this project; None where all topics are."""
     groups: dict[str, list[Named]] = {}
     for subject in subjects:
         if subject.displacement() is not None:
             continue
         for label, series in _foreign(subject):
-            if label in groups or len(groups) < most:
+            if label in groups or len(groups) < _FOREIGN:
                 groups.setdefault(label, []).append(Named(_name(subjects, subject), *series))
     if not groups:
         return None
