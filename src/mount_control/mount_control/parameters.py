@@ -4,7 +4,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.quantity import ParameterError, Quantity, checked
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME
 
 DEFAULT_DAMPER = 'viscous_2000'
 
@@ -54,8 +54,8 @@ class ControlParameters(NamedTuple):
         float, Quantity('m', 'largest believable displacement to either side', 1e-3, 0.1, 'chosen')
     ] = 0.020
     highest_current: Annotated[
-        float, Quantity('A', 'limit of the setpoint', 0.0, 3.0, 'paper, section 3')
-    ] = 3.0
+        float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')
+    ] = HIGHEST_CURRENT
 
     @property
     def period_samples(self) -> int:

@@ -91,7 +91,6 @@ class MountInit(SafeLifecycleNode):
     def _listen(self) -> None:
         assert self._dialogue is not None
         assert isinstance(self.data_path, DataPath)
-        self.data_path.wake()
         if self._deaf:
             self._dialogue.forget_what_was_heard()
             self._subscribe_streams(self.data_path)
@@ -99,8 +98,7 @@ class MountInit(SafeLifecycleNode):
     def _stop_listening(self) -> None:
         assert isinstance(self.data_path, DataPath)
         if self.lockstep:
-            self.data_path.rest()  # the sample that waits for the next ramp must not be missed
-            return
+            return  # the sample that waits for the next ramp must not be missed
         self.data_path.unsubscribe(topics.COIL_RIPPLE)
         self.data_path.unsubscribe(topics.CURRENT_SETPOINT)
         self._deaf = True

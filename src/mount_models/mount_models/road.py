@@ -68,13 +68,6 @@ class Sweep(NamedTuple):
     ramp_in: _RampIn = 1.0
 
 
-def named_road(name: str, speed: float = 33.0, seed: int = 1) -> RandomRoad:
-    """Return the road of a name in `ROAD_CLASSES`; raises `RoadError` for an unknown one."""
-    if name not in ROAD_CLASSES:
-        raise RoadError(f'no road class is called {name!r}; known are {", ".join(ROAD_CLASSES)}')
-    return checked(RandomRoad(roughness=ROAD_CLASSES[name], speed=speed, seed=seed))
-
-
 def random_road(times: npt.ArrayLike, road: RandomRoad) -> FloatArray:
     """Return heights (n,) in m at `times` (n,) in s: a sum of waves with random phases.
 

@@ -1,6 +1,7 @@
 """Writes the page and the pictures of a report, with a progress bar."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mount_bags.bag.recording import Recording
@@ -35,17 +36,17 @@ def write_report(
     pictures: Path | None,
     screen: Screen,
 ) -> list[Path]:
-    """Write the page to `file` and its figures into `pictures` unless that is None; return those files.
+    """Write the page to `file` and its charts into `pictures` unless that is None; return those files.
 
-    With `other`, it shares the figures and its differences from the first recording are told. What could
+    With `other`, it shares the charts and its differences from the first recording are told. What could
     not be made of the page is printed. Raises `ReportError`.
     """
     with screen.bar('reading', transient=True) as show:
         together = [*recordings, *([other] if other is not None else [])]
         subjects = subjects_of(together, run_facts)
         show(0.2, 'comparing')
-        comparison = _comparison(recordings[0], other)
-        made = make_report(subjects, comparison, lambda what, share: show(0.2 + 0.4 * share, what))
+        subjects[-1] = replace(subjects[-1], comparison=_comparison(recordings[0], other))
+        made = make_report(subjects, lambda what, share: show(0.2 + 0.4 * share, what))
         for failure in made.failures:
             screen.note(failure)
         show(0.6, 'writing the page')

@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from mount_bags.audit.answers import LONGEST_SILENCE
 from mount_bags.audit.audit import CONTROL, TopicAudit
 from mount_bags.audit.node_reports import NodeReport, node_reports
 from mount_bags.bag.recording import Recording
@@ -12,6 +11,7 @@ from mount_bags.events.automatic_marks import MarkKind
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.messages.series import registered_topic
 from mount_bags.messages.time_axis import TimeAxis
+from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_ros.topics import DISPLACEMENT
 
 _SAME = 5.0  # s, chosen: a mark that repeats the sentence of a report so soon is of the same fault
@@ -66,7 +66,7 @@ def _silences(audits: Mapping[str, TopicAudit], axis: TimeAxis) -> list[Fault]:
         Fault(
             axis.of_stamp(silence.begin),
             CONTROL,
-            f'no setpoint in time for {1e3 * silence.duration:.0f} ms (limit {1e3 * LONGEST_SILENCE:g} ms): '
+            f'no setpoint in time for {1e3 * silence.duration:.0f} ms (limit {1e3 * SETPOINT_TIMEOUT:g} ms): '
             'the coil went to 0 A',
         )
         for entry in audits.values()

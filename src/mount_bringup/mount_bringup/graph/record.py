@@ -35,7 +35,7 @@ _KEYS = 'm or space: mark, Ctrl-C: end'
 
 @dataclass(frozen=True)
 class RecordOrder:
-    """What the user wants; no names of topics are all, `duration` in s, None without an end."""
+    """What the user orders; no names of topics are all, `duration` in s, None without an end."""
 
     out: Path
     parameters: RecorderParameters

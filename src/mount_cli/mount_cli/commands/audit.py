@@ -30,13 +30,12 @@ def audit(
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
-    import json
-
     from mount_bags.audit.audit import audit as audited
     from mount_bags.audit.losses import losses
     from mount_bags.audit.report import as_json, as_table, latency_lines, sentences
     from mount_bags.run.place import open_run
     from mount_cli.screen import TerminalScreen
+    from mount_report.json_file import write_json
 
     console = terminal()
     with console.status('reading'):
@@ -51,6 +50,6 @@ def audit(
     for warning in opened.warnings:
         note(console, warning)
     if json_file is not None:
-        json_file.write_text(json.dumps(as_json(audits, found), indent=2) + '\n', encoding='utf-8')
+        write_json(as_json(audits, found), json_file)
     if not found.sound:
         raise typer.Exit(1)

@@ -145,7 +145,7 @@ def actuator(
         'rms_by_gap': [{'gap_m': g, 'rms_n': r} for g, r in zip(fit.gaps, fit.gap_rms, strict=True)],
     }
     if figure is not None:
-        from mount_identification.calibration_figure import draw_force_law
+        from mount_identification.calibration_pictures import draw_force_law
 
         draw_force_law(points, law, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
@@ -227,7 +227,7 @@ def inductance(
     for warning in result.warnings:
         note(console, warning, 'warning')
     if figure is not None:
-        from mount_identification.calibration_figure import draw_gap_curves
+        from mount_identification.calibration_pictures import draw_gap_curves
 
         draw_gap_curves(result, order, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
@@ -369,7 +369,7 @@ def _write(
     """Write figures and specimen where they are wanted, and say which parts are of other specimens."""
     from mount_identification.specimen import foreign_parts
     from mount_models.specimen import save_specimen
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     if json_file is not None:
         write_json(figures, json_file)

@@ -1,6 +1,5 @@
 """`engine-mount compare`: what is different between two recordings, in words."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -61,6 +60,7 @@ def _told(
     from mount_bags.compare.words import as_json, as_table, sentences
     from mount_bags.run.place import open_run
     from mount_cli.screen import TerminalScreen
+    from mount_report.json_file import write_json
 
     console = terminal()
     recordings = open_run(a), open_run(b)
@@ -78,9 +78,9 @@ def _told(
         for warning in recording.warnings:
             note(console, f'{recording.path}: {warning}')
     if json_file is not None:
-        json_file.write_text(json.dumps(as_json(comparison), indent=2, allow_nan=False) + '\n')
+        write_json(as_json(comparison), json_file)
     if figure is not None:
-        from mount_report.compare_figure import draw_comparison
+        from mount_report.compare_picture import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
         console.print(f'figure {figure}', soft_wrap=True)

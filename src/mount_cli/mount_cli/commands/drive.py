@@ -66,7 +66,7 @@ def drive(
     out: NewFolder = None,
     json_file: JsonFile = None,
     report: Annotated[
-        bool, typer.Option('--report/--no-report', help='draw the figure and write the page about the run')
+        bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
     on_full: Annotated[
         str, typer.Option(help='full disk: stop the run, or continue without recording')
@@ -87,8 +87,8 @@ def drive(
     from mount_cli.screen import TerminalScreen
     from mount_replay.drive.drive import DriveOrder, record_drive, recorder_parameters
     from mount_replay.drive.recorder_options import recorder_options
-    from mount_report.drive.summary import write_json
     from mount_report.drive.telling import tell_drive, tell_snapshots
+    from mount_report.json_file import write_json
 
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')

@@ -15,7 +15,7 @@ EPILOG = """Examples:
 
 `engine-mount experiment sawtooth --set sawtooth.friction.b_offset=-14` - with other pads
 
-`engine-mount experiment all --page docs/experiments.md` - all, with the page and its pictures
+`engine-mount experiment all --page docs/explanation/experiments.md` - all, with the page and its pictures
 """
 
 
@@ -47,18 +47,19 @@ def experiment(
 
     A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
     """
+    from mount_experiments.registry import experiments_named, listed
+
+    console = terminal()
+    if show:
+        for name, reference, title in listed():
+            console.print(f'{name:22}{reference:15}{title}', soft_wrap=True)
+        return
     from mount_bringup.settings import SettingError
     from mount_cli.screen import TerminalScreen
     from mount_experiments.orders import orders, run_all
     from mount_experiments.page import print_outcome, write_page
-    from mount_experiments.registry import EXPERIMENTS, experiments_named
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
-    console = terminal()
-    if show:
-        for known in EXPERIMENTS.values():
-            console.print(f'{known.name:22}{known.reference:15}{known.title}', soft_wrap=True)
-        return
     if not names:
         raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')
     try:

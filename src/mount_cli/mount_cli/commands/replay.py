@@ -117,7 +117,7 @@ def _replay(
     from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder
     from mount_replay.replay import replay as run_replay
     from mount_replay.summary import print_replay, replay_figures
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     mode = LOCKSTEP if lockstep else CORE
     order = ReplayOrder(recording, mode, changes, table, foreign, out, domain)

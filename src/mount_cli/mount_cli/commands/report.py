@@ -14,7 +14,7 @@ EPILOG = """Examples:
 
 `engine-mount report bags/first --compare bags/second --out difference.html` - and what is different
 
-`engine-mount report drive_1 drive_2 drive_3 --out three.html --png pictures` - in the same figures
+`engine-mount report drive_1 drive_2 drive_3 --out three.html --png pictures` - in the same charts
 """
 
 
@@ -39,9 +39,9 @@ def report(
         ),
     ] = None,
 ) -> None:
-    """Write one HTML page that works without network, and its figures as PNG.
+    """Write one HTML page that works without network, and its charts as PNG.
 
-    Several recordings share the figures. What a recording lacks stands in the page in words.
+    Several recordings share the charts. What a recording lacks stands in the page in words.
     """
     from mount_bags.run.place import open_run
     from mount_cli.screen import TerminalScreen

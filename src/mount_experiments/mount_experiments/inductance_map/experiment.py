@@ -15,10 +15,12 @@ from mount_experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
 from mount_experiments.harness.drawing import BLUE, RED, family, finish, new_figure
+from mount_experiments.inductance_map import REFERENCE, TITLE
 from mount_models.actuator.closing import ClosingMechanics, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.crossing import find_crossing
@@ -51,7 +53,7 @@ class InductanceParameters(NamedTuple):
     ripple_noise: Annotated[
         float, Quantity('1', 'relative standard deviation of the slopes of one ripple', 0.0, 0.5)
     ] = 0.01
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    seed: Seed = 1
     actuator: ReluctanceActuator = ReluctanceActuator()
     coil: RippleCoil = RippleCoil()
     mechanics: ClosingMechanics = ClosingMechanics()
@@ -280,8 +282,8 @@ def _told(ranges: list[list[float]]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Incremental inductance over current and gap',
-    reference='Fig. 4',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'Thin lines: the gap of the simulated actuator is held on the rig and the current stepped; each '
         'point averages 50 ripples. Thick line: the current ramp of the initialisation on the assembled '

@@ -25,8 +25,8 @@ from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
 
 # A ROS domain has 250 UDP ports from 7400 on (RTPS 2.2, section 9.6.1.1), of which two for each participant
-# are in use. The bus takes one behind them: higher up the kernel gives them to anybody, and the bus would not
-# open.
+# are in use. The bus takes one behind them: higher up the kernel gives them to any process, and the bus
+# would not open.
 _FIRST_PORT, _PORTS_OF_DOMAIN = 7530, 250  # behind 59 participants
 _PLACES = 119  # namespaces told apart by their ports
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
@@ -34,7 +34,7 @@ _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts a
 
 @dataclass(frozen=True)
 class DriveOrder:
-    """What the user wants."""
+    """What the user orders."""
 
     scenario: str
     mode: str  # 'real time', 'lock-step' or 'core'

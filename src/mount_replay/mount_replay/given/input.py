@@ -391,7 +391,7 @@ def _was_activated_between(
             return True
     if any(before <= gap.stamp < after for gap in gaps):
         return True
-    # A controller that hears nothing for so long gives up its table; one that hears and says nothing is off.
+    # Without samples for so long a controller discards its table; with samples and no answers it is off.
     heard = all_stamps[(all_stamps >= before) & (all_stamps <= after)]
     return after - before > _BREAK and heard.size > 1 and bool(np.diff(heard).max() <= _BREAK)
 

@@ -1,4 +1,4 @@
-"""Plays a recording by the wall clock, to look at: topics out, keys in, a line that tells the position."""
+"""Plays a recording by the wall clock: topics are published, keys control it, a line tells the position."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -42,7 +42,7 @@ _KEYS = 'space: pause, left/right: 1 s (paused: right is one sample), up/down: 1
 
 @dataclass(frozen=True)
 class LiveOrder:
-    """What the user wants to look at; `begin` in s."""
+    """What is to be played; `begin` in s."""
 
     recording: Path
     rate: float = 1.0

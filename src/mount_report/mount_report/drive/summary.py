@@ -1,6 +1,5 @@
 """What a drive says at its end: the figures of `--json`, and the same for people."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,11 +17,9 @@ from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.run.screen import Screen, Table
 from mount_bringup.chosen import Parameters, chosen_damper, control_parameters
 from mount_bringup.mount_choice import seat_of
-from mount_report.drive.evaluation import Drive, excitation_stamp, tracking_error
+from mount_report.drive.evaluation import tracking_error
+from mount_report.drive.signals import DriveSignals, excitation_stamp
 from mount_sim.plant.mounts import without_friction
-
-SUMMARISED = {'sim/truth': ('rest_gap', 'contact_gap')}
-"""Columns that `summarise` asks for beside those of `load_drive`, by topic."""
 
 _UM, _MM, _US = 1e6, 1e3, 1e6
 
@@ -31,7 +28,7 @@ def summarise(
     recording: Recording,
     audits: Mapping[str, TopicAudit],
     found: Losses,
-    drive: Drive,
+    drive: DriveSignals,
     parameters: Parameters,
     run: dict[str, Any],
 ) -> dict[str, Any]:
@@ -51,7 +48,7 @@ def summarise(
         'mode': run['mode'],
         'mount': seat_of(parameters),
         'excitation_start_s': start,
-        'duration_s': float(drive.time[-1] - max(drive.time[0], start)),
+        'duration_s': float(drive.seen.time[-1] - max(drive.seen.time[0], start)),
         'samples': found.samples,
         'lost_samples': found.lost_samples,
         'lost_messages': found.lost_messages,
@@ -69,7 +66,7 @@ def summarise(
         'offset_current_a': float(gap['offset_current'][-1]),
         'switch_on_s': friction.switch_on,
         'switch_off_s': friction.switch_off,
-        'peak_displacement_m': float(np.nanmax(np.abs(drive.displacement))),
+        'peak_displacement_m': float(np.nanmax(np.abs(drive.seen.displacement))),
         'peak_current_a': friction.peak_current,
         'tracking_error_rms': friction.tracking_error,
         'latency_median_s': _known(run['latency_median_s']),
@@ -88,7 +85,7 @@ class _FrictionFigures:
 
 
 def _friction_figures(
-    recording: Recording, audits: Mapping[str, TopicAudit], drive: Drive, parameters: Parameters
+    recording: Recording, audits: Mapping[str, TopicAudit], drive: DriveSignals, parameters: Parameters
 ) -> _FrictionFigures:
     if without_friction(seat_of(parameters)):
         return _FrictionFigures()
@@ -122,11 +119,6 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
         f'{count} {noun} saved, up to {parameters.snapshot:g} s before an event and '
         f'{parameters.snapshot_after:g} s after it; figures of the drive need a full recording.'
     )
-
-
-def write_json(figures: dict[str, Any], file: Path) -> None:
-    """Write the figures as JSON."""
-    file.write_text(json.dumps(figures, indent=2, allow_nan=False) + '\n')
 
 
 def print_summary(figures: dict[str, Any], found: Losses, screen: Screen) -> None:

@@ -14,15 +14,15 @@ from mount_bags.recorder.snapshot import saved_snapshots
 from mount_bags.run.folder import RunFolder
 from mount_bags.run.screen import Screen
 from mount_bringup.chosen import Parameters, control_parameters
-from mount_report.drive.evaluation import Drive, load_drive, samples_at_the_ends
+from mount_report.drive.evaluation import samples_at_the_ends
+from mount_report.drive.signals import DriveSignals, load_drive
 from mount_report.drive.summary import (
-    SUMMARISED,
     print_summary,
     snapshots_sentence,
     summarise,
     summarise_snapshots,
-    write_json,
 )
+from mount_report.json_file import write_json
 
 
 @dataclass
@@ -43,17 +43,17 @@ def tell_drive(
     is a complaint.
     """
     recording = open_recording(folder.recording)
-    drive_data = load_drive(recording, others=SUMMARISED)
+    drive = load_drive(recording)
     audits = audit(recording)
     found = losses(recording, audits)
     complaints = [*recording.warnings, *found.complaints()]
     complaints += samples_at_the_ends(recording, audits, run['samples'])
-    figures = summarise(recording, audits, found, drive_data, parameters, run)
+    figures = summarise(recording, audits, found, drive, parameters, run)
     write_json(figures, folder.summary)
     print_summary(figures, found, screen)
     screen.table(as_table(audits))
     if report:
-        complaints += _complaint(folder.figure, lambda: _draw(folder, parameters, drive_data, figures))
+        complaints += _complaint(folder.figure, lambda: _draw(folder, parameters, drive, figures))
         complaints += _complaint(folder.report, lambda: _write_report(folder, recording, screen))
     return Told(figures, [folder.recording], complaints)
 
@@ -76,13 +76,13 @@ def tell_snapshots(
     return Told(figures, saved, complaints)
 
 
-def _draw(folder: RunFolder, parameters: Parameters, drive_data: Drive, figures: dict[str, Any]) -> None:
-    from mount_report.drive.figure import draw_drive  # after the drive: what draws takes a second to load
+def _draw(folder: RunFolder, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:
+    from mount_report.drive.picture import draw_drive  # after the drive: what draws takes a second to load
 
     control = control_parameters(parameters)
     title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
     begin = figures['excitation_start_s']
-    draw_drive(drive_data, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)
+    draw_drive(drive.seen, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)
 
 
 def _write_report(folder: RunFolder, recording: Recording, screen: Screen) -> None:
@@ -95,6 +95,6 @@ def _complaint(file: Path, make: Callable[[], None]) -> list[str]:
     """Make the picture or page of a drive; what prevents it is a complaint, for the recording is there."""
     try:
         make()
-    except Exception as error:  # whatever it stumbles over
+    except Exception as error:  # of any kind: the recording is there
         return [f'{file.name} could not be made: {str(error) or type(error).__name__}']
     return []

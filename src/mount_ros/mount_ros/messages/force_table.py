@@ -13,10 +13,9 @@ import numpy.typing as npt
 if TYPE_CHECKING:  # loading messages and middleware takes a fifth of a second, which readers do without
     from std_msgs.msg import Float64MultiArray
 
-FloatArray = npt.NDArray[np.float64]
+from mount_models.sampling import HIGHEST_CURRENT
 
-CURRENT_HIGH = 3.0
-"""Largest coil current (A) that may pass anywhere in the graph."""
+FloatArray = npt.NDArray[np.float64]
 
 _ROWS_LABEL = 'rows: current (A), normal_force (N)'
 _ACTIVATION_LABEL = 'activation '
@@ -105,9 +104,9 @@ def _check(rows: FloatArray) -> None:
                     f'{one:g} and {following:g} {unit}'
                 )
     low, high = float(rows[0, 0]), float(rows[0, -1])
-    if low < 0.0 or high > CURRENT_HIGH:
+    if low < 0.0 or high > HIGHEST_CURRENT:
         raise _refusal(
-            f'must keep the current within 0 .. {CURRENT_HIGH:g} A; it spans {low:g} .. {high:g} A'
+            f'must keep the current within 0 .. {HIGHEST_CURRENT:g} A; it spans {low:g} .. {high:g} A'
         )
 
 

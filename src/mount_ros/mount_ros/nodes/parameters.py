@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity, flattened, quantities, with_flattened
+from mount_ros.private_rclpy import given_at_start
 
 P = TypeVar('P', bound=NamedTuple)
 
@@ -44,8 +45,7 @@ class SpecimenValues:
     def __init__(self, node: Node):
         self._node = node
         self._given: dict[str, Any] = {}
-        # The only trace that rclpy keeps of values given at the start; without it they look like defaults.
-        self._at_start = set(node._parameter_overrides)
+        self._at_start = given_at_start(node)
 
     def give(self, defaults: NamedTuple, prefix: str, values: Mapping[str, Any]) -> None:
         """Set the declared parameters of the set `defaults` to `values` where nobody has set them.
