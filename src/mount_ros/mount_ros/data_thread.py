@@ -51,10 +51,10 @@ class DataThread:
     """A thread that serves nodes and does attended work; it lives as long as there is one or the other.
 
     Without work, so always in real time, it sleeps in an EventsExecutor. With work (lock-step in one process)
-    it polls the subscriptions itself. Measured on two cores, 65 000 samples: 7.1 times real time and 14 s of
-    processor time; `EventsExecutor.spin_once` between the works: 5.5 times and 17 s; an EventsExecutor and a
-    thread for each work: 3.6 times and 23 s. The last node and the last work come first, so that a sample
-    passes through the whole chain in one round where receivers were added before senders.
+    it polls the subscriptions itself. Processor time of 65 000 samples, medians of three runs, busy machine:
+    18 s; with `EventsExecutor.spin_once` between the works 19 s, with an EventsExecutor and a thread for each
+    work 22 s. The last node and the last work come first, so that a sample passes through the whole chain in
+    one round where receivers were added before senders.
 
     An exception ends it: `failure` says which, `on_failure` takes the same sentence in this thread, and
     every waiting or later call of `change` raises `DataThreadEndedError`; `remove` and `leave` return.
