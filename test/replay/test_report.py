@@ -14,7 +14,6 @@ from typer.testing import CliRunner, Result
 import mount_bags
 from mount_bags.bag.writer import BagWriter
 from mount_bags.events.recorded_events import event_time, recorded_events
-from mount_bags.messages.time_axis import time_axis
 from mount_cli.command import app
 from mount_report.pages import default_pictures
 from mount_report.sections import run_sections
@@ -125,7 +124,7 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 @pytest.mark.parametrize(
     ('broken', 'file'),
     [
-        ('mount_report.drive.figure.draw_drive', 'drive.png'),
+        ('mount_report.drive.picture.draw_drive', 'drive.png'),
         ('mount_report.pages.make_report', 'report.html'),
     ],
 )
@@ -287,7 +286,7 @@ def test_a_moment_has_the_same_time_in_a_report_and_among_the_events(bench, tmp_
     writer.write('/event', serialised(String(data=f'{{time: {stamp}, kind: bump}}')), stamp + 9_000_000)
     writer.close()
     late = mount_bags.open(tmp_path / 'late')
-    events = [(event.kind, event_time(event, time_axis(late))) for event in recorded_events(late)]
+    events = [(event.kind, event_time(event, late.time_axis)) for event in recorded_events(late)]
     begins = [time for kind, time in events if kind == 'switch_on']
     assert begins
     assert [begin for begin, _ in Signals(late).damping()] == pytest.approx(begins, abs=1e-9)

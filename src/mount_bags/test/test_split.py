@@ -15,9 +15,9 @@ from small_disk import small_disk
 import mount_bags
 from mount_bags.bag.metadata import read_metadata
 from mount_bags.bag.piece import Piece
-from mount_bags.bag.piece_topics import PIECE_RECORD
 from mount_bags.bag.split import SplitError, SplitRule, checked_rule, duration_in_nanoseconds, split_rule
 from mount_bags.bag.writer import BagWriter, RecordingError
+from mount_bags.container.stored import PIECE_RECORD
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'

@@ -3,12 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from mount_control.identified import check_fits, identified
 from mount_control.parameters import DEFAULT_DAMPER, ControlParameters, checked_parameters
+from mount_control.settings import ControlSettings, control_settings
 from mount_models.damper import DamperCurve, damper_curve
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.coefficient_check import check_friction
-from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import with_flattened
 from mount_models.specimen import Specimen
 from mount_models.specimen import chosen_specimen as specimen_of
@@ -33,11 +30,6 @@ def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specime
     return specimen_of(values.get('parameters_file', ''), values.get('specimen', ''))
 
 
-def friction_model(parameters: Parameters) -> tuple[FrictionCoefficients, FrictionContact]:
-    """Return what the controller of a run assumes of the friction; a `ValueError` says what cannot be."""
-    specimen, control = chosen_specimen(parameters, 'mount_control'), parameters.get('mount_control', {})
-    check_fits(control_parameters(parameters), specimen)
-    friction = identified(specimen, FrictionCoefficients(), control, 'friction')
-    contact = identified(specimen, FrictionContact(), control, 'contact')
-    check_friction(friction, contact)
-    return friction, contact
+def chosen_control(parameters: Parameters) -> ControlSettings:
+    """Return what the controller of a run is set up with; a `ValueError` says what cannot be."""
+    return control_settings(parameters.get('mount_control', {}), chosen_specimen(parameters, 'mount_control'))

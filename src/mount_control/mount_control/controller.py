@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control import band_pass, force_to_current, switching
-from mount_control.parameters import ControlParameters, checked_parameters
+from mount_control.settings import ControlSettings
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype
-from mount_models.damper import DamperCurve, damper_force
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
+from mount_models.damper import damper_force
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.coefficient_check import check_friction
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
 from mount_models.sampling import SAMPLE_TIME
@@ -22,7 +21,7 @@ FADE_SAMPLES = 50
 distance from what the new law asks for then falls evenly to zero."""
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 
-TRACE = np.dtype(
+TRACE = record_type(
     [
         (name, 'f8')
         for name in (
@@ -44,7 +43,7 @@ TRACE = np.dtype(
 )
 """Every intermediate of one control step, SI; the fields of the topic `control_trace` in its order."""
 
-_STATE = np.dtype(
+_STATE = record_type(
     [
         ('band', band_pass.STATE),
         ('switching', switching.STATE),
@@ -90,26 +89,18 @@ class Memory(NamedTuple):
 
 
 class ControlLaw:
-    """All that a control step needs and does not change, checked: made beforehand, taken between steps."""
+    """All that a control step needs and does not change: made beforehand, taken by one controller."""
 
-    def __init__(
-        self,
-        parameters: ControlParameters,
-        damper: DamperCurve,
-        friction: FrictionCoefficients,
-        contact: FrictionContact,
-        table: force_to_current.CurrentTable,
-    ):
-        parameters = checked_parameters(parameters)
-        check_friction(friction, contact)
+    def __init__(self, settings: ControlSettings, table: force_to_current.CurrentTable):
+        parameters, damper = settings.parameters, settings.damper
         law = Law(
             band_pass.design(
                 parameters.eigenfrequency, parameters.quality, parameters.lead_time, SAMPLE_TIME
             ),
             switching.chosen_switching(parameters),
             damper.velocity_step,
-            friction,
-            contact,
+            settings.friction,
+            settings.contact,
             table.limits,
         )
         self.record = record_bytes(law)
@@ -120,15 +111,7 @@ class ControlLaw:
 class Controller:
     """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
 
-    def __init__(
-        self,
-        parameters: ControlParameters,
-        damper: DamperCurve,
-        friction: FrictionCoefficients,
-        contact: FrictionContact,
-        table: force_to_current.CurrentTable,
-    ):
-        law = ControlLaw(parameters, damper, friction, contact, table)
+    def __init__(self, law: ControlLaw):
         self._law, self._tables, self._window = law.record, law.tables, law.window
         self._state = np.zeros(1, _STATE).view(np.uint8)
         self._state_record = self._state.view(_STATE)[0]
@@ -195,17 +178,13 @@ class Controller:
         return traces
 
 
-def load_compiled_law(
-    parameters: ControlParameters,
-    damper: DamperCurve,
-    friction: FrictionCoefficients,
-    contact: FrictionContact,
-) -> None:
+def load_compiled_law(settings: ControlSettings) -> None:
     """Run the compiled law once, so that the first sample need not wait for the compiler."""
     table = force_to_current.resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
-    controller = Controller(parameters, damper, friction, contact, table)
+    controller = Controller(ControlLaw(settings, table))
     controller.step(0.0)
-    controller.change(ControlLaw(parameters, damper, friction, contact, table))
+    controller.run(np.zeros(1))
+    controller.change(ControlLaw(settings, table))
 
 
 @compiled

@@ -6,6 +6,7 @@ import numpy as np
 
 from mount_control.parameters import ControlParameters
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 
 
 class Switching(NamedTuple):
@@ -16,7 +17,7 @@ class Switching(NamedTuple):
     period: int
 
 
-STATE = np.dtype(
+STATE = record_type(
     [
         ('place', 'i8'),
         ('magnitude', 'f8'),

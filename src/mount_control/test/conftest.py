@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mount_control.controller import Controller
-from mount_control.force_to_current import resample
+from mount_control.controller import ControlLaw, Controller
 from mount_control.parameters import ControlParameters
+from mount_control.settings import ControlSettings
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -23,15 +23,32 @@ def table_rows():
 
 
 @pytest.fixture(scope='session')
-def make_controller():
-    """Return a function that builds a controller with some parameters changed."""
+def make_settings():
+    """Return a function that builds the settings of a controller with some parameters changed."""
 
-    def make(damper: str = 'viscous_2000', **changes) -> Controller:
+    def make(damper: str = 'viscous_2000', **changes) -> ControlSettings:
         parameters = ControlParameters(**changes)
-        table = resample(CURRENTS, FORCES, OFFSET_CURRENT, parameters.highest_current)
-        return Controller(parameters, damper_curve(damper), FrictionCoefficients(), FrictionContact(), table)
+        friction, contact = FrictionCoefficients(), FrictionContact()
+        return ControlSettings(parameters, damper_curve(damper), friction, contact)
 
     return make
+
+
+@pytest.fixture(scope='session')
+def make_law(make_settings):
+    """Return a function that builds a law with some parameters changed."""
+
+    def make(damper: str = 'viscous_2000', **changes) -> ControlLaw:
+        settings = make_settings(damper, **changes)
+        return ControlLaw(settings, settings.table(CURRENTS, FORCES, OFFSET_CURRENT))
+
+    return make
+
+
+@pytest.fixture(scope='session')
+def make_controller(make_law):
+    """Return a function that builds a controller with some parameters changed."""
+    return lambda *arguments, **changes: Controller(make_law(*arguments, **changes))
 
 
 @pytest.fixture(scope='session')

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
+from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
 
 from mount_control.controller import (
@@ -15,11 +16,9 @@ from mount_control.controller import (
     ControlLaw,
     Controller,
 )
-from mount_control.force_to_current import resample
 from mount_control.parameters import ControlParameters
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import faded_coefficient
 from mount_ros import topics
 
@@ -107,7 +106,7 @@ def test_the_coefficient_is_the_friction_law_s_at_this_velocity_and_force(make_c
         assert now['friction_coefficient'] == pytest.approx(law, rel=2e-3)
 
 
-@settings(deadline=None, max_examples=40)
+@hypothesis(deadline=None, max_examples=40)
 @given(SHAKING)
 def test_the_desired_force_is_odd(make_controller, values):
     displacement = _held(values)
@@ -116,7 +115,7 @@ def test_the_desired_force_is_odd(make_controller, values):
     np.testing.assert_array_equal(one['damping_active'], other['damping_active'])
 
 
-@settings(deadline=None, max_examples=40)
+@hypothesis(deadline=None, max_examples=40)
 @given(SHAKING, st.sampled_from([0.6, 1.5, 3.0]), st.sampled_from(['viscous_4000', 'progressive']))
 def test_current_stays_within_its_limits_for_any_bounded_input(make_controller, values, highest, damper):
     traces = make_controller(damper, highest_current=highest).run(_held(values))
@@ -198,18 +197,13 @@ def test_more_damping_asks_for_more_current(make_controller, sine):
     assert (np.diff(peaks) > 0.1).all()
 
 
-def test_the_force_is_limited_by_the_table(table_rows, sine):
+def test_the_force_is_limited_by_the_table(make_settings, table_rows, sine):
     currents, forces, offset = table_rows
-    weak = resample(currents[:4], forces[:4], offset, 3.0)  # up to 1 A and 75 N
-    law = damper_curve('viscous_4000'), FrictionCoefficients(), FrictionContact()
-    traces = Controller(ControlParameters(), *law, weak).run(sine(8.0, 2e-3, 1.0))
+    settings = make_settings('viscous_4000')
+    weak = settings.table(currents[:4], forces[:4], offset)  # up to 1 A and 75 N
+    traces = Controller(ControlLaw(settings, weak)).run(sine(8.0, 2e-3, 1.0))
     assert traces['normal_force'].max() == 74.5
     assert traces['current'].max() == weak.currents[-1] < 1.0
-
-
-def test_parameters_are_checked_by_the_controller_itself(make_controller):
-    with pytest.raises(ValueError, match='must lie below switch_on_level'):
-        make_controller(switch_off_level=0.0009)
 
 
 def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, sine):
@@ -324,20 +318,13 @@ CHANGES = {
 }
 
 
-def _law(table_rows, damper='viscous_2000', **changes):
-    currents, forces, offset = table_rows
-    table = resample(currents, forces, offset, 3.0)
-    pads = FrictionCoefficients(), FrictionContact()
-    return ControlLaw(ControlParameters(**changes), damper_curve(damper), *pads, table)
-
-
 @pytest.mark.parametrize('moment', range(700, 825, 11))  # everywhere in a period
 @pytest.mark.parametrize('change', CHANGES)
-def test_a_change_of_the_law_makes_no_jump(make_controller, table_rows, sine, change, moment):
+def test_a_change_of_the_law_makes_no_jump(make_controller, make_law, sine, change, moment):
     displacement = sine(8.0, 1e-3, 1.4)
     controller, stayed = make_controller(), make_controller()
     before = controller.run(displacement[:moment])
-    controller.change(_law(table_rows, **CHANGES[change]))
+    controller.change(make_law(**CHANGES[change]))
     after = controller.run(displacement[moment:])
     undisturbed = stayed.run(displacement)
     assert before['damping_active'][-1] == after['damping_active'][0] == 1.0
@@ -360,24 +347,22 @@ def test_a_change_of_the_law_makes_no_jump(make_controller, table_rows, sine, ch
     assert controller.faults == 0
 
 
-def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit(
-    make_controller, table_rows, sine
-):
+def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit(make_controller, make_law, sine):
     displacement = sine(8.0, 1e-3, 1.0)
     controller, stayed = make_controller(), make_controller()
     controller.run(displacement[:700])
-    controller.change(_law(table_rows, 'viscous_4000'))
+    controller.change(make_law('viscous_4000'))
     after, undisturbed = controller.run(displacement[700:]), stayed.run(displacement)[700:]
     for name in ('band_displacement', 'band_velocity', 'predicted_velocity', 'magnitude', 'damping_active'):
         np.testing.assert_array_equal(after[name], undisturbed[name])
     np.testing.assert_array_equal(after['desired_force'], 2.0 * undisturbed['desired_force'])
 
 
-def test_a_change_while_damping_is_off_is_there_at_once(make_controller, table_rows, sine):
+def test_a_change_while_damping_is_off_is_there_at_once(make_controller, make_law, sine):
     displacement = np.r_[sine(8.0, 0.1e-3, 0.5), sine(8.0, 1e-3, 1.0)]
     controller = make_controller()
     controller.run(displacement[:400])
-    controller.change(_law(table_rows, 'viscous_4000'))
+    controller.change(make_law('viscous_4000'))
     after = controller.run(displacement[400:])
     expected = make_controller('viscous_4000').run(displacement)[400:]
     assert _equal(after, expected)
@@ -385,12 +370,12 @@ def test_a_change_while_damping_is_off_is_there_at_once(make_controller, table_r
 
 @pytest.mark.parametrize('eigenfrequency', [5.0, 8.0, 13.0])
 def test_the_magnitude_stays_the_highest_of_the_last_period_over_a_change_of_it(
-    make_controller, table_rows, sine, eigenfrequency
+    make_controller, make_law, sine, eigenfrequency
 ):
     displacement = sine(8.0, 1e-3, 0.6) * np.linspace(0.2, 1.0, 600)
     controller = make_controller()
     before = controller.run(displacement[:333])
-    controller.change(_law(table_rows, eigenfrequency=eigenfrequency))
+    controller.change(make_law(eigenfrequency=eigenfrequency))
     after = controller.run(displacement[333:])
     distances = np.abs(np.r_[before['band_displacement'], after['band_displacement']])
     period = ControlParameters(eigenfrequency=eigenfrequency).period_samples

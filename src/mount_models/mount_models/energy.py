@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.hydromount import decoupler_overrun, upper_energy
 
 LOSSES = (
@@ -36,7 +37,7 @@ LOSSES = (
 )
 """Parts that dissipate; the decoupler with its stops, the pads by sliding and by creep."""
 
-ACCOUNT = np.dtype(
+ACCOUNT = record_type(
     [
         (name, 'f8')
         for name in (

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
 
 _RESISTANCE = 'Pa s/m^3'
@@ -63,7 +64,7 @@ class Hydromount(NamedTuple):
     stop_resistance: Annotated[float, Quantity(_RESISTANCE, 'R_st: stops of the decoupler', 0.0, 1e10)] = 6e7
 
 
-HYDROMOUNT_STATE = np.dtype(
+HYDROMOUNT_STATE = record_type(
     [
         (name, 'f8')
         for name in ('upper_volume', 'lower_volume', 'track_flow', 'decoupler_flow', 'passed_volume')

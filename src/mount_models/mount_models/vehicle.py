@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.elastomer import Elastomer, branch_step, elastomer_force
 from mount_models.quantity import Quantity
 
@@ -21,11 +22,11 @@ FloatArray = npt.NDArray[np.float64]
 
 _BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
 _BODIES = ('wheel', 'body', 'chassis', 'engine')
-VEHICLE_STATE = np.dtype(
+VEHICLE_STATE = record_type(
     [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + _BRANCHES
 )
 """Heights (m) and velocities (m/s) of the four bodies, forces (N) of the elastomer's branches."""
-ENGINE_STATE = np.dtype([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
+ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
 """Mount displacement x (m), its velocity (m/s), forces (N) of the elastomer's branches."""
 
 

@@ -3,23 +3,29 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from mount_bags.bag.recording import Recording
 from mount_bags.run.folder import RunFolder, make_run_folder
 from mount_bags.run.place import open_run
-from mount_bringup.chosen import Parameters, chosen_damper, chosen_specimen, control_parameters
+from mount_bags.run.session import session_parameters, time_text
+from mount_bags.run.versions import versions
+from mount_bringup.chosen import (
+    Parameters,
+    chosen_control,
+    chosen_damper,
+    chosen_specimen,
+    control_parameters,
+)
 from mount_bringup.settings import checked_settings, defaults_of_nodes
+from mount_control.controller import load_compiled_law
 from mount_init.parameters import InitParameters
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, with_flattened
 from mount_replay.agreement import Agreement, agreement
-from mount_replay.core import Progress, Replayed, controller_for, replay_in_core
+from mount_replay.core import Progress, Replayed, replay_in_core
 from mount_replay.given.foreign import ForeignOrder, chosen_gap, foreign_input
 from mount_replay.given.input import ReplayError, ReplayInput, replay_input
 from mount_replay.given.parameter_changes import without
@@ -32,7 +38,7 @@ REPLAYED_NODES = ('mount_control', 'mount_init')
 
 @dataclass(frozen=True)
 class ReplayOrder:
-    """What the user wants; `changes` are parameters other than those recorded, {node: {parameter: value}}.
+    """What the user orders; `changes` are parameters other than those recorded, {node: {parameter: value}}.
 
     `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one.
     """
@@ -210,9 +216,7 @@ def with_changes(
 
 def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
     """Load or compile the laws, which a process does once."""
-    controller = controller_for(given.controls[0].gap, parameters)
-    controller.step(0.0)
-    controller.run(np.zeros(1))
+    load_compiled_law(chosen_control(parameters))
     chosen_specimen(parameters)
 
 
@@ -220,21 +224,18 @@ def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
 
 
 def _session(order: ReplayOrder, outcome: ReplayOutcome) -> dict[str, Any]:
-    from mount_bags.run.versions import versions
-
     given = outcome.given
-    recorded = given.session.get('parameters')
     return {
         'scenario': 'replay',
         **given.session,
         'parameters': {
-            **(recorded if isinstance(recorded, dict) else {}),
+            **session_parameters(given.session),
             **{node: dict(values) for node, values in outcome.parameters.items()},
         },
         'replay': {
             'of': given.source,
             'mode': order.mode,
-            'made': datetime.now().astimezone().isoformat(timespec='seconds'),
+            'made': time_text(),
             'changed': {node: dict(values) for node, values in order.changes.items()},
             'table': order.table and Path(order.table).name,
             'notes': list(given.notes),

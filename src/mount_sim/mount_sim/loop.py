@@ -91,7 +91,7 @@ class ElectronicsLoop:
         """Take the next sample if the last one is answered within `wait` s; return whether it was.
 
         Raises `NoAnswerError` when no answer came for `patience` s; the first sample waits for the
-        activation of whoever answers it.
+        activation of the node that answers it.
         """
         if self._asked is not None:
             answer = self._can_end.wait_for_answer(self._asked, wait)
@@ -134,7 +134,7 @@ class ElectronicsLoop:
             return None, 0
         late = received.late(self._mount.sample)
         if late >= self._mount.patience:
-            return None, 0  # an answer of the past: whoever sends it must not keep the coil on
+            return None, 0  # an answer to a sample of the past must not keep the coil on
         self._note(received)
         return received.setpoint.current if received.setpoint.enable else 0.0, late
 

@@ -10,7 +10,7 @@ from mount_bags.bag.recording import Recording
 from mount_bags.events.automatic_marks import MarkKind
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.messages.series import registered_topic
-from mount_bags.messages.time_axis import TimeAxis, time_axis
+from mount_bags.messages.time_axis import TimeAxis
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_ros.topics import DISPLACEMENT
 
@@ -36,7 +36,7 @@ def faults(recording: Recording, audits: Mapping[str, TopicAudit]) -> list[Fault
     They count from control's first answer until it was deactivated for the last time: starting and ending the
     graph have verdicts of their own. Without an answer of control, all count.
     """
-    axis, reports = time_axis(recording), node_reports(recording)
+    axis, reports = recording.time_axis, node_reports(recording)
     found = [*_silences(audits, axis), *_errors(recording, reports, axis)]
     found += _marks(recording, found, axis)
     begin, end = _drive(reports, audits, axis)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import Recording
 from mount_bags.compare.alignment import (
     Alignment,
@@ -22,7 +21,8 @@ from mount_bags.compare.signal_difference import SignalDifference, signal_differ
 from mount_bags.compare.tolerances import Tolerances
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import SwitchingChange, paired_switchings, switching_times
-from mount_bags.run.session_differences import session_differences, session_texts
+from mount_bags.run.session import recorded_sessions
+from mount_bags.run.session_differences import session_differences
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, EVENT, SESSION, Topic
 
 _TOLD_OTHERWISE = (SESSION, EVENT)  # in words of their own
@@ -136,8 +136,8 @@ def compare(
     marks_a, marks_b = _marks(a, {}), _marks(b, {other: name for name, other in pairs.items()})
     sessions = _sessions(a, b, pairs)
     return Comparison(
-        name_a=short_name(a),
-        name_b=short_name(b),
+        name_a=a.short_name,
+        name_b=b.short_name,
         alignments=alignments,
         topics=tuple(_compared(topic, tolerances, switching) for topic in matched),
         only_a=_lonely_topics(a, pairs, topics),
@@ -246,7 +246,7 @@ def _lonely_topics(
 
 def _sessions(a: Recording, b: Recording, pairs: Mapping[str, str]) -> list[str] | None:
     """Return how the sessions differ, mount by mount; None where no mount has one in both."""
-    texts_a, texts_b = session_texts(a), session_texts(b)
+    texts_a, texts_b = recorded_sessions(a), recorded_sessions(b)
     both = [(name, other) for name, other in pairs.items() if texts_a.get(name) and texts_b.get(other)]
     if not both:
         return None

@@ -91,7 +91,7 @@ def _kernel_at(distance: float) -> float:
 
 @compiled
 def _bessel(argument: float) -> float:
-    """Return the modified Bessel function I0 by its series."""
+    """Return the modified Bessel function I0 by its series: `np.i0` differs by processor."""
     term, total, number = 1.0, 1.0, 0
     while term > 1e-17 * total:
         number += 1

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
 from mount_cli.commands.options import JsonFile
+from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
 control left samples without a setpoint, on faults, or when nothing can be read.
@@ -36,13 +36,14 @@ def audit(
     from mount_bags.audit.losses import losses
     from mount_bags.audit.report import as_json, as_table, latency_lines, sentences
     from mount_bags.run.place import open_run
+    from mount_cli.screen import TerminalScreen
 
     console = terminal()
     with console.status('reading'):
         opened = open_run(recording)
         audits = audited(opened)
         found = losses(opened, audits)
-    console.print(as_table(audits))
+    TerminalScreen(console).table(as_table(audits))
     for line in latency_lines(audits):
         console.print(line, soft_wrap=True)
     for sentence in sentences(audits, found):

@@ -5,6 +5,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from mount_experiments.force_characteristic import REFERENCE, TITLE
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -182,8 +183,8 @@ def _rms(values: Any) -> float:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Force of the actuator over current and gap',
-    reference='Fig. 2',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The gap of the simulated actuator is held, the current stepped, the force measured with a noisy '
         'load cell (dots). Solid lines are the law of the shipped specimen, Eqs (3), (4) fitted to a '

@@ -3,20 +3,16 @@
 import math
 import time
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from geometry_msgs.msg import WrenchStamped
-from std_msgs.msg import String
 
 from mount_bags.bag.writer import BagWriter
-from mount_bags.run.versions import versions
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import new_session, session_message, session_text
 from mount_models.sampling import SAMPLE_TIME_NS
-from mount_ros.messages.cdr import serialised
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import (
@@ -49,7 +45,7 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
     try:
         for topic in _TOPICS:
             writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
-        writer.write(f'/{SESSION.name}', _session(session), begin)
+        writer.write(f'/{SESSION.name}', session_message(session_text(new_session(session))), begin)
         positions = ScalarsLayout(DISPLACEMENT)
         forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
         channels = measured.displacement, measured.friction_force, measured.normal_force
@@ -84,7 +80,7 @@ def record_actuator_rack(
     try:
         for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
             writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
-        writer.write(f'/{SESSION.name}', _session(session), begin)
+        writer.write(f'/{SESSION.name}', session_message(session_text(new_session(session))), begin)
         ripples, temperatures = ScalarsLayout(COIL_RIPPLE), temperature_layout()
         forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
         rows = zip(
@@ -101,8 +97,3 @@ def record_actuator_rack(
     finally:
         writer.close()
     return folder
-
-
-def _session(content: Mapping[str, Any]) -> bytes:
-    started = datetime.now().astimezone().isoformat(timespec='seconds')
-    return serialised(String(data=session_text({**content, 'started': started, 'versions': versions()})))

@@ -16,6 +16,7 @@ from mount_experiments.harness.contract import (
 )
 from mount_experiments.harness.drawing import BLUE, GREY, RED, finish, new_figure
 from mount_experiments.harness.rack_recording import SUBSTEPS, record_friction_rack
+from mount_experiments.ramp_and_hold import REFERENCE, TITLE
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.ramp_hold import contact_of_response, printed_formulas
 from mount_identification.friction.recording import FloatArray, FrictionRecording
@@ -250,8 +251,8 @@ def _told(errors: dict[str, float]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Ramp and hold of the sticking contact',
-    reference='Fig. 7',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The motor of the rack, a spring p in series with the pads, pulls them by a short ramp and holds. '
         'Nothing slides; the parallel pair of spring and damper relaxes. The joint stiffness comes from the '

@@ -16,6 +16,7 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_experiments.harness.rack_recording import SUBSTEPS, record_friction_rack
+from mount_experiments.sawtooth import REFERENCE, TITLE
 from mount_experiments.sawtooth.evaluation import Run, evaluate
 from mount_identification.friction.recording import FloatArray
 from mount_identification.friction.slip_regions import slip_regions
@@ -52,7 +53,7 @@ class SawtoothParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Move the rack at every normal force, record it, and evaluate the recordings."""
-    from mount_experiments.sawtooth import figures
+    from mount_experiments.sawtooth import pictures as drawn
 
     parameters = parameters_of(order, NAME, SawtoothParameters())
     _check_order(parameters)
@@ -65,10 +66,10 @@ def run(order: Order, progress: Progress) -> Outcome:
     progress(0.95, 'pictures')
     shown = runs[int(np.argmin(np.abs(np.array(loads) - parameters.shown_normal_force)))]
     pictures = [
-        figures.draw_time(shown, order.out / 'sawtooth_force.png'),
-        figures.draw_lines(shown, order.out / 'sawtooth_mu_over_u.png'),
-        figures.draw_parameters(runs, parameters.friction, order.out / 'sawtooth_a_b.png'),
-        figures.draw_models(shown, order.out / 'sawtooth_models.png'),
+        drawn.draw_time(shown, order.out / 'sawtooth_force.png'),
+        drawn.draw_lines(shown, order.out / 'sawtooth_mu_over_u.png'),
+        drawn.draw_parameters(runs, parameters.friction, order.out / 'sawtooth_a_b.png'),
+        drawn.draw_models(shown, order.out / 'sawtooth_models.png'),
     ]
     results = _figures(runs, shown, parameters)
     return Outcome(results, pictures, recordings, _statements(results))
@@ -251,8 +252,8 @@ def _rms(values: FloatArray) -> float:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Friction contact alone on a saw tooth',
-    reference='Figs. 8 to 11',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The simulated pads (full model) are moved between two turning points at constant speed and constant '
         'normal force; after every second turning point the speed grows by 1 mm/s. Displacement, friction '

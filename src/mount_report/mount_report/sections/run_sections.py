@@ -13,10 +13,10 @@ from mount_bags.compare.compare import Comparison
 from mount_bags.compare.quantity_text import quantity_text, time_text
 from mount_bags.compare.words import by_importance
 from mount_bags.compare.words import sentences as comparison_sentences
-from mount_bags.run.session_differences import session_values
-from mount_report.sections import figures
+from mount_bags.run.session import session_values
+from mount_report.sections import charts
+from mount_report.sections.charts import Named
 from mount_report.sections.coil_load import CoilLoad, coil_load
-from mount_report.sections.figures import Named
 from mount_report.sections.section import Section, Table
 from mount_report.sections.subject import Subject
 from mount_report.sections.wording import Sentences
@@ -92,19 +92,19 @@ def tracking(subjects: Sequence[Subject]) -> Section:
         )
         said.say(subject, error)
         said.say(subject, subject.facts.tracking_remark)
-    chart = figures.tracking(wanted, actual, damping, _around(damping)) if wanted and damping else None
+    chart = charts.tracking(wanted, actual, damping, _around(damping)) if wanted and damping else None
     return Section('tracking', 'Tracking error against the truth', said.told(), chart)
 
 
 def losses(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses]) -> Section:
     """Return what is missing of each topic, and the faults."""
     words, tables = [], []
-    for subject, topics, figure in zip(subjects, audits, found, strict=True):
+    for subject, topics, lost in zip(subjects, audits, found, strict=True):
         prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
-        told = audit_sentences(topics, figure)
+        told = audit_sentences(topics, lost)
         words.append(f'{prefix}{told[-1]}')
-        if figure.faults:
-            faults = [(time_text(fault.time), fault.node, fault.sentence) for fault in figure.faults]
+        if lost.faults:
+            faults = [(time_text(fault.time), fault.node, fault.sentence) for fault in lost.faults]
             tables.append(Table(('time', 'node', 'fault'), faults, f'{prefix}faults'))
         rows = [
             (

@@ -8,8 +8,8 @@ import numpy as np
 
 from mount_bags.compare.quantity_text import quantity_text
 from mount_report.drawing.chart import Array
-from mount_report.sections import figures
-from mount_report.sections.figures import Levels, Named
+from mount_report.sections import charts
+from mount_report.sections.charts import Levels, Named
 from mount_report.sections.periodic import Sine, cycle_work, distortion, harmonics, whole_periods
 from mount_report.sections.section import Section, Table
 from mount_report.sections.spectrum import amplitude_density, evenly
@@ -54,7 +54,7 @@ def traces(subjects: Sequence[Subject]) -> Section:
     if moved or currents:
         first = min(float(series.x[0]) for series in (*moved, *currents))
         last = max(float(series.x[-1]) for series in (*moved, *currents))
-        chart = figures.time_traces(moved, currents, levels, damping, limits=(first, last))
+        chart = charts.time_traces(moved, currents, levels, damping, limits=(first, last))
     return Section('traces', 'Displacement and current', words, chart)
 
 
@@ -94,7 +94,7 @@ def loops(subjects: Sequence[Subject]) -> Section:
                 group.append(Named(_name(subjects, subject), x, y))
                 found = True
         said.say(subject, how if found else 'no force was recorded')
-    chart = figures.hysteresis_loops(mount, friction) if mount or friction else None
+    chart = charts.hysteresis_loops(mount, friction) if mount or friction else None
     return Section('hysteresis', 'Loss hysteresis', said.told(), chart)
 
 
@@ -120,7 +120,7 @@ def harmonic_content(subjects: Sequence[Subject]) -> Section:
         *(f'h{number} (N)' for number in range(1, 9)),
     )  # fmt: skip
     tables = [Table(head, rows)] if rows else []
-    chart = figures.harmonics_bars(bars) if bars else None
+    chart = charts.harmonics_bars(bars) if bars else None
     return Section('harmonics', 'Harmonics of the mount force', said.told(), chart, tables)
 
 
@@ -180,7 +180,7 @@ def spectra(subjects: Sequence[Subject]) -> Section:
     words += _absent(
         subjects, (Subject.mount_force, 'no mount force'), (_acceleration, 'no chassis acceleration')
     )
-    chart = figures.spectra(groups) if groups else None
+    chart = charts.spectra(groups) if groups else None
     return Section('spectra', 'Spectra', words, chart)
 
 
@@ -200,7 +200,7 @@ def sweep_view(subjects: Sequence[Subject]) -> Section | None:
     if not peaks:
         return None
     level = subjects[0].facts.levels.switch_on
-    chart = figures.sweep_bands(peaks, accelerations, level)
+    chart = charts.sweep_bands(peaks, accelerations, level)
     rows = [
         (f'{edge:g} .. {edge + 1:g}', *(_band_cell(series, edge) for series in peaks))
         for edge in sorted(set(chain.from_iterable(series.x.tolist() for series in peaks)))
@@ -222,7 +222,7 @@ def plain(subjects: Sequence[Subject], most: int = 6) -> Section | None:
     if not groups:
         return None
     words = [f'The first {len(groups)} numbers that change; their units are not known here.']
-    return Section('signals', 'Recorded signals', words, figures.plain_traces(list(groups.items())))
+    return Section('signals', 'Recorded signals', words, charts.plain_traces(list(groups.items())))
 
 
 def _foreign(subject: Subject) -> list[tuple[str, tuple[Array, Array]]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mount_report.drawing.chart import Array
-from mount_report.sections.figures import Levels
+from mount_report.sections.charts import Levels
 from mount_report.sections.periodic import Sine, dominant_sine
 from mount_report.sections.sweep import Sweep, find_sweep
 from mount_report.signals import Signal, Signals

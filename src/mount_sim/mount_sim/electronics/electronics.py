@@ -104,7 +104,7 @@ def read_sensors(electronics, coil, actuator, displacement, current, gap, noise)
 def advance_current(electronics, coil, actuator, current, gap, wanted, dt):
     """Return the coil current (A) after `dt` s of the current loop, within what the link voltage allows.
 
-    The loop asks for the voltage that would close the error with its bandwidth; slow changes of flux
+    The loop sets the voltage that would close the error with its bandwidth; slow changes of flux
     reach the whole core, so the inductance is the mean incremental one. Motion adds no voltage here. The
     mean rate over the step makes the decay exact: by its first value the loop would be 7 % too fast.
     """

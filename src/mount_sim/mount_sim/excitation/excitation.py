@@ -11,7 +11,7 @@ from mount_models.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, 
 
 
 class Seat(IntEnum):
-    """Where the mount sits, and so what the excitation means."""
+    """Where the mount is fixed, and so what the excitation means."""
 
     BENCH = 0  # displacement of the mount, m
     ACCELERATED_CHASSIS = 1  # vertical acceleration of the chassis under the engine, m/s^2
