@@ -56,6 +56,18 @@ def test_no_module_needs_itself_by_way_of_others():
     tuple(TopologicalSorter(needs).static_order())  # raises CycleError, which names the circle
 
 
+def test_rooms_of_mount_bags_stand_one_upon_another():
+    files = {name: file for name, file in module_files().items() if name.count('.') == 2}
+    rooms: dict[str, set[str]] = {}
+    for module, file in files.items():
+        room = module.rpartition('.')[0]
+        others = {name.rpartition('.')[0] for name in modules_of(file) if name in files}
+        rooms.setdefault(room, set()).update(others - {room})
+    of_bags = {room: others for room, others in rooms.items() if room.startswith('mount_bags.')}
+    assert 'mount_bags.container' in of_bags['mount_bags.bag']
+    tuple(TopologicalSorter(of_bags).static_order())  # raises CycleError, which names the circle
+
+
 def test_every_package_is_covered():
     assert set(PACKAGES) == set(MAY_IMPORT)
 

@@ -38,7 +38,7 @@ def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
 
 
 def as_table(audits: Mapping[str, TopicAudit]) -> Table:
-    """Return the figures as a table; columns of troubles that nobody has are left out."""
+    """Return the figures as a table; columns of troubles are left out where no topic has them."""
     troubles = [name for name in _TROUBLES if any(getattr(entry, name) for entry in audits.values())]
     heads = (*_HEADS, *(_TROUBLES[name] for name in troubles))
     rows = [
@@ -96,7 +96,7 @@ def _verdict(audits: Mapping[str, TopicAudit], found: Losses) -> str:
     told = sum(entry.expected is not None for entry in audits.values() if entry.present)
     untold = sum(entry.expected is None and entry.present > 0 for entry in audits.values())
     if not told:
-        return 'Whether anything was lost cannot be told: no topic has stamps with a rate, nobody counted.'
+        return 'Whether anything was lost cannot be told: no topic has stamps with a rate, none was counted.'
     rest = f'; of {untold} others it cannot be told' if untold else ''
     return f'Nothing is known to be lost: {told} topics are complete{rest}.'
 

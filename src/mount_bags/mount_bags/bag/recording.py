@@ -75,11 +75,6 @@ class Recording:
         return all(file.whole for file in self.files) or self._counts_agree
 
     @property
-    def all_pieces(self) -> bool:
-        """Whether no file of the recording is known to be missing."""
-        return self._complete
-
-    @property
     def described(self) -> bool:
         """Whether `metadata.yaml` tells of all files."""
         information = self.information

@@ -97,11 +97,6 @@ class BagWriter:
         """How many bytes the files have."""
         return sum(piece.file.size for piece in self._pieces)
 
-    @property
-    def piece_count(self) -> int:
-        """How many files the recording has."""
-        return len(self._pieces)
-
     def unwritten(self, handed: int) -> int:
         """Return how many of the messages handed over do not stand on the disk, once writing has failed."""
         return handed - self.kept

@@ -140,8 +140,8 @@ def compare(
         name_b=b.short_name,
         alignments=alignments,
         topics=tuple(_compared(topic, tolerances, switching) for topic in matched),
-        only_a=_lonely_topics(a, pairs, topics),
-        only_b=_lonely_topics(b, pairs.values(), topics),
+        only_a=_unpaired_topics(a, pairs, topics),
+        only_b=_unpaired_topics(b, pairs.values(), topics),
         sessions=tuple(sessions or ()),
         both_have_session=sessions is not None,
         marks_a=tuple((marks_a - marks_b).elements()),
@@ -170,7 +170,7 @@ def _wanted(registered: Topic | None, topics: Collection[Topic] | None) -> bool:
 def _compared(
     topic: MatchedTopic, tolerances: Tolerances, switching: Mapping[str, list[SwitchingChange]]
 ) -> TopicComparison:
-    (only_a, outside_a), (only_b, outside_b) = topic.lonely_samples()
+    (only_a, outside_a), (only_b, outside_b) = topic.unmatched_samples()
     signals = {
         name: unit
         for name, unit in topic.signals.items()
@@ -208,8 +208,8 @@ def _compared(
 def _remark(topic: MatchedTopic) -> str:
     if topic.a.type != topic.b.type:
         return f'in A it is {topic.a.type}, in B {topic.b.type}'
-    lonely = topic.lonely_signals
-    return f'only one of both has {", ".join(lonely)}' if lonely else ''
+    unmatched = topic.unmatched_signals
+    return f'only one of both has {", ".join(unmatched)}' if unmatched else ''
 
 
 def _is_switch(topic: MatchedTopic, signal: str) -> bool:
@@ -232,7 +232,7 @@ def _in_time(switchings: Iterable[list[SwitchingChange]]) -> tuple[SwitchingChan
     return tuple(sorted((change for each in switchings for change in each), key=lambda change: change.time))
 
 
-def _lonely_topics(
+def _unpaired_topics(
     recording: Recording, paired: Collection[str], topics: Collection[Topic] | None
 ) -> tuple[str, ...]:
     return tuple(

@@ -25,7 +25,7 @@ def sentences(comparison: Comparison) -> list[str]:
         *_reasons(comparison),
         *_samples(comparison),
         *(f'{topic.name}: {topic.remark}' for topic in comparison.topics if topic.remark),
-        *_lonely(comparison),
+        *_unmatched(comparison),
         _rest(comparison),
     ]
 
@@ -196,7 +196,7 @@ def _samples(comparison: Comparison) -> list[str]:
     ]
 
 
-def _lonely(comparison: Comparison) -> list[str]:
+def _unmatched(comparison: Comparison) -> list[str]:
     return [
         f'{what} only in {where}: {_few(names, ", ")}'
         for what, where, names in (

@@ -59,7 +59,7 @@ class Chunk:
     compression: str
     start_time: int
     end_time: int
-    channels: frozenset[int] | None = None  # those with messages, None where nobody reliable says
+    channels: frozenset[int] | None = None  # those with messages, None where no reliable source tells
     counts: dict[int, int] = field(default_factory=dict)  # messages by channel, once explored
     declarations: tuple[tuple[int, bytes], ...] = ()  # of schemas and channels, once explored
     explored: bool = False

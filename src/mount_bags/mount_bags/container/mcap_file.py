@@ -275,7 +275,7 @@ class McapFile:
     def _understood(self, position: int, limit: int, walked: int) -> int:
         """Return where from `position` on the last whole record before `limit` ends.
 
-        What stands beside the messages is taken where nobody has `walked` so far.
+        What stands beside the messages is taken only from `walked` on.
         """
         while position < limit:
             end = self._record_end(position, limit)

@@ -53,7 +53,7 @@ def cut(
     Times are in s on the time axis of `recording`, which the piece keeps; None is its beginning, or its end
     with the last message. Messages keep their bytes, log and publish times. Of latched topics and of `event`
     the last message before `begin` comes with it, and so do attachments and metadata. What the recorder lost
-    is told of the piece too: nobody knows when that was. `reason` goes into the note of origin. Raises
+    is told of the piece too: when that was is not known. `reason` goes into the note of origin. Raises
     `CutError`.
     """
     span = _checked_span(recording, recording.time_axis, begin, end)

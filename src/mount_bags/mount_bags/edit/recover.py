@@ -178,7 +178,7 @@ def _estimate(files: Sequence[McapFile], kept: int) -> int | None:
 
 
 def _expected(recording: Recording) -> int | None:
-    """Return how many messages there once were, None if nobody reliable says."""
+    """Return how many messages there once were, None if no reliable source tells."""
     if recording.proven:
         return sum(sum(file.message_counts().values()) for file in recording.files)
     information = recording.information
@@ -208,7 +208,7 @@ def _lost_inside(file: McapFile) -> int:
 
 
 def _lost_at_ends(recording: Recording, kept: tuple[int, int]) -> float:
-    """Return the s before the first and behind the last kept message, NaN if nobody says."""
+    """Return the s before the first and behind the last kept message, NaN if no source tells."""
     first, last = kept
     information = recording.information
     if recording.proven and recording.time_range:
@@ -232,4 +232,4 @@ def _size(count: int) -> str:
 
 
 def _silent(done: int, of: int) -> None:
-    """Nobody looks."""
+    """Show no progress."""

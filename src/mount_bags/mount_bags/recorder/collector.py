@@ -25,7 +25,7 @@ Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns), both of the system clock."""
 
 _PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold five seconds
-_SHARED_PERIOD = 0.02  # s, chosen: the same where nobody looks at the recording while it grows
+_SHARED_PERIOD = 0.02  # s, chosen: the same where the recording is not watched while it grows
 
 
 class Collector:

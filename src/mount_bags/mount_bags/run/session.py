@@ -8,12 +8,10 @@ from datetime import datetime
 from typing import Any
 
 import yaml
-from std_msgs.msg import String
 
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import registered_topic
 from mount_bags.run.versions import versions
-from mount_ros.messages.cdr import serialised
 from mount_ros.topics import SESSION
 
 
@@ -38,6 +36,10 @@ def session_text(content: Mapping[str, Any]) -> str:
 
 def session_message(text: str) -> bytes:
     """Return the serialised message of a session text."""
+    from std_msgs.msg import String  # only here: these load the middleware, which readers do without
+
+    from mount_ros.messages.cdr import serialised
+
     return serialised(String(data=text))
 
 

@@ -5,12 +5,13 @@ Row-major, shape (2, N). Dimension 0: label `rows: current (A), normal_force (N)
 """
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from rclpy.serialization import deserialize_message
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+if TYPE_CHECKING:  # loading messages and middleware takes a fifth of a second, which readers do without
+    from std_msgs.msg import Float64MultiArray
 
 from mount_models.sampling import HIGHEST_CURRENT
 
@@ -32,12 +33,14 @@ class ForceTable(NamedTuple):
     normal_force: FloatArray
 
 
-def to_message(stamp: int, table: npt.ArrayLike) -> Float64MultiArray:
+def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
     """Return the message of a table of shape (2, N), rows current (A) and normal force (N).
 
     `stamp` (ns) is that of the `air_gap` message. Raises `ForceTableMessageError` for a table
     that `from_message` would refuse.
     """
+    from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
     rows = np.asarray(table, float)
     if rows.ndim != 2:
         raise _refusal(f'must have 2 rows of N columns; instead received an array of shape {rows.shape}')
@@ -50,7 +53,7 @@ def to_message(stamp: int, table: npt.ArrayLike) -> Float64MultiArray:
     return Float64MultiArray(layout=MultiArrayLayout(dim=dimensions), data=rows.ravel().tolist())
 
 
-def from_message(message: Float64MultiArray) -> ForceTable:
+def from_message(message: 'Float64MultiArray') -> ForceTable:
     """Return activation stamp and table of `message`, or raise `ForceTableMessageError`."""
     dimensions = list(message.layout.dim)
     if len(dimensions) != 2 or dimensions[0].size != 2:
@@ -72,6 +75,9 @@ def from_message(message: Float64MultiArray) -> ForceTable:
 
 def from_bytes(raw: bytes) -> ForceTable:
     """Like `from_message`, from the serialised message that a data path hands over."""
+    from rclpy.serialization import deserialize_message
+    from std_msgs.msg import Float64MultiArray
+
     return from_message(deserialize_message(raw, Float64MultiArray))
 
 
