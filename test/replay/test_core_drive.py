@@ -17,6 +17,7 @@ from mount_bags.messages.series import Series
 from mount_bringup.chosen import chosen_damper, control_parameters
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_control.controller import _STATE
+from mount_models.arithmetic import series
 from mount_models.specimen import default_specimen
 from mount_replay.loop import chain as core_chain
 from mount_replay.loop import run as core_run
@@ -260,8 +261,11 @@ def test_a_mount_beyond_the_range_of_its_sensor_is_told_and_answered_with_0_ampe
 def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
     def poisoned(parameters):
         excitation = build_excitation(parameters)
-        excitation.values[21_000] = np.nan
-        return excitation
+        values = excitation.values[:]
+        values[21_000] = np.nan
+        return replace(
+            excitation, values=series.Series(len(values), lambda first, behind: values[first:behind])
+        )
 
     monkeypatch.setattr(core_run, 'build_excitation', poisoned)
     with pytest.raises(DivergedError, match=r'has diverged: at 3\.851 s not all of its state is a finite'):

@@ -41,12 +41,12 @@ class Snapshot(NamedTuple):
     latest_stamp: int = 0  # ns
     last_refusal: Refusal | None = None
     driving: bool = False
-    unheard: bool = False  # the electronics say that no setpoint reaches them
+    unheard: bool = False  # the electronics report that no setpoint reaches them
     bus_off: bool = False
     trouble: str = ''
     failure: str = ''
     status: Status | None = None
-    setpoint_errors: int = 0  # statuses that tell of setpoint frames with a failed check
+    setpoint_errors: int = 0  # statuses that report setpoint frames with a failed check
 
 
 def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:

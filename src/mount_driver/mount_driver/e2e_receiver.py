@@ -1,6 +1,6 @@
 """The receiving side of the end-to-end protection: each frame is judged and counted, a doubtful one not used.
 
-AUTOSAR E2E profile 5 as the DBC tells it to those who build either end; both ends of the bus run this code.
+AUTOSAR E2E profile 5 as the DBC describes it; both ends of the bus run this code.
 """
 
 from collections.abc import Callable

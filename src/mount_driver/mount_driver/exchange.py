@@ -106,7 +106,7 @@ class Exchange:
             return setpoint is not None and self._send(setpoint)
 
     def poll(self) -> bool:
-        """Handle the next frame if one is there and return whether; for who did not start a thread."""
+        """Handle the next frame if one is there and return whether; used without a thread."""
         bus = self._bus
         return bus is not None and may_have_frames(bus) and self._attempt(0.0)
 
@@ -237,7 +237,7 @@ class Exchange:
             self._thread = None
 
     def _recover(self, error: can.CanError) -> None:
-        """Open the bus again and again until it works, we are told to end, or the time is over."""
+        """Open the bus again and again until it works, `stop` is called, or the time is over."""
         self.trouble = str(error)
         deadline = time.monotonic() + self._parameters.recovery_time
         while not self._ending.is_set():

@@ -67,7 +67,7 @@ class Link:
         """The newest sample."""
         self.status: Status | None = None
         self.setpoint_errors = 0
-        """Statuses in which the electronics told of setpoint frames that failed their check."""
+        """Statuses that report setpoint frames which failed their check."""
 
         self.setpoints = 0
         """Setpoints that were let through."""
@@ -189,7 +189,7 @@ class Link:
             return Refusal.STALE
         if stamp < self._answered_stamp:
             return Refusal.SUPERSEDED
-        # 0 A may be said again: whoever ends says it for the sample that he has answered.
+        # 0 A may be repeated: a node that ends sends it for the sample that it has answered.
         if stamp == self._answered_stamp and current > 0.0 and current >= self._last_setpoint.current:
             return Refusal.NOT_LOWER
         return None

@@ -27,7 +27,8 @@ from mount_replay.core import OFF, ControlAnswers, Progress, RampAnswers, Replay
 from mount_replay.given.input import Column, ControlRun, ReplayError, ReplayInput, Times
 from mount_replay.given.ramps import MeasuredGap, Ramp
 from mount_ros import topics
-from mount_ros.data_path import DataPath, DataThread
+from mount_ros.data_path import DataPath
+from mount_ros.data_thread import DataThread
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import from_bytes, to_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of

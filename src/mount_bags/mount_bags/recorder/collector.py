@@ -14,7 +14,8 @@ from collections.abc import Callable
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from mount_ros.data_path import DataThread, Work, io_node
+from mount_ros.data_path import io_node
+from mount_ros.data_thread import DataThread, Work
 from mount_ros.messages.types import message_class
 from mount_ros.private_rclpy import Taken, raw_taker
 from mount_ros.qos import publisher_qos, recording_qos

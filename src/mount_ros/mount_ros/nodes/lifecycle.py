@@ -6,7 +6,8 @@ from typing import Any, Protocol
 
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from mount_ros.data_path import DataPath, DataThread
+from mount_ros.data_path import DataPath
+from mount_ros.data_thread import DataThread
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
 from mount_ros.nodes.scheduling import calm_resending
@@ -24,7 +25,7 @@ class ServedPath(Protocol):
         """Why its thread has ended by itself; empty while it serves."""
 
     def unmatched(self) -> list[str]:
-        """Return the names of the topics that nobody on the other side has been found for yet."""
+        """Return the names of the topics whose other side has not been found yet."""
 
     def stop(self) -> None:
         """End serving; safe to call twice."""

@@ -36,7 +36,7 @@ def read(node: Node, defaults: P, prefix: str = '') -> P:
 
 
 class SpecimenValues:
-    """Gives parameters the values of a file, except those that somebody has set otherwise.
+    """Gives parameters the values of a file, except those that were set otherwise.
 
     Set otherwise is what came with the start of the node, even if it equals the default, and what was changed
     since to another value. After `give` the parameters of the node are those in use.
@@ -48,7 +48,7 @@ class SpecimenValues:
         self._at_start = given_at_start(node)
 
     def give(self, defaults: NamedTuple, prefix: str, values: Mapping[str, Any]) -> None:
-        """Set the declared parameters of the set `defaults` to `values` where nobody has set them.
+        """Set the declared parameters of the set `defaults` to `values` unless they were set otherwise.
 
         What an earlier file gave goes back to its default if this one does not name it. Raises
         `ParameterError` for a value that the parameter refuses.
