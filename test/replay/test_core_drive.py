@@ -17,7 +17,7 @@ from mount_bags.messages.series import Series
 from mount_bringup.chosen import chosen_damper, control_parameters
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_control.controller import _STATE
-from mount_models.arithmetic import series
+from mount_models.arithmetic.series import series_of
 from mount_models.specimen import default_specimen
 from mount_replay.loop import chain as core_chain
 from mount_replay.loop import run as core_run
@@ -263,9 +263,7 @@ def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
         excitation = build_excitation(parameters)
         values = excitation.values[:]
         values[21_000] = np.nan
-        return replace(
-            excitation, values=series.Series(len(values), lambda first, behind: values[first:behind])
-        )
+        return replace(excitation, values=series_of(values))
 
     monkeypatch.setattr(core_run, 'build_excitation', poisoned)
     with pytest.raises(DivergedError, match=r'has diverged: at 3\.851 s not all of its state is a finite'):

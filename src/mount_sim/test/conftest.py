@@ -1,11 +1,13 @@
 """What the tests share: simulated mounts by their parameters, and runs of them."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mount_models.arithmetic.series import series_of
 from mount_models.quantity import with_flattened
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
@@ -26,12 +28,20 @@ def parameters() -> Callable[..., SimParameters]:
 
 @pytest.fixture(scope='session')
 def make_mount() -> Callable[..., SimulatedMount]:
-    """Return a function that builds a simulated mount; by default on the bench for 0.3 s."""
+    """Return a function that builds a simulated mount; by default on the bench for 0.3 s.
 
-    def make(**changes: Any) -> SimulatedMount:
+    `spoil` changes the numbers that shake it, in their place.
+    """
+
+    def make(spoil: Callable[[np.ndarray], None] | None = None, **changes: Any) -> SimulatedMount:
         defaults = {'scenario': 'bench', 'timeline__start': 0.0, 'timeline__duration': 0.3}
         chosen = sim_parameters(**{**defaults, **changes})
-        return SimulatedMount(chosen.plant, build_excitation(chosen), chosen.seed)
+        excitation = build_excitation(chosen)
+        if spoil is not None:
+            values = excitation.values[:]
+            spoil(values)
+            excitation = replace(excitation, values=series_of(values))
+        return SimulatedMount(chosen.plant, excitation, chosen.seed)
 
     return make
 

@@ -275,8 +275,7 @@ def test_step_by_step_the_loop_never_waits(ends, make_mount):
 def test_a_mount_beyond_the_range_of_its_sensor_goes_on_and_is_told(ends, make_mount):
     """The rack is told to move farther than the sensor reaches, as a rough road can."""
     end, host = ends
-    mount = make_mount()
-    mount._values[:] *= 80.0  # to 80 mm
+    mount = make_mount(lambda values: np.multiply(values, 80.0, out=values))  # to 80 mm
     loop = _loop(mount, end)
     answering = _in_thread(host.answer_each, 300, lambda sample: 0.0)
     loop.run_in_lockstep(threading.Event(), LIMIT)
@@ -292,8 +291,7 @@ def test_a_mount_beyond_the_range_of_its_sensor_goes_on_and_is_told(ends, make_m
 
 def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(ends, make_mount):
     end, host = ends
-    mount = make_mount()
-    mount._values[20, 3] = math.nan
+    mount = make_mount(lambda values: values.put(20 * 20 + 3, math.nan))
     loop = _loop(mount, end)
     answering = _in_thread(host.answer_each, 21, lambda sample: 0.0)
     with pytest.raises(DivergedError, match=r'has diverged: at 0\.021 s not all of its state is a finite'):

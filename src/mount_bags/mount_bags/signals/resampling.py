@@ -24,16 +24,14 @@ from mount_bags.signals.plausibility import OVERSHOOT, check_range
 from mount_bags.signals.signal import FloatArray
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import sine_and_cosine
-from mount_models.arithmetic.series import Series
+from mount_models.arithmetic.series import Series, series_of
 
 HALF_LENGTH = 26  # samples of the slower rate
 CUTOFF = 0.45  # of the slower rate, chosen: what is left at its half is as small as the window allows
 _SHAPE = 7.857  # Kaiser's beta for 80 dB
 _PHASES = 1024  # points of the kernel for each sample; between them it is straight, within 1e-6
 _COARSE = 4  # points to a period of the slower rate
-_WITHOUT_DOUBT = (
-    0.9  # of what is allowed, chosen: 8 % for what lies between the points, the rest for the stop band
-)
+_WITHOUT_DOUBT = 0.9  # of what is allowed, chosen: 8 % for what lies between the points, and some more
 _SAME = 0.1  # samples, chosen: grids that run apart by no more over the whole signal are one
 
 
@@ -44,8 +42,7 @@ def resampled(even: EvenSignal, step_time: float, first: float = 0.0, count: int
     `SignalError` for a result that its samples do not bear out.
     """
     if first == 0.0 and has_step(even, step_time):
-        values = even.values[:count]
-        return Series(len(values), lambda begin, behind: values[begin:behind])
+        return series_of(even.values[:count])
     if count is None:
         count = max(1, math.ceil(even.length / step_time - 1e-6))
     grid, kernel = _Grid(even.period, first, step_time), _kernel()

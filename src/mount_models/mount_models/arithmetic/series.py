@@ -28,6 +28,11 @@ class Series:
         return Series(min(count, self._count), self._make)
 
 
+def series_of(values: NDArray[np.float64]) -> Series:
+    """Return `values` (n,), which are in memory, as a series."""
+    return Series(len(values), lambda first, behind: values[first:behind])
+
+
 def series_over_time(
     count: int, step_time: float, at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
 ) -> Series:

@@ -131,8 +131,8 @@ class SimulatedMount:
     def ahead(self, count: int) -> Ahead:
         """Return what the next samples of the run need in a compiled loop; none of them is taken yet.
 
-        They are at least one and at most `count`.
-        The loop does for each what `measure` and `advance` with a setpoint do; `skip` notes how far it came.
+        They are at least one and at most `count`. The loop does for each what `measure` and `advance` with a
+        setpoint do; `skip` notes how far it came.
         """
         until_open = self.run.excitation_start - self.sample
         if self._driver_opens and until_open > 0:
