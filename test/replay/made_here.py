@@ -63,7 +63,7 @@ def numbers(folder: Path) -> dict[str, np.ndarray]:
         'recorded': {'recorded.file': str(folder / 'shaken.csv'), 'recorded.column': 'az'},
     }
     shaken = {
-        name: build_excitation(with_flattened(SimParameters(), {'scenario': name, **values})).values
+        name: build_excitation(with_flattened(SimParameters(), {'scenario': name, **values})).values[:]
         for name, values in chosen.items()
     }
     return {**shaken, **{name: damper_curve(name).table for name in DAMPERS}}
