@@ -18,4 +18,5 @@ setup(
         ('share/mount_bringup/layouts', glob('layouts/*')),
     ],
     install_requires=['setuptools'],
+    extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
 )

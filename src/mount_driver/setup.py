@@ -14,5 +14,6 @@ setup(
         ('share/mount_driver', ['package.xml', 'README.md']),
     ],
     install_requires=['setuptools'],
+    extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
     entry_points={'console_scripts': ['mount_driver = mount_driver.node:main']},
 )

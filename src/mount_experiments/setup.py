@@ -13,4 +13,5 @@ setup(
         ('share/mount_experiments', ['package.xml', 'README.md']),
     ],
     install_requires=['setuptools'],
+    extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
 )

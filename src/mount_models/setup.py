@@ -14,4 +14,5 @@ setup(
         ('share/mount_models', ['package.xml', 'README.md']),
     ],
     install_requires=['setuptools'],
+    extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
 )

@@ -13,5 +13,6 @@ setup(
         ('share/mount_sim', ['package.xml', 'README.md']),
     ],
     install_requires=['setuptools'],
+    extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
     entry_points={'console_scripts': ['mount_sim = mount_sim.node:main']},
 )
