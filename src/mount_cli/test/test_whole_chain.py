@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mount_bringup.chosen import chosen_control, chosen_damper, control_parameters
+from mount_bringup.chosen import chosen_control, chosen_damper, switched_viscous_parameters
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
@@ -115,7 +115,7 @@ def tracking(seed, file):
         zero=zero,
     )
     assert active.mean() > 0.3
-    return tracking_error(drive, control_parameters(settings), chosen_damper(settings))
+    return tracking_error(drive, switched_viscous_parameters(settings), chosen_damper(settings))
 
 
 def step_errors(seed, file):
