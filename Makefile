@@ -16,7 +16,7 @@ REAL_TIME_TESTS = $(shell grep -rl --include='test_*.py' 'mark.real_time' src te
 WORKERS ?= $(shell echo $$(($$(nproc) < 3 ? $$(nproc) + 1 : 4)))
 RACK := build/rack
 SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
-# A real drive, not part of this repository: docs/recorded_drive.md is written anew only where it is there.
+# A real drive, not part of this repository: docs/explanation/recorded_drive.md is written anew only where it is there.
 RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 
 # Where it is set, as in many containers, every process would compile all its modules anew: half a second for each node,
@@ -36,11 +36,11 @@ test: $(VENV)/.ready-dev ## pass all tests
 	@$(BIN)/python -m pytest -m 'not real_time' -n $(WORKERS) --dist worksteal
 	@$(BIN)/python -m pytest -m real_time $(REAL_TIME_TESTS)
 
-experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/experiments.md and docs/figures
-	@$(BIN)/engine-mount experiment all --page docs/experiments.md
+experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/explanation/experiments.md and docs/explanation/figures
+	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md
 ifneq ($(RECORDED_DRIVE),)
 	@$(BIN)/engine-mount experiment recorded_drive --set recorded_drive.file=$(RECORDED_DRIVE) \
-		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/recorded_drive.md
+		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/explanation/recorded_drive.md
 endif
 
 identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes the specimen that is shipped

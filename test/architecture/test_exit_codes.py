@@ -6,13 +6,12 @@ from pathlib import Path
 from mount_cli.command import app
 from mount_cli.commands import compare
 
-PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'interface.md'
+PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'exit_codes.md'
 
 
 def _rows() -> dict[str, str]:
     """Return {command: its row} of the page."""
-    chapter = PAGE.read_text(encoding='utf-8').split('## Exit codes')[1].split('\n## ')[0]
-    rows = [line for line in chapter.splitlines() if line.startswith('| `')]
+    rows = [line for line in PAGE.read_text(encoding='utf-8').splitlines() if line.startswith('| `')]
     return {name: row for row in rows for name in re.findall(r'`(\w+)`', row.split('|')[1])}
 
 

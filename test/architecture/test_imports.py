@@ -25,6 +25,7 @@ MAY_IMPORT = {
     for package in floor
 }
 ROS = ('rclpy', 'sensor_msgs', 'std_msgs', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle_msgs', 'mount_ros')
+REGISTRY = 'mount_ros.topics'  # plain data, which any file may read
 # Beside node.py: verdicts are `mount_ros.nodes.diagnostics.Verdict`, plain data.
 MAY_TOUCH_ROS = {
     'mount_driver': {'node.py', 'diagnosis.py'},
@@ -55,14 +56,30 @@ def test_no_module_needs_itself_by_way_of_others():
     tuple(TopologicalSorter(needs).static_order())  # raises CycleError, which names the circle
 
 
+def test_rooms_of_mount_bags_stand_one_upon_another():
+    files = {name: file for name, file in module_files().items() if name.count('.') == 2}
+    rooms: dict[str, set[str]] = {}
+    for module, file in files.items():
+        room = module.rpartition('.')[0]
+        others = {name.rpartition('.')[0] for name in modules_of(file) if name in files}
+        rooms.setdefault(room, set()).update(others - {room})
+    of_bags = {room: others for room, others in rooms.items() if room.startswith('mount_bags.')}
+    assert 'mount_bags.container' in of_bags['mount_bags.bag']
+    tuple(TopologicalSorter(of_bags).static_order())  # raises CycleError, which names the circle
+
+
 def test_every_package_is_covered():
     assert set(PACKAGES) == set(MAY_IMPORT)
 
 
 @pytest.mark.parametrize('package', MAY_TOUCH_ROS)
 def test_only_the_node_and_its_verdict_touch_ros(package: str):
-    touching = {file.name for file, name in _imports(package) if name in ROS}
-    assert touching == MAY_TOUCH_ROS[package]
+    files = (SOURCES / package / package).rglob('*.py')
+    assert {file.name for file in files if _touches_ros(file)} == MAY_TOUCH_ROS[package]
+
+
+def test_the_registry_of_topics_is_plain_data():
+    assert not _touches_ros(SOURCES / 'mount_ros' / 'mount_ros' / 'topics.py')
 
 
 def test_models_know_no_ros():
@@ -101,3 +118,8 @@ def _imports(package: str) -> Iterator[tuple[Path, str]]:
     for file in sorted((SOURCES / package / package).rglob('*.py')):
         for module in modules_of(file):
             yield file, module.split('.')[0]
+
+
+def _touches_ros(file: Path) -> bool:
+    modules = {name for name in modules_of(file) if name != REGISTRY and not name.startswith(f'{REGISTRY}.')}
+    return bool({name.split('.')[0] for name in modules} & set(ROS))

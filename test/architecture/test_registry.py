@@ -1,4 +1,4 @@
-"""The registry of topics, the nodes, docs/interface.md and the tables of READMEs say the same."""
+"""The registry of topics, the nodes, docs/reference and the tables of READMEs say the same."""
 
 import ast
 import math
@@ -35,12 +35,10 @@ from mount_ros.topics import (
     DIAGNOSTICS,
     RACK_TOPICS,
     SESSION,
-    SIM_TRUTH,
     TOPICS,
     Delivery,
     Topic,
 )
-from mount_sim.plant.plant import TRUTH
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
@@ -119,10 +117,6 @@ def test_the_units_of_what_policies_trace_are_known_to_readers():
     assert units == {name: unit for policy in POLICIES.values() for name, unit in policy.TRACE.items()}
 
 
-def test_the_plant_gives_what_the_registry_declares():
-    assert TRUTH.names == SIM_TRUTH.names
-
-
 def test_every_topic_that_a_source_names_is_registered():
     used = {(file, name) for file in python_files() for name in topics_used_in(file)}
     assert len(used) > 20, 'the search no longer finds what it looks for'
@@ -160,9 +154,7 @@ def test_interface_lists_the_signals_of_the_dbc(message):
     assert listed == [
         (
             signal.name,
-            f'{signal.start}'
-            if signal.length == 1
-            else f'{signal.start}..{signal.start + signal.length - 1}',
+            bits(signal.start, signal.length),
             float(signal.scale),
             signal.unit or '1',
             f'{signal.minimum} .. {signal.maximum}',
@@ -179,7 +171,7 @@ def test_interface_lists_the_figures_of_a_drive():
     figures = next(node for node in ast.walk(function) if isinstance(node, ast.Return)).value
     assert isinstance(figures, ast.Dict)
     keys = [key.value for key in figures.keys if isinstance(key, ast.Constant)]
-    assert [row['figure'] for row in table('Figures')] == keys
+    assert [row['figure'] for row in table('Figures', 'docs/reference/recordings.md')] == keys
 
 
 def test_models_readme_lists_every_parameter_with_unit_range_and_source():
@@ -212,7 +204,7 @@ def test_bringup_readme_lists_every_option_of_drive():
 
 
 @cache
-def table(heading: str, file: str = 'docs/interface.md') -> list[dict[str, str]]:
+def table(heading: str, file: str = 'docs/reference/interface.md') -> list[dict[str, str]]:
     """Return the first table below a heading of a page, code marks removed."""
     text = (REPOSITORY / file).read_text()
     section = re.split(rf'^#+ {heading}$', text, flags=re.MULTILINE)[1]

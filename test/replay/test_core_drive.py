@@ -4,6 +4,7 @@ Plant and controller share the friction law unless a test says otherwise; so the
 chain works, not how well the law describes a real mount.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,17 +12,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mount_bags.bag.recording import Recording, open_recording
+from mount_bags.messages.series import Series
 from mount_bringup.chosen import chosen_damper, switched_viscous_parameters
 from mount_bringup.mount_choice import with_control_of_mount
-from mount_control.policy import switched_viscous
-from mount_control.policy.contract import trace_fields
+from mount_models.arithmetic import series
 from mount_models.specimen import default_specimen
 from mount_replay.loop import chain as core_chain
 from mount_replay.loop import run as core_run
+from mount_replay.loop.recording import record_core
 from mount_replay.loop.run import CoreOutcome, run_core
-from mount_report.drive.evaluation import Drive, switching, tracking_error
+from mount_report.drive.evaluation import switching, tracking_error
+from mount_report.drive.signals import DriveSignals, load_drive
 from mount_ros import topics
-from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import Topic
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.plant.simulated_mount import DivergedError
@@ -39,37 +42,15 @@ UNREACHABLE = {'switch_on_level': 0.009}  # m: damping never goes on
 
 @dataclass(frozen=True)
 class Recorded:
-    """A core run: its outcome and the scalars of its topics, each with stamps (ns)."""
+    """A core run: its outcome, its recording and the signals of the drive."""
 
     outcome: CoreOutcome
     settings: dict[str, dict[str, Any]]
-    tables: dict[str, tuple[NDArray[np.int64], dict[str, NDArray[np.float64]]]]
+    recording: Recording
+    drive: DriveSignals
 
-    def __getitem__(self, topic: Topic) -> dict[str, NDArray[np.float64]]:
-        return self.tables[topic.name][1]
-
-    def stamps(self, topic: Topic) -> NDArray[np.int64]:
-        return self.tables[topic.name][0]
-
-    @property
-    def drive(self) -> Drive:
-        """The signals as the evaluation of a drive wants them."""
-        truth, samples = self[topics.SIM_TRUTH], self.stamps(topics.DISPLACEMENT)
-        zero = round(self.outcome.excitation_start * 1e9)
-        places = np.searchsorted(samples, self.stamps(topics.CONTROL_TRACE))
-        active, current = np.zeros(len(samples), bool), np.zeros(len(samples))
-        active[places] = self[topics.CONTROL_TRACE]['damping_active'] > 0.5
-        current[places] = self[topics.CONTROL_TRACE]['current']
-        return Drive(
-            time=(samples - zero) / 1e9,
-            displacement=self[topics.DISPLACEMENT]['mount'],
-            current=current,
-            damping_active=active,
-            true_time=(self.stamps(topics.SIM_TRUTH) - zero) / 1e9,
-            true_velocity=truth['velocity'],
-            friction_force=truth['friction_force'],
-            zero=zero,
-        )
+    def __getitem__(self, topic: Topic) -> Series:
+        return self.recording[topic.name]
 
     @property
     def tracking(self) -> float:
@@ -79,27 +60,16 @@ class Recorded:
         )
 
 
-def _run(sim: dict[str, Any], control: dict[str, Any] | None = None) -> Recorded:
-    settings = {'mount_sim': sim, 'mount_control': control or {}}
-    wanted = (topics.DISPLACEMENT, topics.CONTROL_TRACE, topics.SIM_TRUTH, topics.CURRENT_SETPOINT)
-    rows: dict[str, list[tuple[int, tuple[float, ...]]]] = {topic.name: [] for topic in wanted}
-    layouts = {topic.name: ScalarsLayout(topic) for topic in wanted}
-    layouts['control_trace'] = ScalarsLayout(topics.control_trace(trace_fields(switched_viscous)))
+@pytest.fixture(scope='module')
+def run(tmp_path_factory) -> Callable[..., Recorded]:
+    def run(sim: dict[str, Any], control: dict[str, Any] | None = None) -> Recorded:
+        settings = {'mount_sim': sim, 'mount_control': control or {}}
+        folder = tmp_path_factory.mktemp('core') / 'recording'
+        outcome = record_core(folder, settings, '')
+        recording = open_recording(folder)
+        return Recorded(outcome, settings, recording, load_drive(recording, outcome.excitation_start))
 
-    def write(topic: Topic, raw: bytes, stamp: int) -> None:
-        if topic.name in rows:
-            rows[topic.name].append(layouts[topic.name].unpack(raw)[:2])
-
-    outcome = run_core(settings, write)
-    tables = {
-        name: (
-            np.array([stamp for stamp, _ in entries]),
-            dict(zip(layouts[name].names, np.array([numbers for _, numbers in entries]).T, strict=True)),
-        )
-        for name, entries in rows.items()
-        if entries
-    }
-    return Recorded(outcome, settings, tables)
+    return run
 
 
 def _initialisation(**changes: Any):
@@ -111,9 +81,9 @@ def _initialisation(**changes: Any):
 
 
 @pytest.fixture(scope='module')
-def matched() -> Recorded:
+def matched(run) -> Recorded:
     """Bench, 8 Hz, 1 mm, viscous_2000; controller and plant have the same friction, no ripple noise."""
-    return _run(BENCH)
+    return run(BENCH)
 
 
 def test_friction_force_follows_the_damper(matched):
@@ -122,22 +92,22 @@ def test_friction_force_follows_the_damper(matched):
 
 def test_friction_force_is_never_far_from_the_damper_s(matched):
     """The same in the largest error of a sample, over the last 2 s: at most 4 % of the peak."""
-    settled = matched.drive.damping_active & (matched.drive.time > 2.0)
-    time, force = matched.drive.time[settled], matched[topics.SIM_TRUTH]['friction_force'][settled]
+    settled = matched.drive.seen.damping_active & (matched.drive.seen.time > 2.0)
+    time, force = matched.drive.seen.time[settled], matched[topics.SIM_TRUTH]['friction_force'][settled]
     # what the plant shows at a sample is the force of the step that has just ended, half a sample ago
     velocity = 1e-3 * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * time)
     wanted = chosen_damper({}).force(velocity)
     assert np.abs(force - wanted).max() <= 0.04 * np.abs(wanted).max()
 
 
-def test_friction_force_follows_the_damper_after_a_noisy_initialisation():
-    errors = [_run({**BENCH, 'electronics.ripple_noise': 0.01, 'seed': seed}).tracking for seed in (1, 2, 3)]
+def test_friction_force_follows_the_damper_after_a_noisy_initialisation(run):
+    errors = [run({**BENCH, 'electronics.ripple_noise': 0.01, 'seed': seed}).tracking for seed in (1, 2, 3)]
     assert max(errors) <= 0.03
 
 
 @pytest.mark.parametrize('scale', [0.85, 1.15])
-def test_friction_force_follows_where_the_plant_s_friction_differs(scale):
-    assert _run({**BENCH, 'friction.scale': scale}).tracking <= 0.13
+def test_friction_force_follows_where_the_plant_s_friction_differs(run, scale):
+    assert run({**BENCH, 'friction.scale': scale}).tracking <= 0.13
 
 
 def test_the_mount_force_is_nearly_a_sine(matched):
@@ -149,7 +119,7 @@ def test_the_mount_force_is_nearly_a_sine(matched):
 
 def _harmonics(recorded: Recorded) -> NDArray[np.float64]:
     """Amplitudes (N) of harmonics 1 to 8 of the mount force over whole periods, damping settled."""
-    time, force = recorded.drive.true_time, recorded[topics.SIM_TRUTH]['mount_force']
+    time, force = recorded.drive.truth.time, recorded[topics.SIM_TRUTH]['mount_force']
     first = int(np.searchsorted(time, 1.0 - 1e-9))
     count = 24 * round(PERIOD / 1e-3)
     spectrum = np.abs(np.fft.rfft(force[first : first + count])) * 2.0 / count
@@ -157,7 +127,7 @@ def _harmonics(recorded: Recorded) -> NDArray[np.float64]:
 
 
 def test_damping_takes_energy_out_and_none_goes_back(matched):
-    settled = matched.drive.true_time > 1.0
+    settled = matched.drive.truth.time > 1.0
     truth = matched[topics.SIM_TRUTH]
     power = truth['friction_force'][settled] * truth['velocity'][settled]
     assert power.min() >= -0.05 * power.max()
@@ -174,11 +144,11 @@ def _dissipation_of_the_damper() -> float:
 
 
 def test_damping_goes_on_one_period_after_the_magnitude_exceeds_its_level(matched):
-    times = switching(matched.drive)
+    times = switching(matched.drive.seen)
     assert len(times.on) == 1
     assert times.off == ()
     magnitude = matched[topics.CONTROL_TRACE]['magnitude']
-    exceeded = matched.stamps(topics.CONTROL_TRACE)[np.argmax(magnitude > 0.0008)]
+    exceeded = matched[topics.CONTROL_TRACE].stamps[np.argmax(magnitude > 0.0008)]
     on = round(1e9 * times.on[0]) + matched.drive.zero
     assert (on - exceeded) / 1e9 == pytest.approx(0.124)
 
@@ -189,9 +159,9 @@ def test_the_current_stays_far_from_its_limits(matched):
     assert set(current[:100]) == {0.0}
 
 
-def test_with_damping_off_there_is_no_friction_at_all_after_initialisation():
-    recorded = _run({**BENCH, 'timeline.duration': 1.0}, UNREACHABLE)
-    truth, time = recorded[topics.SIM_TRUTH], recorded.drive.true_time
+def test_with_damping_off_there_is_no_friction_at_all_after_initialisation(run):
+    recorded = run({**BENCH, 'timeline.duration': 1.0}, UNREACHABLE)
+    truth, time = recorded[topics.SIM_TRUTH], recorded.drive.truth.time
     during = time < -0.01
     assert truth['normal_force'][during].max() > 200.0  # the ramp of the initialisation closes the actuator
     assert np.abs(truth['displacement']).max() > 0.99e-3
@@ -204,24 +174,24 @@ def test_with_damping_off_there_is_no_friction_at_all_after_initialisation():
 
 
 @pytest.mark.parametrize('mount', ['friction_off', 'hydro', 'elastomer'])
-def test_without_pads_or_current_the_control_asks_in_vain(mount):
-    recorded = _run({**BENCH, 'mount': mount, 'timeline.duration': 1.5})
+def test_without_pads_or_current_the_control_asks_in_vain(run, mount):
+    recorded = run({**BENCH, 'mount': mount, 'timeline.duration': 1.5})
     assert recorded.outcome.result is not None
     assert recorded.outcome.result.contact_gap == pytest.approx(349e-6, abs=1e-6)
-    shaken = recorded.drive.true_time > 0.05
+    shaken = recorded.drive.truth.time > 0.05
     assert recorded[topics.CURRENT_SETPOINT]['coil_current'].max() > 0.9
     assert (recorded[topics.SIM_TRUTH]['friction_force'][shaken] == 0.0).all()
 
 
-def test_the_mount_that_is_always_on_damps_without_having_been_shaken():
+def test_the_mount_that_is_always_on_damps_without_having_been_shaken(run):
     settings = with_control_of_mount({'mount_sim': {**BENCH, 'mount': 'friction_always_on'}})
     assert settings['mount_control'] == {'switching': 'always'}
-    recorded = _run(settings['mount_sim'], settings['mount_control'])
+    recorded = run(settings['mount_sim'], settings['mount_control'])
     active = recorded[topics.CONTROL_TRACE]['damping_active']
     assert (active[124:] == 1.0).all()
     assert recorded.tracking <= 0.02
     # it damps the very first period, which the switched one lets pass
-    first = (recorded.drive.true_time > 0.06) & (recorded.drive.true_time < 0.125)
+    first = (recorded.drive.truth.time > 0.06) & (recorded.drive.truth.time < 0.125)
     assert np.abs(recorded[topics.SIM_TRUTH]['friction_force'][first]).max() > 30.0
 
 
@@ -274,14 +244,14 @@ def test_with_noise_the_gaps_of_20_seeds_stay_within_their_targets():
     assert max(abs(result.contact_gap - 349e-6) for result in results) <= 2e-6
 
 
-def test_a_mount_beyond_the_range_of_its_sensor_is_told_and_answered_with_0_ampere():
+def test_a_mount_beyond_the_range_of_its_sensor_is_told_and_answered_with_0_ampere(run):
     """An engine that shakes at its eigenfrequency; the sensor reaches 50 mm to either side."""
     shaking = {'idle.amplitude': 2000.0, 'idle.frequency': 8.0, 'electronics.displacement_noise': 0.0}
     sim = {**BENCH, 'scenario': 'motorway', 'timeline.duration': 3.0, **shaking}
-    recorded = _run(sim, {'displacement_range': 0.1, **UNREACHABLE})
+    recorded = run(sim, {'displacement_range': 0.1, **UNREACHABLE})
     displacement, setpoint = recorded[topics.DISPLACEMENT]['mount'], recorded[topics.CURRENT_SETPOINT]
     invalid = np.isnan(displacement)
-    first = recorded.stamps(topics.DISPLACEMENT)[invalid][0] / 1e9
+    first = recorded[topics.DISPLACEMENT].stamps[invalid][0] / 1e9
     assert 0 < recorded.outcome.beyond_range.samples == invalid.sum() < len(invalid)
     assert recorded.outcome.beyond_range.first == pytest.approx(first)
     assert (setpoint['coil_current'][: len(invalid)][invalid] == 0.0).all()
@@ -292,15 +262,18 @@ def test_a_mount_beyond_the_range_of_its_sensor_is_told_and_answered_with_0_ampe
 def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
     def poisoned(parameters):
         excitation = build_excitation(parameters)
-        excitation.values[21_000] = np.nan
-        return excitation
+        values = excitation.values[:]
+        values[21_000] = np.nan
+        return replace(
+            excitation, values=series.Series(len(values), lambda first, behind: values[first:behind])
+        )
 
     monkeypatch.setattr(core_run, 'build_excitation', poisoned)
     with pytest.raises(DivergedError, match=r'has diverged: at 3\.851 s not all of its state is a finite'):
         run_core({'mount_sim': BENCH}, lambda topic, raw, stamp: None)
 
 
-def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(monkeypatch):
+def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(run, monkeypatch):
     take_many, poisoned = core_run._take_many, []
 
     def take_many_and_poison(mount, chain, samples, pending):
@@ -311,9 +284,9 @@ def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(mon
         return take_many(mount, chain, samples, pending)
 
     monkeypatch.setattr(core_run, '_take_many', take_many_and_poison)
-    recorded = _run(BENCH)
+    recorded = run(BENCH)
     trace = recorded[topics.CONTROL_TRACE]
-    place = recorded.stamps(topics.CONTROL_TRACE).tolist().index(poisoned[0] * 1_000_000)
+    place = recorded[topics.CONTROL_TRACE].stamps.tolist().index(poisoned[0] * 1_000_000)
     assert recorded.outcome.control_faults == 1
     assert trace['damping_active'][place - 1] == trace['damping_active'][-1] == 1.0
     assert trace['damping_active'][place] == trace['current'][place] == 0.0

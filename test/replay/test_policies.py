@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mount_bags
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import session_text
 from mount_control.policy.registry import POLICIES
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, parsed_changes, replay_without_output

@@ -1,10 +1,12 @@
 """A replay tells with which versions and on which processor the recording was made."""
 
-import pytest
-from rich.console import Console
+import io
 
+import pytest
+
+from mount_bags.run.screen import Screen
+from mount_bags.run.session import session_text
 from mount_bags.run.versions import versions
-from mount_bringup.graph.supervisor import session_text
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 from mount_replay.summary import print_replay, replay_figures
@@ -24,8 +26,8 @@ def test_the_replay_is_equal_and_says_where_the_recording_is_from(others, senten
     content = {'parameters': {'mount_sim': SIM}, 'versions': {**versions(), **others}}
     record_core(tmp_path / 'drive', {'mount_sim': SIM}, session_text(content))
     outcome = replay(ReplayOrder(tmp_path / 'drive', mode, out=tmp_path / 'replay', domain=domain))
-    figures, console = replay_figures(outcome), Console(record=True, width=400)
-    print_replay(outcome, figures, console)
+    figures, shown = replay_figures(outcome), io.StringIO()
+    print_replay(outcome, figures, Screen(shown))
     assert outcome.held
-    assert sentence in console.export_text()
+    assert sentence in shown.getvalue()
     assert figures['recorded_with'] == others

@@ -6,8 +6,7 @@ import pytest
 
 from mount_bags.compare.accept import ACCEPTED_NAME, LARGEST_TOTAL
 from mount_bags.compare.reference import differences_from_reference
-from mount_bags.run.versions import versions
-from mount_replay.recorded_versions import version_differences, versions_sentence
+from mount_bags.run.versions import version_differences, versions, versions_sentence
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 REFERENCES = sorted(

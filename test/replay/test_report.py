@@ -14,11 +14,10 @@ from typer.testing import CliRunner, Result
 import mount_bags
 from mount_bags.bag.writer import BagWriter
 from mount_bags.events.recorded_events import event_time, recorded_events
-from mount_bags.messages.time_axis import time_axis
 from mount_cli.command import app
+from mount_report import report
 from mount_report.pages import default_pictures
 from mount_report.sections import run_sections
-from mount_report.sections import signal_sections as sections
 from mount_report.signals import Signals
 from mount_ros.messages.cdr import serialised
 
@@ -105,11 +104,15 @@ def test_a_slow_excitation_is_a_good_drive_whose_page_says_what_it_was_too_short
 def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_end_of_a_drive(
     tmp_path, monkeypatch
 ):
-    def fail(subjects):
+    def harmonics(subjects):
         raise ZeroDivisionError('a section with [brackets] fails')
 
-    monkeypatch.setattr(sections, 'harmonic_content', fail)
-    monkeypatch.setattr(run_sections, 'overview', lambda *_: fail(()))
+    def overview(subjects):
+        harmonics(subjects)
+
+    made = tuple(harmonics if make.__name__ == 'harmonics' else make for make in report.SECTIONS)
+    monkeypatch.setattr(report, 'SECTIONS', made)
+    monkeypatch.setattr(run_sections, 'overview', overview)
     short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
     result = command('drive', '--core', *short, '--out', tmp_path / 'run')
     assert result.exit_code == 0, result.output
@@ -125,7 +128,7 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 @pytest.mark.parametrize(
     ('broken', 'file'),
     [
-        ('mount_report.drive.figure.draw_drive', 'drive.png'),
+        ('mount_report.drive.picture.draw_drive', 'drive.png'),
         ('mount_report.pages.make_report', 'report.html'),
     ],
 )
@@ -287,7 +290,7 @@ def test_a_moment_has_the_same_time_in_a_report_and_among_the_events(bench, tmp_
     writer.write('/event', serialised(String(data=f'{{time: {stamp}, kind: bump}}')), stamp + 9_000_000)
     writer.close()
     late = mount_bags.open(tmp_path / 'late')
-    events = [(event.kind, event_time(event, time_axis(late))) for event in recorded_events(late)]
+    events = [(event.kind, event_time(event, late.time_axis)) for event in recorded_events(late)]
     begins = [time for kind, time in events if kind == 'switch_on']
     assert begins
     assert [begin for begin, _ in Signals(late).damping()] == pytest.approx(begins, abs=1e-9)

@@ -4,7 +4,7 @@ import pytest
 
 import mount_bags
 from mount_bags.compare.accept import accept
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import session_text
 from mount_replay.given.ramps import measured_gaps
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay

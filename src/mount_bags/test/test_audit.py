@@ -1,17 +1,18 @@
 """What the audit says of recordings with known losses."""
 
+import io
 import json
 
 import numpy as np
 import pytest
 from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
-from rich.console import Console
 
 import mount_bags
 from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
 from mount_bags.audit.report import as_json, as_table
 from mount_bags.bag.writer import BagWriter
+from mount_bags.run.screen import Screen
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
@@ -81,8 +82,9 @@ def test_json_holds_the_figures_and_no_nan(tmp_path):
 
 
 def test_table_names_every_topic_and_its_losses(tmp_path):
-    console = Console(width=160, record=True, file=open('/dev/null', 'w'))  # noqa: SIM115
-    console.print(as_table(audit(mount_bags.open(write_drive(tmp_path / 'bag', 100, skipped=range(40, 47))))))
-    text = console.export_text()
+    shown = io.StringIO()
+    audits = audit(mount_bags.open(write_drive(tmp_path / 'bag', 100, skipped=range(40, 47))))
+    Screen(shown).table(as_table(audits))
+    text = shown.getvalue()
     assert '/coil_ripple' in text
     assert '8.0' in text

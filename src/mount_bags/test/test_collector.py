@@ -8,7 +8,7 @@ import pytest
 from rclpy.node import Node
 
 from mount_bags.recorder.collector import Collector
-from mount_ros.data_path import DataThread
+from mount_ros.data_thread import DataThread
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.messages.types import message_class
 from mount_ros.qos import publisher_qos

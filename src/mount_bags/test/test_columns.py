@@ -39,7 +39,7 @@ def test_what_else_is_asked_of_a_topic_is_read_then(drive):
     assert series.names == ('coil_current', 'flux_density')
     np.testing.assert_array_equal(series['flux_density'], whole['coil_ripple']['flux_density'])
     np.testing.assert_array_equal(series.derivative('flux_density'), -series['flux_density'])
-    assert series.message(COUNT - 1) == whole['coil_ripple'].message(COUNT - 1)
+    assert series.message(COUNT - 1).name == whole['coil_ripple'].message(COUNT - 1).name
     with pytest.raises(SeriesError, match='it has coil_current, flux_density'):
         series['nothing']
 

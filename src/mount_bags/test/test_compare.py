@@ -254,4 +254,4 @@ def test_json_holds_what_the_words_say_and_no_nan(compared):
 
 def test_the_table_names_topic_and_signal(compared):
     table = as_table(compared(_changed('current', 150, 0.7)))
-    assert list(table.columns[0].cells) == ['current_setpoint\ncoil_current', 'control_trace\ncurrent']
+    assert [row[0] for row in table.rows] == ['current_setpoint\ncoil_current', 'control_trace\ncurrent']

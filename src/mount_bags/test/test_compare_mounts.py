@@ -63,7 +63,7 @@ def test_both_mounts_are_compared_under_their_own_names(car):
         for side in ('left', 'right')
     }
     assert found == {'left': 0, 'right': 1}
-    assert list(as_table(comparison).columns[0].cells) == [
+    assert [row[0] for row in as_table(comparison).rows] == [
         'mount_right/current_setpoint\ncoil_current',
         'mount_right/control_trace\ncurrent',
     ]

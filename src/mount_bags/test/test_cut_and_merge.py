@@ -16,7 +16,6 @@ from mount_bags.compare.compare import compare
 from mount_bags.edit.cut import CutError, cut
 from mount_bags.edit.merge import MergeError, merge
 from mount_bags.events.recorded_events import EventError, event_time, find_event, recorded_events
-from mount_bags.messages.time_axis import time_axis
 
 COUNT = 400
 MARKS = ((50, '{time: 1, kind: fault, text: cable}'), (250, 'just a sentence'), (320, '{kind: fault}'))
@@ -73,7 +72,7 @@ def test_a_cut_keeps_topics_types_and_quality_of_service(whole, place):
 
 def test_a_cut_says_where_it_is_from(whole, place):
     first = _cut(whole, place(), 0.1, 0.3, reason='fault')
-    step = origin(first)[0]
+    step = origin(first.information)[0]
     assert {key: step[key] for key in ('did', 'recording', 'from_s', 'to_s', 'reason')} == {
         'did': 'cut',
         'recording': 'whole',
@@ -81,7 +80,7 @@ def test_a_cut_says_where_it_is_from(whole, place):
         'to_s': 0.3,
         'reason': 'fault',
     }
-    assert [step['did'] for step in origin(_cut(first, place(), 0.15, 0.2))] == ['cut', 'cut']
+    assert [step['did'] for step in origin(_cut(first, place(), 0.15, 0.2).information)] == ['cut', 'cut']
 
 
 def test_seconds_mean_the_same_in_a_cut_of_a_cut(whole, place):
@@ -244,8 +243,8 @@ def test_types_that_nobody_installed_are_cut_with_their_definition(place):
     piece = _cut(mount_bags.open(folder), place(), 2.0, 5.0)
     original = _messages(mount_bags.open(folder))['/thing']
     assert _messages(piece) == {'/thing': original[2:5]}
-    (schema,) = piece.files[0].schemas.values()
-    assert (schema.name, schema.data) == ('strange_msgs/msg/Thing', b'int32 number')
+    (topic,) = piece.files[0].topics.values()
+    assert (topic.type, topic.definition) == ('strange_msgs/msg/Thing', b'int32 number')
 
 
 # Time.
@@ -254,7 +253,7 @@ def test_types_that_nobody_installed_are_cut_with_their_definition(place):
 def _times(recording) -> dict[str, list[float]]:
     times: dict[str, list[float]] = {}
     for event in recorded_events(recording):
-        times.setdefault(event.kind, []).append(round(event_time(event, time_axis(recording)), 6))
+        times.setdefault(event.kind, []).append(round(event_time(event, recording.time_axis), 6))
     return times
 
 

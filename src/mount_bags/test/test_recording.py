@@ -9,8 +9,9 @@ from mcap.reader import make_reader
 from recorded_drive import PERIOD, START, sample
 from small_disk import small_disk
 
-from mount_bags.bag.statement import RECORDER_RECORD, read_statement
+from mount_bags.bag.statement import read_statement
 from mount_bags.bag.writer import BagWriter, RecordingError
+from mount_bags.container.stored import RECORDER_RECORD
 from mount_bags.recorder import recorder as recording
 from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
 from mount_bags.recorder.recorder import Recorder, Unobserved

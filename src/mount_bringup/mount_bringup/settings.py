@@ -61,7 +61,7 @@ def checked_settings(
 ) -> dict[str, dict[str, Any]]:
     """Return the settings in the types that the nodes declare; unknown names raise `ParameterError`.
 
-    ROS itself takes an unknown parameter without a word. `known` is {node: {parameter: default}} where others
+    ROS itself takes an unknown parameter silently. `known` is {node: {parameter: default}} where others
     than nodes of the graph have parameters; `owner` is what those are called in the refusal.
     """
     if known is None:

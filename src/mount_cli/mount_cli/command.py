@@ -4,7 +4,6 @@ import sys
 
 import typer
 
-from mount_bringup.terminal import refuse, terminal
 from mount_cli.commands import (
     accept,
     audit,
@@ -21,6 +20,7 @@ from mount_cli.commands import (
     report,
 )
 from mount_cli.commands.identify_arguments import with_repeated_options
+from mount_cli.terminal import refuse, terminal
 from mount_ros.environment import prepare_environment
 
 app = typer.Typer(

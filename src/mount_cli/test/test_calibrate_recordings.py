@@ -1,19 +1,28 @@
 """Calibrations from MCAP recordings, as a rack makes them in the topics of a drive."""
 
+import math
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from geometry_msgs.msg import WrenchStamped
+from std_msgs.msg import String
 
+from mount_bags.bag.writer import BagWriter
 from mount_cli.command import main
-from mount_experiments.harness.rack_recording import record_actuator_rack
 from mount_identification.rack.columns import RackRecordingError
 from mount_identification.rack.recordings import GivenValues, read_force, read_ripple
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import evaluate
 from mount_models.specimen import default_specimen, load_specimen
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
+from mount_ros.messages.temperature import temperature_layout
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
+from mount_sim.electronics.electronics import STATUS_EVERY
 from mount_sim.rack.coil import drawn_rack, record_ripple
 
 RACK = drawn_rack(5)
@@ -22,8 +31,8 @@ AREA = default_specimen().turns_area
 NOTHING = GivenValues({}, {})
 
 
-def record(folder, gap, celsius=20.0, spoil=0):
-    """Record one held gap; every `spoil`-th ripple has no slopes."""
+def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
+    """Record one held gap; every `spoil`-th ripple has no slopes, the coil grows warmer by `warming` K/s."""
     columns = record_ripple(RACK, gap, celsius, duration=1.5, peak_current=2.5)
     current = columns['current_a']
     rate, flux = columns['current_rate_a_per_s'], columns['flux_rate_t_per_s']
@@ -31,7 +40,30 @@ def record(folder, gap, celsius=20.0, spoil=0):
         rate[::spoil] = flux[::spoil] = np.nan
     noise = 1.0 + 0.01 * np.random.default_rng([5, round(gap * 1e9)]).standard_normal(current.size)
     pull = noise * np.array([magnetic_force(RACK.actuator, i, gap) for i in current.tolist()])
-    return record_actuator_rack(folder, current, rate, flux, pull, celsius, {'scenario': 'rack'})
+    writer = BagWriter(folder)
+    begin = time.time_ns()
+    try:
+        for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
+            writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
+        writer.write(f'/{SESSION.name}', serialised(String(data='scenario: rack')), begin)
+        ripples, temperatures = ScalarsLayout(COIL_RIPPLE), temperature_layout()
+        forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        rows = zip(current.tolist(), rate.tolist(), flux.tolist(), pull.tolist(), strict=True)
+        for sample, (i, of_current, of_flux, force) in enumerate(rows):
+            stamp = sample * 1_000_000
+            at = begin + stamp
+            ripple = ripples.pack(stamp, (i, math.nan), (of_current, of_flux))
+            writer.write(f'/{COIL_RIPPLE.name}', ripple, at)
+            writer.write(f'/{SIM_CLAMP_FORCE.name}', forces.pack(stamp, force), at)
+            if sample % STATUS_EVERY == 0:
+                writer.write(
+                    f'/{COIL_TEMPERATURE.name}',
+                    temperatures.pack(stamp, celsius + warming * 1e-9 * stamp),
+                    at,
+                )
+    finally:
+        writer.close()
+    return folder
 
 
 @pytest.fixture(scope='module')
@@ -118,16 +150,8 @@ def test_a_recording_whose_slopes_are_mostly_missing_is_refused(tmp_path):
         read_ripple([bag], {}, NOTHING, AREA)
 
 
-def test_a_coil_that_warmed_while_it_was_recorded_is_refused(tmp_path, monkeypatch):
-    from mount_experiments.harness import rack_recording
-
-    class Warming:
-        def pack(self, stamp, celsius):
-            return LAYOUT.pack(stamp, celsius + 1e-8 * stamp)  # 10 K/s
-
-    LAYOUT = rack_recording.temperature_layout()
-    monkeypatch.setattr(rack_recording, 'temperature_layout', Warming)
-    bag = record(tmp_path / 'held_349um', 349e-6)
+def test_a_coil_that_warmed_while_it_was_recorded_is_refused(tmp_path):
+    bag = record(tmp_path / 'held_349um', 349e-6, warming=10.0)
     with pytest.raises(RackRecordingError, match=r'the coil temperature ran from 20\.0 to 34\.0 degC'):
         read_ripple([bag], {}, NOTHING, AREA)
 

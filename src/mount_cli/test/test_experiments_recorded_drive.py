@@ -149,8 +149,8 @@ def test_alone_its_own_page_is_the_page(driven, tmp_path):
 @needs_i280
 def test_the_committed_page_tells_of_this_recording():
     signal = recorded_acceleration(I280, column='accelerometer.2')
-    values = acceleration_at(signal, -1.0, STEP_TIME)[:: round(SAMPLE_TIME / STEP_TIME)]
-    text = (REPOSITORY / 'docs' / 'recorded_drive.md').read_text()
+    values = acceleration_at(signal, -1.0, STEP_TIME)[:][:: round(SAMPLE_TIME / STEP_TIME)]
+    text = (REPOSITORY / 'docs' / 'explanation' / 'recorded_drive.md').read_text()
     told = re.findall(r'([\d.]+) m/s\^2 from', text)
     assert [float(number) for number in told] == pytest.approx(rms_in_bands(values), abs=0.001)
 

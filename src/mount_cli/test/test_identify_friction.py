@@ -254,7 +254,7 @@ def test_channels_name_column_and_unit(tmp_path):
     read = read_recording(file, chosen)
     assert read.displacement.max() == pytest.approx(1e-3, rel=1e-3)
     assert read.force.max() == pytest.approx(50.0, rel=1e-3)
-    assert read.mean_normal_force == pytest.approx(100.0)
+    assert np.mean(read.normal_force) == pytest.approx(100.0)
 
 
 def rig_file(folder):

@@ -4,14 +4,14 @@ import io
 from pathlib import Path
 
 import pytest
-from rich.table import Table
 
-import mount_bringup
-from mount_bringup.progress_bar import progress_bar
-from mount_bringup.terminal import note, refuse, terminal
+import mount_cli
+from mount_bags.run.screen import Table
 from mount_cli.command import app, main
+from mount_cli.screen import TerminalScreen
+from mount_cli.terminal import refuse, terminal
 
-SOURCES = Path(mount_bringup.__file__).parent
+SOURCES = Path(mount_cli.__file__).parents[2]
 TEXT = 'a [/g] of [red]Weg [mm][/red]: {"columns": ["time", "[/x]"]} :smile:'
 MISSING = 'nowhere [/x]'
 DRIVE = ('--core', '--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
@@ -39,13 +39,12 @@ def drive(tmp_path_factory) -> Path:
 def test_nothing_that_is_printed_is_markup(capsys):
     file = io.StringIO()
     console = terminal(file=file, width=200)
-    table = Table(TEXT, title=TEXT, caption=TEXT)
-    table.add_row(TEXT)
-    console.print(table)
-    console.print(TEXT, soft_wrap=True)
-    note(console, TEXT)
-    with progress_bar(console) as progress:
-        progress.add_task(TEXT, total=1.0)
+    screen = TerminalScreen(console)
+    screen.table(Table(TEXT, 'l', [[TEXT]], [TEXT], TEXT))
+    screen.say(TEXT)
+    screen.note(TEXT)
+    with screen.bar(TEXT):
+        pass
     assert file.getvalue().count(TEXT) == 7
     assert file.getvalue().count(f'note {TEXT}\n') == 1
     refuse(TEXT)
@@ -57,11 +56,12 @@ def test_only_one_file_decides_how_text_is_printed():
     ways = ('Console(', ' Progress(', 'from_markup', '[yellow]', '[red]', '[bold]', 'rprint')
     found = {
         f'{file.relative_to(SOURCES)}: {way}'
-        for file in SOURCES.rglob('*.py')
+        for file in SOURCES.glob('*/mount_*/**/*.py')
         for way in ways
         if way in file.read_text(encoding='utf-8')
     }
-    assert found == {'terminal.py: Console(', 'progress_bar.py:  Progress('}
+    own = 'mount_cli/mount_cli'
+    assert found == {f'{own}/terminal.py: Console(', f'{own}/screen.py:  Progress('}
 
 
 REFUSED = {

@@ -1,6 +1,7 @@
 """From recordings of a rack to a drive: files all the way, and no truth of the plant in any of them.
 
-`python test_whole_chain.py SEED...` prints the errors of each step for other draws (docs/identification.md).
+`python test_whole_chain.py SEED...` prints the errors of each step for other draws, as they stand in
+docs/explanation/identification.md.
 """
 
 import contextlib
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from mount_bags.bag.recording import open_recording
 from mount_bringup.chosen import chosen_control, chosen_damper, switched_viscous_parameters
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
@@ -25,10 +27,9 @@ from mount_models.friction.coefficient import FrictionCoefficients, offset_coeff
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import flattened
 from mount_models.specimen import DEFAULT_SPECIMEN, load_specimen
-from mount_replay.loop.run import run_core
-from mount_report.drive.evaluation import Drive, tracking_error
-from mount_ros import topics
-from mount_ros.messages.scalars import ScalarsLayout
+from mount_replay.loop.recording import record_core
+from mount_report.drive.evaluation import tracking_error
+from mount_report.drive.signals import load_drive
 from mount_sim.rack.coil import drawn_rack
 from mount_sim.rack.friction import drawn_friction
 
@@ -84,37 +85,10 @@ def tracking(seed, file):
     }  # fmt: skip
     chosen = {'parameters_file': str(file), 'specimen': 'drawn'}
     settings = {'mount_sim': sim, 'mount_init': chosen, 'mount_control': chosen}
-    wanted = (topics.DISPLACEMENT, topics.CONTROL_TRACE, topics.SIM_TRUTH)
-    layouts = {topic.name: ScalarsLayout(topic) for topic in wanted}
-    rows = {topic.name: [] for topic in wanted}
-
-    def write(topic, raw, stamp):
-        if topic.name in rows:
-            rows[topic.name].append(layouts[topic.name].unpack(raw)[:2])
-
-    outcome = run_core(settings, write)
-    zero = round(outcome.excitation_start * 1e9)
-    stamps = {name: np.array([stamp for stamp, _ in each]) for name, each in rows.items()}
-    columns = {
-        name: dict(zip(layouts[name].names, np.array([numbers for _, numbers in each]).T, strict=True))
-        for name, each in rows.items()
-    }
-    samples, truth = stamps['displacement'], columns[topics.SIM_TRUTH.name]
-    places = np.searchsorted(samples, stamps['control_trace'])
-    active, current = np.zeros(samples.size, bool), np.zeros(samples.size)
-    active[places] = columns['control_trace']['damping_active'] > 0.5
-    current[places] = columns['control_trace']['current']
-    drive = Drive(
-        time=(samples - zero) / 1e9,
-        displacement=columns['displacement']['mount'],
-        current=current,
-        damping_active=active,
-        true_time=(stamps[topics.SIM_TRUTH.name] - zero) / 1e9,
-        true_velocity=truth['velocity'],
-        friction_force=truth['friction_force'],
-        zero=zero,
-    )
-    assert active.mean() > 0.3
+    folder = file.with_name(f'drive_{seed}')
+    outcome = record_core(folder, settings, '')
+    drive = load_drive(open_recording(folder), outcome.excitation_start)
+    assert drive.seen.damping_active.mean() > 0.3
     return tracking_error(drive, switched_viscous_parameters(settings), chosen_damper(settings))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import sine_and_cosine
+from mount_models.arithmetic.record import record_type
 
 
 class BandPass(NamedTuple):
@@ -24,7 +25,7 @@ class BandPass(NamedTuple):
     from_displacement: float
 
 
-STATE = np.dtype([('z1', 'f8'), ('z2', 'f8'), ('displacement', 'f8'), ('earlier', 'f8')])
+STATE = record_type([('z1', 'f8'), ('z2', 'f8'), ('displacement', 'f8'), ('earlier', 'f8')])
 """Memory of the filter, band displacement (m) of the last sample and of the one before."""
 
 

@@ -16,7 +16,7 @@ from mount_control import force_maker, force_to_current
 from mount_control.policy.contract import Policy, trace_dtype, trace_fields
 from mount_control.settings import ControlSettings
 from mount_models.arithmetic.compiled import compiled, specialised
-from mount_models.arithmetic.record import record_bytes, record_dtype
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.sampling import SAMPLE_TIME
 
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
@@ -146,7 +146,7 @@ def load_compiled_law(settings: ControlSettings) -> None:
 def compiled_with(policy: Policy) -> Compiled:
     """Return the controller compiled with a policy; compiled on the first call of each function."""
     law = NamedTuple('law', [('policy', policy.Law), ('maker', force_maker.Law)])  # noqa: UP014
-    state = np.dtype(
+    state = record_type(
         [('policy', policy.STATE), ('maker', force_maker.STATE), ('displacement', 'f8'), ('faults', 'i8')]
     )
     trace = trace_dtype(policy)

@@ -11,6 +11,7 @@ import numpy as np
 
 from mount_control import force_to_current
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
@@ -29,7 +30,7 @@ class Law(NamedTuple):
     sample_time: float
 
 
-STATE = np.dtype(
+STATE = record_type(
     [
         ('deflection', 'f8'),
         ('normal_force', 'f8'),

@@ -163,7 +163,7 @@ class MountControl(SafeLifecycleNode):
             self.get_logger().error(str(error))
 
     def _values(self) -> dict[str, Any]:
-        return {name: parameter.value for name, parameter in self._parameters.items()}
+        return {name: self.get_parameter(name).value for name in self.get_parameters_by_prefix('')}
 
 
 def _spelled_out(parameters: list[Parameter]) -> list[Parameter]:

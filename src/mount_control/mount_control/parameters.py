@@ -4,6 +4,7 @@ from typing import Annotated, NamedTuple
 
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import Quantity
+from mount_models.sampling import HIGHEST_CURRENT
 
 
 class ControlParameters(NamedTuple):
@@ -24,5 +25,5 @@ class ControlParameters(NamedTuple):
         float, Quantity('m', 'largest believable displacement to either side', 1e-3, 0.1, 'chosen')
     ] = 0.020
     highest_current: Annotated[
-        float, Quantity('A', 'limit of the setpoint', 0.0, 3.0, 'paper, section 3')
-    ] = 3.0
+        float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')
+    ] = HIGHEST_CURRENT

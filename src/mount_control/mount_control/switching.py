@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 
 
 class Switching(NamedTuple):
@@ -15,7 +16,7 @@ class Switching(NamedTuple):
     period: int
 
 
-STATE = np.dtype(
+STATE = record_type(
     [
         ('place', 'i8'),
         ('magnitude', 'f8'),

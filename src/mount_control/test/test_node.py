@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.msg import Transition
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -362,11 +362,11 @@ def test_after_cleanup_the_old_table_is_forgotten(active, around):
 
 def test_a_transition_that_is_not_valid_is_refused_and_the_node_goes_on(active, around):
     control = active()
-    assert control._LifecycleNodeMixin__change_state(Transition.TRANSITION_CONFIGURE) == FAILURE
+    assert control.change_state(Transition.TRANSITION_CONFIGURE) == FAILURE
     assert control.active
     around.send(1.0)
     assert _answers(around, 1) == [(1.0, 0.0)]
-    assert control._state_machine.current_state[0] == State.PRIMARY_STATE_ACTIVE
+    assert control.trigger_deactivate() == SUCCESS  # which only the active state allows
 
 
 @pytest.mark.parametrize(

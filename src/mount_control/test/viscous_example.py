@@ -1,14 +1,13 @@
-"""A policy as small as can be, the worked example of docs/extending.md: a viscous damper that is always on.
+"""A policy as small as can be, the worked example of docs/how-to/extending.md: a viscous damper, always on.
 
 To ship it, it would be `mount_control/policy/viscous_example.py`, with one line in `policy/registry.py`.
 """
 
 from typing import Annotated, NamedTuple
 
-import numpy as np
-
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
 
 
@@ -27,7 +26,7 @@ class Law(NamedTuple):
     sample_time: float
 
 
-STATE = np.dtype([('displacement', 'f8')])
+STATE = record_type([('displacement', 'f8')])
 TRACE = {'predicted_velocity': 'm/s'}
 
 

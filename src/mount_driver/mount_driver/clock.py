@@ -1,17 +1,18 @@
 """From the microsecond counter of the electronics to time stamps.
 
-`ElectronicsClock` is for real time, `CounterClock` for lock-step; both answer
-`stamp(microseconds, received_monotonic_ns) -> ns` and count what interrupted them.
+`ElectronicsClock` is for real time, `CounterClock` for lock-step.
 """
 
 import math
+from typing import Protocol
+
+from mount_models.sampling import SAMPLE_TIME_NS
 
 _WRAP = 1 << 32  # us: the counter wraps after 71.6 min
 _NS = 1000  # ns per us
 
 _GAP_US = 1_000_000  # chosen: after a second without samples a new mapping is started
 _BLOCK_US = 500_000  # chosen: 500 samples, of which at least one usually arrives without delay
-_SPACING_NS = 1_000_000  # ns, the period of the samples: the least distance across a restart
 
 # Second-order loop per block: share of the error corrected in the next block, and share that goes to the
 # estimated drift. Poles at 0.75 +- 0.19j: it settles in about 10 blocks without ringing. Chosen.
@@ -24,8 +25,25 @@ _TRUSTED_NS = 5_000_000  # ns, chosen: a block without any frame in time says no
 _BLOCKS_TO_BELIEVE = 8  # chosen: 4 s in which every frame is late are no pause but an error of the mapping
 
 
+class Clock(Protocol):
+    """Gives samples their stamps and counts what interrupted the electronics' counter."""
+
+    lockstep: bool
+    """Whether ages are judged by the stamps."""
+    restarts: int
+    gaps: int
+
+    def stamp(self, microseconds: int, received_monotonic_ns: int) -> int:
+        """Return the ROS time (ns) of the sample taken at `microseconds` and received at the steady time."""
+
+    def now(self, monotonic_ns: int) -> int:
+        """Return the time (ns) by which ages are judged at the steady time."""
+
+
 class CounterClock:
     """Stamps are the electronics' own counter from zero, unwrapped: for lock-step, where no other time is."""
+
+    lockstep = True
 
     def __init__(self) -> None:
         self.restarts = 0
@@ -41,12 +59,16 @@ class CounterClock:
             self._base = 0
         elif step >= _WRAP // 2:
             self.restarts += 1
-            self._base = self._stamp + _SPACING_NS - microseconds * _NS
+            self._base = self._stamp + SAMPLE_TIME_NS - microseconds * _NS
         elif microseconds < self._microseconds:
             self._base += _WRAP * _NS
         self._microseconds = microseconds
         self._stamp = self._base + microseconds * _NS
         return self._stamp
+
+    def now(self, monotonic_ns: int) -> int:
+        """Return the latest stamp, 0 before the first."""
+        return max(self._stamp, 0)
 
 
 class ElectronicsClock:
@@ -62,6 +84,8 @@ class ElectronicsClock:
     when all frames have come late for 4 s. It never leads back behind the last stamp. Frames must come in
     the order of their samples.
     """
+
+    lockstep = False
 
     def __init__(self, epoch_offset_ns: int):
         self.restarts = 0
@@ -104,8 +128,12 @@ class ElectronicsClock:
         self._received = received_monotonic_ns
         return self._stamp
 
+    def now(self, monotonic_ns: int) -> int:
+        """Return the steady time itself."""
+        return monotonic_ns
+
     def _begin(self, arrival: int) -> None:
-        self._stamp = max(arrival, self._stamp + _SPACING_NS) if self._running else arrival
+        self._stamp = max(arrival, self._stamp + SAMPLE_TIME_NS) if self._running else arrival
         self._running = True
         self._late_blocks = 0
         self._begin_block(0.0)

@@ -23,7 +23,6 @@ __all__ = [
     'Status',
     'WrongCrcError',
     'WrongLengthError',
-    'alive_counter_of',
 ]
 
 DATABASE_FILE = Path(__file__).parent / 'dbc' / 'mount.dbc'
@@ -58,7 +57,6 @@ _STATUS = (
 )
 _VOLTAGE_NOT_AVAILABLE = 65535  # value tables of the DBC
 _TEMPERATURE_NOT_AVAILABLE = -32768
-_ALIVE_COUNTER_BYTE = 2  # of the header of E2E profile 5
 
 
 class WrongLengthError(ValueError):
@@ -126,8 +124,8 @@ class Status(NamedTuple):
 class MountCodec:
     """Encodes and decodes the messages of `mount.dbc`; no state but its tables, so one serves all threads.
 
-    Encoding takes the alive counter (0..255) of the frame. Decoding raises `WrongLengthError` or
-    `WrongCrcError` before it looks at any number.
+    Encoding takes the alive counter (0..255) of the frame, decoding returns it with the message. Decoding
+    raises `WrongLengthError` or `WrongCrcError` before it looks at any number.
     """
 
     def __init__(self, database_file: Path = DATABASE_FILE):
@@ -174,11 +172,11 @@ class MountCodec:
             ),
         )
 
-    def decode_measurement(self, data: bytes | bytearray) -> Measurement:
-        """Return a sample; what is marked not valid or lies outside the DBC's limits is NaN."""
+    def decode_measurement(self, data: bytes | bytearray) -> tuple[int, Measurement]:
+        """Return alive counter and sample; what is not valid or lies outside the DBC's limits is NaN."""
         (
             _,
-            _,
+            alive_counter,
             displacement_valid,
             current_valid,
             ripple_valid,
@@ -192,7 +190,7 @@ class MountCodec:
             current_rate,
             flux_rate,
         ) = _checked(self.measurement, data)
-        return Measurement(
+        return alive_counter, Measurement(
             counter,
             microseconds,
             _reading(self.displacement, displacement, displacement_valid),
@@ -216,15 +214,12 @@ class MountCodec:
         raw = limits.to_raw(min(max(current, limits.low), limits.high))
         return _protected(self.setpoint, (0, alive_counter, raw, answered_counter, enable))
 
-    def decode_setpoint(self, data: bytes | bytearray) -> Setpoint:
-        """Return a setpoint; a current above the DBC's limit is refused with `OutOfRangeError`."""
-        _, _, current, answered_counter, enable = _checked(self.setpoint, data)
+    def decode_setpoint(self, data: bytes | bytearray) -> tuple[int, Setpoint | None]:
+        """Return alive counter and setpoint, which is None where its current exceeds the DBC's limit."""
+        _, alive_counter, current, answered_counter, enable = _checked(self.setpoint, data)
         if not self.current.holds(current):
-            raise OutOfRangeError(
-                f'received current setpoint ({self.current.to_si(current):g} A) must lie within '
-                f'{self.current.low:g} .. {self.current.high:g} A; the frame is not used'
-            )
-        return Setpoint(self.current.to_si(current), answered_counter, enable == 1)
+            return alive_counter, None
+        return alive_counter, Setpoint(self.current.to_si(current), answered_counter, enable == 1)
 
     def encode_status(self, status: Status, alive_counter: int) -> bytearray:
         """Return the 8 bytes of a status; NaN is sent as not available. Raises `OutOfRangeError`."""
@@ -237,19 +232,14 @@ class MountCodec:
         )
         return _protected(self.status, (0, alive_counter, raw_voltage, raw_temperature, *faults))
 
-    def decode_status(self, data: bytes | bytearray) -> Status:
-        """Return the status; what is not available or lies outside the DBC's limits is NaN."""
-        _, _, voltage, temperature, *faults = _checked(self.status, data)
-        return Status(
+    def decode_status(self, data: bytes | bytearray) -> tuple[int, Status]:
+        """Return alive counter and status; what is not available or lies outside the DBC's limits is NaN."""
+        _, alive_counter, voltage, temperature, *faults = _checked(self.status, data)
+        return alive_counter, Status(
             _reading(self.supply_voltage, voltage, True),
             _reading(self.coil_temperature, temperature, True),
             *(fault == 1 for fault in faults),
         )
-
-
-def alive_counter_of(data: bytes | bytearray) -> int:
-    """Return the alive counter of a frame that has passed its CRC."""
-    return data[_ALIVE_COUNTER_BYTE]
 
 
 def _protected(layout: MessageLayout, raw: tuple[int, ...]) -> bytearray:

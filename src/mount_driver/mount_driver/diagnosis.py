@@ -8,6 +8,7 @@ from mount_driver.e2e_receiver import Outcome
 from mount_driver.exchange import Exchange
 from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
+from mount_models.sampling import HIGHEST_CURRENT
 from mount_ros.nodes.diagnostics import Level, Verdict
 
 _PERIOD = 1.0  # s: rates are taken over this long
@@ -40,17 +41,17 @@ class Snapshot(NamedTuple):
     latest_stamp: int = 0  # ns
     last_refusal: Refusal | None = None
     driving: bool = False
-    unheard: bool = False  # the electronics say that no setpoint reaches them
+    unheard: bool = False  # the electronics report that no setpoint reaches them
     bus_off: bool = False
     trouble: str = ''
     failure: str = ''
     status: Status | None = None
-    setpoint_errors: int = 0  # statuses that tell of setpoint frames with a failed check
+    setpoint_errors: int = 0  # statuses that report setpoint frames with a failed check
 
 
 def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
     """Return what `exchange` has counted; `now_ns` and `started_ns` are on the steady clock."""
-    link, clock = exchange.link, exchange.clock
+    link, latest = exchange.link, exchange.link.latest
     return Snapshot(
         time=now_ns * 1e-9,
         frame_age=(now_ns - (exchange.last_received or started_ns)) * 1e-9,
@@ -70,14 +71,14 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         timeouts=link.timeouts,
         unsent=exchange.unsent,
         unsent_reason=exchange.unsent_reason,
-        restarts=clock.restarts,
-        gaps=clock.gaps,
+        restarts=link.clock.restarts,
+        gaps=link.clock.gaps,
         recoveries=exchange.recoveries,
         error_frames=exchange.error_frames,
-        latest_stamp=link.latest_stamp,
+        latest_stamp=latest.stamp if latest is not None else 0,
         last_refusal=link.last_refusal,
         driving=link.driving,
-        unheard=link.last_sample is not None and link.last_sample.setpoint_timeout,
+        unheard=latest is not None and latest.sample.setpoint_timeout,
         bus_off=exchange.bus_off,
         trouble=exchange.trouble,
         failure=exchange.failure,
@@ -195,7 +196,9 @@ def _setpoint_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParam
     if now.driving and earlier.driving and now.unheard and earlier.unheard:
         found.append((Level.WARN, 'the electronics do not take the setpoints; check the bus'))
     if now.limited > earlier.limited:
-        text = f'{now.limited - earlier.limited} setpoints limited to 3 A in the last second'
+        text = (
+            f'{now.limited - earlier.limited} setpoints limited to {HIGHEST_CURRENT:g} A in the last second'
+        )
         found.append((Level.WARN, text))
     return found
 

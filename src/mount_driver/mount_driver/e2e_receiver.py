@@ -1,13 +1,13 @@
 """The receiving side of the end-to-end protection: each frame is judged and counted, a doubtful one not used.
 
-AUTOSAR E2E profile 5 as the DBC tells it to those who build either end; both ends of the bus run this code.
+AUTOSAR E2E profile 5 as the DBC describes it; both ends of the bus run this code.
 """
 
 from collections.abc import Callable
 from enum import IntEnum
 from typing import Generic, TypeVar
 
-from mount_driver.codec import OutOfRangeError, WrongCrcError, WrongLengthError, alive_counter_of
+from mount_driver.codec import WrongCrcError, WrongLengthError
 from mount_driver.layout import MessageLayout
 
 M = TypeVar('M')
@@ -42,7 +42,7 @@ class AliveCounter:
 class E2EReceiver(Generic[M]):
     """Decodes the frames of one message, judges their order by the alive counter and counts outcomes."""
 
-    def __init__(self, decode: Callable[[bytes | bytearray], M], layout: MessageLayout):
+    def __init__(self, decode: Callable[[bytes | bytearray], tuple[int, M | None]], layout: MessageLayout):
         self.outcome = Outcome.OK
         """Of the last frame."""
         self.counts = [0] * len(Outcome)
@@ -59,16 +59,15 @@ class E2EReceiver(Generic[M]):
         """Return the message of a frame, or None where it must not be used; see `outcome`."""
         message = None
         try:
-            message = self._decode(data)
+            alive, message = self._decode(data)
         except WrongCrcError:
             outcome = Outcome.WRONG_CRC
         except WrongLengthError:
             outcome = Outcome.WRONG_LENGTH
-        except OutOfRangeError:
-            outcome = Outcome.OUT_OF_RANGE
-            self._follow(alive_counter_of(data))
         else:
-            outcome = self._follow(alive_counter_of(data))
+            outcome = self._follow(alive)
+            if message is None:
+                outcome = Outcome.OUT_OF_RANGE
         self.outcome = outcome
         self.counts[outcome] += 1
         return message if outcome <= Outcome.LOST else None

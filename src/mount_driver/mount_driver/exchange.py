@@ -9,15 +9,15 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from typing import Protocol
 
 import can
 
 from mount_driver.bus import CanLinkError, may_have_frames, open_bus
-from mount_driver.codec import Measurement, MountCodec, Setpoint
+from mount_driver.clock import Clock
+from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.frame import Frame
-from mount_driver.link import Arrival, Link, Refusal
+from mount_driver.link import Arrival, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
@@ -26,21 +26,12 @@ _OFF_FRAMES = 3  # chosen: so that one lost frame does not leave the coil on unt
 _BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
 
 
-class Clock(Protocol):
-    """Maps the electronics' counter to stamps: see `mount_driver.clock`."""
-
-    restarts: int
-    gaps: int
-
-    def stamp(self, microseconds: int, received_monotonic_ns: int) -> int: ...
-
-
 class Exchange:
     """Owns the bus between `start` and `stop`; every way out of it sends 0 A first.
 
-    `on_sample(stamp_ns, measurement)` is called in the receiving thread for every new sample, and
+    `on_sample(stamped)` is called in the receiving thread for every new sample, and
     `on_temperature(stamp_ns, celsius)` for a status with a coil temperature, with the last sample's stamp.
-    `steady() -> ns` is the clock by which ages are judged; in lock-step the stamps are.
+    `clock` gives the stamps and says by which time ages are judged; `steady() -> ns` is the steady clock.
     """
 
     def __init__(
@@ -48,14 +39,12 @@ class Exchange:
         parameters: DriverParameters,
         codec: MountCodec,
         clock: Clock,
-        on_sample: Callable[[int, Measurement], None],
+        on_sample: Callable[[Stamped], None],
         *,
-        lockstep: bool,
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
         steady: Callable[[], int] = time.monotonic_ns,
     ):
-        self.clock = clock
-        self.link = Link(codec, round(parameters.setpoint_timeout * 1e9))
+        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9))
         self.failure = ''
         """Why the exchange has ended on its own; empty while it runs."""
         self.trouble = ''
@@ -74,7 +63,7 @@ class Exchange:
         self._on_sample = on_sample
         self._on_temperature = on_temperature
         self._temperature_stamp: int | None = None  # of the temperature told last
-        self._lockstep = lockstep
+        self._clock = clock
         self._steady = steady
         self._ids = (codec.measurement.frame_id, codec.status.frame_id)
         self._bus: can.BusABC | None = None
@@ -117,13 +106,13 @@ class Exchange:
             return setpoint is not None and self._send(setpoint)
 
     def poll(self) -> bool:
-        """Handle the next frame if one is there and return whether; for who did not start a thread."""
+        """Handle the next frame if one is there and return whether; used without a thread."""
         bus = self._bus
         return bus is not None and may_have_frames(bus) and self._attempt(0.0)
 
     def watch(self) -> None:
         """Send 0 A if the sample that was answered last is too old for its current."""
-        if self._lockstep and self.link.last_sample is None:
+        if self._clock.lockstep and self.link.latest is None:
             return  # time has not begun
         with self._sending:
             if self._accepting and self.link.off_is_due(self._now()):
@@ -135,7 +124,7 @@ class Exchange:
 
     def _sleep(self) -> float:
         """Return how long to wait for a frame, s: no longer than until 0 A is due."""
-        if self._lockstep:
+        if self._clock.lockstep:
             return _WAKE
         with self._sending:
             return min(_WAKE, max(0.0, 1e-9 * self.link.time_until_off(self._now())))
@@ -175,27 +164,22 @@ class Exchange:
         return message is not None
 
     def _take_measurement(self, message: can.Message, received: int) -> None:
-        link = self.link
-        sample = link.take_measurement(message.data)
-        if sample is None:
-            if link.arrival is Arrival.RESENT:
-                self._answer_again()
-            return
-        self.bus_off = False
-        self.last_received = received
-        stamp = self.clock.stamp(sample.microseconds, received)
-        link.remember(stamp, sample.sample_counter, stamp if self._lockstep else received)
-        self._on_sample(stamp, sample)
+        stamped = self.link.take(message.data, received)
+        if stamped is not None:
+            self.bus_off = False
+            self.last_received = received
+            self._on_sample(stamped)
+        elif self.link.arrival is Arrival.RESENT:
+            self._answer_again()
 
     def _take_status(self, message: can.Message) -> None:
-        link = self.link
-        status = link.take_status(message.data)
-        if status is None or link.last_sample is None or math.isnan(status.coil_temperature_celsius):
+        status, latest = self.link.take_status(message.data), self.link.latest
+        if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
             return
         # The frame has no time of its own. A second one without a sample between has none at all.
-        if link.latest_stamp != self._temperature_stamp:
-            self._temperature_stamp = link.latest_stamp
-            self._on_temperature(link.latest_stamp, status.coil_temperature_celsius)
+        if latest.stamp != self._temperature_stamp:
+            self._temperature_stamp = latest.stamp
+            self._on_temperature(latest.stamp, status.coil_temperature_celsius)
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
@@ -204,16 +188,15 @@ class Exchange:
 
     def _answer_again(self) -> None:
         with self._sending:
-            last = self.link.last_sample
-            if last is None or not self._accepting:
+            latest = self.link.latest
+            if latest is None or not self._accepting:
                 return
-            setpoint = self.link.answer_again(last.sample_counter, self._now())
+            setpoint = self.link.answer_again(latest.sample.sample_counter, self._now())
             if setpoint is not None:
                 self._send(setpoint)
 
     def _now(self) -> int:
-        # In lock-step the stamps are all the time there is.
-        return self.link.latest_stamp if self._lockstep else self._steady()
+        return self._clock.now(self._steady())
 
     def _send(self, setpoint: Setpoint) -> bool:
         """Send one frame and return whether the bus took it; call it with the lock held."""
@@ -254,7 +237,7 @@ class Exchange:
             self._thread = None
 
     def _recover(self, error: can.CanError) -> None:
-        """Open the bus again and again until it works, we are told to end, or the time is over."""
+        """Open the bus again and again until it works, `stop` is called, or the time is over."""
         self.trouble = str(error)
         deadline = time.monotonic() + self._parameters.recovery_time
         while not self._ending.is_set():

@@ -1,14 +1,16 @@
 """The state of the link to the electronics: what came, what was missing, which setpoint may leave.
 
-No bus and no clock here: frames and times come in, decisions go out. Times are ns; whoever calls decides
-whether they are the steady clock (real time) or the stamps (lock-step).
+No bus here: frames and times come in, decisions go out. Times are ns. Ages are judged by `Clock.now`: the
+steady clock in real time, the stamps in lock-step.
 
 The hold: a current stands on the bus only while the sample that it answers has arrived no longer ago than the
-setpoint timeout. So nothing but a new sample and its own answer prolongs it, whoever repeats himself.
+setpoint timeout. So nothing but a new sample and its own answer prolongs it, even if either is repeated.
 """
 
 from enum import Enum, IntEnum
+from typing import NamedTuple
 
+from mount_driver.clock import Clock
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import E2EReceiver, Outcome
 
@@ -41,10 +43,18 @@ class Refusal(Enum):
     BUS_LOST = 'the CAN bus is not there'
 
 
-class Link:
-    """Judges every measurement and every setpoint, and counts."""
+class Stamped(NamedTuple):
+    """A sample with the ROS time (ns) at which it was taken; a setpoint names the sample by this stamp."""
 
-    def __init__(self, codec: MountCodec, setpoint_timeout_ns: int):
+    stamp: int
+    sample: Measurement
+
+
+class Link:
+    """Judges and stamps every measurement, judges every setpoint, and counts."""
+
+    def __init__(self, codec: MountCodec, clock: Clock, setpoint_timeout_ns: int):
+        self.clock = clock
         self.samples = E2EReceiver(codec.decode_measurement, codec.measurement)
         self.statuses = E2EReceiver(codec.decode_status, codec.status)
         self.arrival = Arrival.NEW
@@ -53,12 +63,11 @@ class Link:
         self.lost = 0
         """Samples missing by their SampleCounter."""
         self.invalid_displacements = 0
-        self.last_sample: Measurement | None = None
-        self.latest_stamp = 0
-        """Stamp of the newest sample, ns; 0 before the first."""
+        self.latest: Stamped | None = None
+        """The newest sample."""
         self.status: Status | None = None
         self.setpoint_errors = 0
-        """Statuses in which the electronics told of setpoint frames that failed their check."""
+        """Statuses that report setpoint frames which failed their check."""
 
         self.setpoints = 0
         """Setpoints that were let through."""
@@ -71,9 +80,7 @@ class Link:
 
         self._highest_current = codec.current.high
         self._timeout = setpoint_timeout_ns
-        self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, of the last
-        self._stamps = [-1] * _REMEMBERED
-        self._place = 0
+        self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, oldest first
         self._answered_stamp = -1
         # No sample of the first minute bears this number: 0 A sent before any answer answers nothing.
         self._last_setpoint = Setpoint(0.0, _COUNTER_MASK, False)
@@ -81,9 +88,12 @@ class Link:
 
     # From the electronics.
 
-    def take_measurement(self, data: bytes | bytearray) -> Measurement | None:
-        """Return the sample of a frame if it is a new one, else None; `arrival` says what it was."""
-        sample = self.samples.receive(data)
+    def take(self, frame: bytes | bytearray, received: int) -> Stamped | None:
+        """Return the sample of a frame with its stamp if it is a new one, else None: see `arrival`.
+
+        `received` is the time of the frame on the steady clock.
+        """
+        sample = self.samples.receive(frame)
         arrival = self._arrival_of_none() if sample is None else self._order(sample)
         self.arrival = arrival
         self.arrivals[arrival] += 1
@@ -91,20 +101,12 @@ class Link:
             return None
         if sample.displacement != sample.displacement:
             self.invalid_displacements += 1
-        self.last_sample = sample
-        return sample
-
-    def remember(self, stamp: int, sample_counter: int, arrival: int) -> None:
-        """Note the stamp under which a sample is published, so that a setpoint can name it.
-
-        `arrival` is its time on the clock of `now` in what follows.
-        """
-        place = self._place
-        self._samples.pop(self._stamps[place], None)
-        self._stamps[place] = stamp
-        self._samples[stamp] = sample_counter, arrival
-        self._place = (place + 1) % _REMEMBERED
-        self.latest_stamp = stamp
+        stamp = self.clock.stamp(sample.microseconds, received)
+        if len(self._samples) == _REMEMBERED:
+            del self._samples[next(iter(self._samples))]
+        self._samples[stamp] = sample.sample_counter, self.clock.now(received)
+        self.latest = Stamped(stamp, sample)
+        return self.latest
 
     def take_status(self, data: bytes | bytearray) -> Status | None:
         """Keep the status of a frame if it is sound, and return it; else None."""
@@ -187,7 +189,7 @@ class Link:
             return Refusal.STALE
         if stamp < self._answered_stamp:
             return Refusal.SUPERSEDED
-        # 0 A may be said again: whoever ends says it for the sample that he has answered.
+        # 0 A may be repeated: a node that ends sends it for the sample that it has answered.
         if stamp == self._answered_stamp and current > 0.0 and current >= self._last_setpoint.current:
             return Refusal.NOT_LOWER
         return None
@@ -196,9 +198,9 @@ class Link:
         return Arrival.CORRUPT if self.samples.outcome >= Outcome.WRONG_CRC else Arrival.DISORDERED
 
     def _order(self, sample: Measurement) -> Arrival:
-        last = self.last_sample
-        if last is None:
+        if self.latest is None:
             return Arrival.NEW
+        last = self.latest.sample
         step = (sample.sample_counter - last.sample_counter) & _COUNTER_MASK
         step_us = (sample.microseconds - last.microseconds) & _MICROSECOND_MASK
         if step == 1 and step_us < _LATE_US:

@@ -68,7 +68,7 @@ class LoopbackMulticastBus(can.BusABC):
         try:
             message = unpack_message(datagram, replace={'timestamp': _arrival(told)})
         except (TypeError, ValueError):
-            self.foreign_datagrams += 1  # somebody else uses this group and port; no reason to stop
+            self.foreign_datagrams += 1  # another program uses this group and port; no reason to stop
             return None, False
         # Like SocketCAN: error frames pass the filter, because they tell the state of the bus.
         return message, message.is_error_frame

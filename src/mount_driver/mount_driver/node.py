@@ -4,10 +4,10 @@ import math
 import time
 
 from mount_driver.clock import CounterClock, ElectronicsClock
-from mount_driver.codec import Measurement, MountCodec
+from mount_driver.codec import MountCodec
 from mount_driver.diagnosis import LinkWatch, judge, snapshot
 from mount_driver.exchange import Exchange
-from mount_driver.link import Refusal
+from mount_driver.link import Refusal, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
@@ -51,12 +51,7 @@ class MountDriver(SafeLifecycleNode):
         epoch_offset = time.time_ns() - time.monotonic_ns()
         clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
         exchange = Exchange(
-            self._settings,
-            self._codec,
-            clock,
-            self._on_sample,
-            lockstep=self.lockstep,
-            on_temperature=self._on_temperature,
+            self._settings, self._codec, clock, self._on_sample, on_temperature=self._on_temperature
         )
         self._watch = LinkWatch()
         self._started_ns = time.monotonic_ns()
@@ -85,7 +80,8 @@ class MountDriver(SafeLifecycleNode):
         now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
         return judge(now, self._watch.earlier(now), self._settings, lockstep=self.lockstep)
 
-    def _on_sample(self, stamp: int, sample: Measurement) -> None:
+    def _on_sample(self, stamped: Stamped) -> None:
+        stamp, sample = stamped
         # The displacement first: the setpoint waits for it.
         self._publish_displacement(self._displacement_layout.pack(stamp, (sample.displacement,)))
         self._publish_ripple(

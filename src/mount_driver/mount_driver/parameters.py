@@ -4,6 +4,7 @@ from typing import Annotated, NamedTuple
 
 from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
 from mount_models.quantity import Quantity
+from mount_models.sampling import SETPOINT_TIMEOUT
 
 
 class DriverParameters(NamedTuple):
@@ -24,8 +25,9 @@ class DriverParameters(NamedTuple):
         int, Quantity('bit/s', 'data bit rate of CAN FD, likewise', 10_000, 8_000_000)
     ] = 2_000_000
     setpoint_timeout: Annotated[
-        float, Quantity('s', 'greatest age of the sample that a current answers; then 0 A', 0.002, 0.020)
-    ] = 0.020
+        float,
+        Quantity('s', 'greatest age of the sample that a current answers; then 0 A', 0.002, SETPOINT_TIMEOUT),
+    ] = SETPOINT_TIMEOUT
     frame_timeout: Annotated[
         float, Quantity('s', 'without a frame for this long the link counts as dead', 0.01, 10.0)
     ] = 0.1

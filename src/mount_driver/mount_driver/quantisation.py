@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.sampling import HIGHEST_CURRENT
 
 DISPLACEMENT_STEPS = 1.0e7  # per m
 DISPLACEMENT_LIMIT = 500_000.0  # raw, both ways
@@ -24,7 +25,6 @@ COIL_TEMPERATURE_STEPS = 10.0  # per K
 COIL_TEMPERATURE_LOWEST = -600.0  # raw
 COIL_TEMPERATURE_HIGHEST = 2500.0
 SETPOINT_STEPS = 1.0e4  # per A
-SETPOINT_HIGHEST = 3.0  # A
 
 
 @compiled
@@ -65,7 +65,7 @@ def quantised_setpoint_current(current: float) -> float:
     """Return the current setpoint (A) as it arrives, limited to 0..3 A in steps of 0.1 mA; NaN for NaN."""
     if math.isnan(current):
         return math.nan
-    limited = min(max(current, 0.0), SETPOINT_HIGHEST)
+    limited = min(max(current, 0.0), HIGHEST_CURRENT)
     return np.rint(limited * SETPOINT_STEPS) / SETPOINT_STEPS + 0.0
 
 

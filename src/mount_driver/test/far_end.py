@@ -52,7 +52,7 @@ class FarEnd:
         """Return the next setpoint that arrives."""
         message = self.bus.recv(LIMIT)
         assert message is not None, f'no setpoint frame within {LIMIT} s'
-        return CODEC.decode_setpoint(message.data)
+        return CODEC.decode_setpoint(message.data)[1]
 
     def setpoint_where(self, condition) -> Setpoint:
         """Return the next setpoint that fulfils a condition."""

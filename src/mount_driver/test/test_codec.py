@@ -17,8 +17,9 @@ from mount_driver.codec import (
     Status,
     WrongCrcError,
     WrongLengthError,
-    alive_counter_of,
 )
+from mount_driver.parameters import DriverParameters
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SETPOINT_TIMEOUT
 
 CODEC = MountCodec()
 DATABASE = cantools.database.load_file(DATABASE_FILE)
@@ -58,8 +59,8 @@ def nearly(value, scale):
 def test_a_measurement_reads_as_cantools_reads_it(measurement, counter):
     data = CODEC.encode_measurement(measurement, counter)
     values = MEASUREMENT.decode(bytes(data), decode_choices=False)
-    decoded = CODEC.decode_measurement(data)
-    assert values['AliveCounter'] == alive_counter_of(data) == counter
+    alive_counter, decoded = CODEC.decode_measurement(data)
+    assert values['AliveCounter'] == alive_counter == counter
     assert values['SampleCounter'] == decoded.sample_counter == measurement.sample_counter
     assert values['Microseconds'] == decoded.microseconds == measurement.microseconds
     assert values['Enabled'] == decoded.enabled == measurement.enabled
@@ -93,7 +94,7 @@ def test_frames_made_by_cantools_are_read(data):
 def test_a_setpoint_reads_as_cantools_reads_it(current, answered, enable, counter):
     data = CODEC.encode_setpoint(Setpoint(current, answered, enable), counter)
     values = SETPOINT.decode(bytes(data), decode_choices=False)
-    decoded = CODEC.decode_setpoint(data)
+    decoded = CODEC.decode_setpoint(data)[1]
     assert nearly(values['Current'], 1e-4) == decoded.current == pytest.approx(current, abs=0.5001e-4)
     assert (values['AnsweredCounter'], values['Enable']) == (answered, enable)
     assert decoded[1:] == (answered, enable)
@@ -104,7 +105,7 @@ def test_a_setpoint_reads_as_cantools_reads_it(current, answered, enable, counte
 def test_a_status_reads_as_cantools_reads_it(voltage, temperature, faults, counter):
     data = CODEC.encode_status(Status(voltage, temperature, *faults), counter)
     values = STATUS.decode(bytes(data), decode_choices=False)
-    decoded = CODEC.decode_status(data)
+    decoded = CODEC.decode_status(data)[1]
     assert nearly(values['SupplyVoltage'], 1e-2) == decoded.supply_voltage
     assert nearly(values['CoilTemperature'], 1e-1) == decoded.coil_temperature_celsius
     names = ('OverTemperature', 'OverCurrent', 'UnderVoltage', 'SetpointTimeout', 'DisplacementSensor')
@@ -117,18 +118,18 @@ def test_status_names_its_faults():
 
 def test_status_that_is_not_available_is_nan_and_says_so_in_the_value_table():
     data = CODEC.encode_status(Status(math.nan, math.nan), 0)
-    assert all(math.isnan(value) for value in CODEC.decode_status(data)[:2])
+    assert all(math.isnan(value) for value in CODEC.decode_status(data)[1][:2])
     values = STATUS.decode(bytes(data))
     assert str(values['SupplyVoltage']) == str(values['CoilTemperature']) == 'not available'
 
 
 def test_decimal_numbers_come_back_exactly():
-    assert CODEC.decode_measurement(CODEC.encode_measurement(SAMPLE, 0)) == SAMPLE
+    assert CODEC.decode_measurement(CODEC.encode_measurement(SAMPLE, 0))[1] == SAMPLE
 
 
 @pytest.mark.parametrize('slope', ['current_rate', 'flux_rate'])
 def test_one_missing_slope_makes_both_unknown(slope):
-    decoded = CODEC.decode_measurement(CODEC.encode_measurement(SAMPLE._replace(**{slope: math.nan}), 0))
+    decoded = CODEC.decode_measurement(CODEC.encode_measurement(SAMPLE._replace(**{slope: math.nan}), 0))[1]
     assert math.isnan(decoded.current_rate)
     assert math.isnan(decoded.flux_rate)
     assert decoded.coil_current == SAMPLE.coil_current
@@ -150,13 +151,13 @@ def test_a_counter_that_does_not_fit_is_refused(change):
 
 def test_a_protected_frame_with_a_displacement_outside_the_limits_is_unknown():
     raw = dict.fromkeys(CODEC.measurement.names, 0) | {'DisplacementValid': 1, 'Displacement': 500_001}
-    decoded = CODEC.decode_measurement(protected(CODEC.measurement, raw))
+    decoded = CODEC.decode_measurement(protected(CODEC.measurement, raw))[1]
     assert math.isnan(decoded.displacement)
 
 
 @pytest.mark.parametrize(('wanted', 'sent'), [(-0.1, 0.0), (3.0001, 3.0), (math.inf, 3.0), (-math.inf, 0.0)])
 def test_a_setpoint_is_limited_to_0_to_3_ampere(wanted, sent):
-    assert CODEC.decode_setpoint(CODEC.encode_setpoint(Setpoint(wanted, 1), 0)).current == sent
+    assert CODEC.decode_setpoint(CODEC.encode_setpoint(Setpoint(wanted, 1), 0))[1].current == sent
 
 
 def test_a_setpoint_that_is_nan_is_refused():
@@ -166,8 +167,7 @@ def test_a_setpoint_that_is_nan_is_refused():
 
 def test_a_received_setpoint_above_3_ampere_is_refused():
     raw = dict.fromkeys(CODEC.setpoint.names, 0) | {'Current': 30_001}
-    with pytest.raises(OutOfRangeError, match=r'3\.0001 A'):
-        CODEC.decode_setpoint(protected(CODEC.setpoint, raw))
+    assert CODEC.decode_setpoint(protected(CODEC.setpoint, raw)) == (0, None)
 
 
 @pytest.mark.parametrize(
@@ -226,8 +226,18 @@ def test_the_dbc_tells_those_who_build_the_electronics_what_to_refuse():
     assert all(word in rule for word in ('repeated: not used', 'goes back: not used', 'E2ESyncFrames'))
     for layout in (CODEC.measurement, CODEC.setpoint, CODEC.status):
         assert (layout.max_delta_counter, layout.sync_frames) == (5, 3)
-    assert 'answers one of the last 20 samples' in SETPOINT.comment
     assert 'repeated, of wrong sequence' in STATUS.get_signal_by_name('E2EError').comment
+
+
+def test_the_dbc_agrees_with_what_both_ends_know_of_current_time_and_rate():
+    assert (CODEC.current.low, CODEC.current.high) == (0.0, HIGHEST_CURRENT)
+    assert [message.cycle_time for message in (MEASUREMENT, SETPOINT)] == [1e3 * SAMPLE_TIME] * 2
+    limit = f'{1e3 * SETPOINT_TIMEOUT:g} ms'
+    timeout = MEASUREMENT.get_signal_by_name('SetpointTimeout'), STATUS.get_signal_by_name('SetpointTimeout')
+    assert all(f'No valid setpoint for {limit}' in signal.comment for signal in timeout)
+    assert f'Without a valid frame for {limit}' in SETPOINT.comment
+    assert f'answers one of the last {round(SETPOINT_TIMEOUT / SAMPLE_TIME)} samples' in SETPOINT.comment
+    assert DriverParameters().setpoint_timeout == SETPOINT_TIMEOUT
 
 
 def test_a_dbc_without_a_needed_signal_is_refused(tmp_path):
@@ -242,7 +252,7 @@ def test_scales_and_places_come_from_the_dbc(tmp_path):
     text = text.replace('24|16@1+ (0.0001,0) [0|3] "A"', '24|12@1+ (0.001,0) [0|3] "A"')
     (tmp_path / 'other.dbc').write_text(text, encoding='utf-8')
     other = MountCodec(tmp_path / 'other.dbc')
-    assert other.decode_setpoint(other.encode_setpoint(Setpoint(1.2344, 9), 0)) == Setpoint(1.234, 9)
+    assert other.decode_setpoint(other.encode_setpoint(Setpoint(1.2344, 9), 0))[1] == Setpoint(1.234, 9)
 
 
 def protected(layout, raw):

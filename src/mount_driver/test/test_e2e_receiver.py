@@ -127,6 +127,13 @@ def test_damage_does_not_disturb_the_order(receiver):
     assert (receiver.outcome, receiver.lost) == (Outcome.LOST, 1)
 
 
+def test_a_content_that_is_not_allowed_is_not_used_but_its_counter_is_followed():
+    forbidding = E2EReceiver(lambda data: (data[2], None if data[2] == 1 else data), CODEC.setpoint)
+    assert [forbidding.receive(frame(alive)) is not None for alive in range(3)] == [True, False, True]
+    assert forbidding.counts[Outcome.OUT_OF_RANGE] == forbidding.corrupt == 1
+    assert forbidding.outcome == Outcome.OK
+
+
 def test_a_measurement_goes_through():
     receiver = E2EReceiver(CODEC.decode_measurement, CODEC.measurement)
     sample = Measurement(3, 5, 0.001, 0.5, 1.0, 2.0)

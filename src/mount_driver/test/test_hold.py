@@ -33,8 +33,7 @@ class Car:
             DriverParameters(interface='virtual', channel=channel),
             CODEC,
             ElectronicsClock(10**18),
-            lambda stamp, measurement: self.stamps.append(stamp),
-            lockstep=False,
+            lambda stamped: self.stamps.append(stamped.stamp),
             steady=lambda: self.now,
         )
         self.exchange.start(threaded=False)
@@ -63,7 +62,7 @@ class Car:
     def look(self):
         """Note what is on the bus."""
         while (frame := self.far.bus.recv(0.0)) is not None:
-            self.sent.append((self.now, CODEC.decode_setpoint(frame.data)))
+            self.sent.append((self.now, CODEC.decode_setpoint(frame.data)[1]))
 
     def on_bus(self):
         """Return the setpoint that stands on the bus."""
@@ -172,7 +171,7 @@ class SilentBus:
         return frame
 
     def send(self, message):
-        self.sent.append((self._clock.now, CODEC.decode_setpoint(message.data)))
+        self.sent.append((self._clock.now, CODEC.decode_setpoint(message.data)[1]))
 
     def shutdown(self):
         pass
@@ -192,11 +191,11 @@ def test_on_a_silent_bus_the_thread_wakes_when_the_hold_ends(monkeypatch):
     bus = SilentBus(steady)
     monkeypatch.setattr(exchange_module, 'open_bus', lambda *_, **__: bus)
 
-    def answer(stamp, _):
+    def answer(stamped):
         steady.now += 13 * MS  # an answer after 13 ms holds for 7 ms
-        exchange.send_setpoint(stamp, 3.0)
+        exchange.send_setpoint(stamped.stamp, 3.0)
 
-    exchange = Exchange(DriverParameters(), CODEC, ElectronicsClock(0), answer, lockstep=False, steady=steady)
+    exchange = Exchange(DriverParameters(), CODEC, ElectronicsClock(0), answer, steady=steady)
     exchange.start()
     wait_until(lambda: len(bus.sent) >= 2, '0 A')
     exchange.stop()

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mount_driver.clock import CounterClock, ElectronicsClock
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.link import Arrival, Link, Refusal
 
@@ -16,7 +17,11 @@ SAMPLE = Measurement(0, 0, 0.001, 0.5, 10.0, 20.0)
 
 @pytest.fixture
 def link():
-    return Link(CODEC, 20 * MS)
+    return new_link()
+
+
+def new_link():
+    return Link(CODEC, ElectronicsClock(0), 20 * MS)
 
 
 def frame(index, alive, **changes):
@@ -28,8 +33,7 @@ def feed(link, indices, first_alive=0):
     """Let samples arrive and be stamped: sample k at k ms, in one frame after the other."""
     arrivals = []
     for alive, index in enumerate(indices, first_alive):
-        if link.take_measurement(frame(index, alive)) is not None:
-            link.remember(index * MS, index % 65536, index * MS)
+        link.take(frame(index, alive), index * MS)
         arrivals.append(link.arrival)
     return arrivals
 
@@ -37,6 +41,22 @@ def feed(link, indices, first_alive=0):
 def test_samples_in_order_are_new_across_the_wrap_of_their_counter(link):
     assert set(feed(link, range(65_500, 65_600))) == {Arrival.NEW}
     assert link.lost == 0
+
+
+def test_a_new_sample_is_handed_on_with_the_stamp_that_a_setpoint_names(link):
+    stamped = link.take(frame(7, 0), 7 * MS)
+    assert stamped == link.latest
+    assert (stamped.stamp, stamped.sample.sample_counter) == (7 * MS, 7)
+    assert link.answer(stamped.stamp, 1.0, now=8 * MS).answered_counter == 7
+
+
+def test_in_lock_step_the_stamps_alone_make_a_sample_old():
+    link = Link(CODEC, CounterClock(), 20 * MS)
+    for index in range(30):
+        link.take(frame(index, index), received=60_000 * MS * index)
+    assert link.answer(9 * MS, 1.0, link.clock.now(10**15)) is not None
+    assert link.answer(8 * MS, 1.0, link.clock.now(10**15)) is None
+    assert link.last_refusal is Refusal.STALE
 
 
 @pytest.mark.parametrize('missing', [1, 3, 500])
@@ -55,14 +75,14 @@ def test_the_alive_counter_alone_could_not_have_counted_300_missing_samples(link
 
 def test_the_same_sample_again_is_resent_and_not_handed_on(link):
     feed(link, [10, 11])
-    assert link.take_measurement(frame(11, alive=2)) is None
-    assert link.take_measurement(frame(11, alive=3)) is None
+    assert link.take(frame(11, alive=2), 12 * MS) is None
+    assert link.take(frame(11, alive=3), 12 * MS) is None
     assert link.arrivals[Arrival.RESENT] == 2
 
 
 def test_the_same_frame_again_is_no_sample_at_all(link):
     feed(link, [10, 11])
-    assert link.take_measurement(frame(11, alive=1)) is None
+    assert link.take(frame(11, alive=1), 12 * MS) is None
     assert link.arrivals[Arrival.RESENT] == 0
     assert link.arrivals[Arrival.DISORDERED] == 1
 
@@ -80,14 +100,14 @@ def test_a_restart_of_the_electronics_loses_nothing_and_goes_on(link):
 def test_a_corrupt_frame_is_counted_and_not_handed_on(link):
     data = frame(0, 0)
     data[12] ^= 4
-    assert link.take_measurement(data) is None
+    assert link.take(data, 0) is None
     assert link.arrivals[Arrival.CORRUPT] == 1
-    assert link.last_sample is None
+    assert link.latest is None
 
 
 def test_displacements_that_are_not_valid_are_counted(link):
-    sample = link.take_measurement(frame(0, 0, displacement=math.nan))
-    assert math.isnan(sample.displacement)
+    stamped = link.take(frame(0, 0, displacement=math.nan), 0)
+    assert math.isnan(stamped.sample.displacement)
     assert link.invalid_displacements == 1
 
 
@@ -165,7 +185,7 @@ def test_more_than_3_ampere_is_limited_and_counted(link, current):
 @settings(max_examples=200, deadline=None)
 @given(st.floats(allow_nan=True, allow_infinity=True), st.integers(-200 * MS, 200 * MS))
 def test_no_setpoint_outside_0_to_3_ampere_ever_leaves(current, stamp):
-    link = Link(CODEC, 20 * MS)
+    link = new_link()
     feed(link, range(100))
     setpoint = link.answer(stamp, current, now=99 * MS)
     assert setpoint is None or 0.0 <= setpoint.current <= 3.0
@@ -290,8 +310,8 @@ events = st.lists(
 @settings(max_examples=300, deadline=None)
 @given(events)
 def test_no_current_ever_stands_on_a_sample_older_than_20_ms_nor_rises_without_a_new_one(happenings):
-    link = Link(CODEC, 20 * MS)
-    now, index, arrivals = 0, 0, {}
+    link = new_link()
+    now, index, arrivals, stamps = 0, 0, {}, {}
     on_bus, answered = Setpoint(0.0, 0, False), 0
     for kind, *details in happenings:
         sent = None
@@ -300,11 +320,11 @@ def test_no_current_ever_stands_on_a_sample_older_than_20_ms_nor_rises_without_a
         elif kind == 'sample':
             now += MS
             index += 1
-            assert link.take_measurement(frame(index, index - 1)) is not None
-            arrivals[index] = now
-            link.remember(1000 * index, index, now)
+            stamped = link.take(frame(index, index - 1), now)
+            assert stamped is not None
+            arrivals[index], stamps[index] = now, stamped.stamp
         elif kind == 'answer':
-            sent = link.answer(1000 * (index - details[0]), details[1], now)
+            sent = link.answer(stamps.get(index - details[0], -1), details[1], now)
         else:
             sent = link.answer_again(index, now)
         if sent is not None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mount_driver import quantisation
 from mount_driver.codec import Measurement, MountCodec, OutOfRangeError, Setpoint, Status
+from mount_models.sampling import HIGHEST_CURRENT
 
 CODEC = MountCodec()
 SAMPLE = Measurement(0, 0, 0.0, 0.0, 0.0, 0.0)
@@ -27,7 +28,7 @@ def over_can(name, value):
         data = CODEC.encode_measurement(SAMPLE._replace(**{name: value}), 0)
     except OutOfRangeError:
         return math.nan
-    return getattr(CODEC.decode_measurement(data), name)
+    return getattr(CODEC.decode_measurement(data)[1], name)
 
 
 def same_bits(left, right):
@@ -57,7 +58,7 @@ def test_a_reading_is_quantised_as_over_can(name):
 @example(3.0)
 def test_a_setpoint_is_quantised_as_over_can(value):
     try:
-        expected = CODEC.decode_setpoint(CODEC.encode_setpoint(Setpoint(value, 0), 0)).current
+        expected = CODEC.decode_setpoint(CODEC.encode_setpoint(Setpoint(value, 0), 0))[1].current
     except OutOfRangeError:
         expected = math.nan
     assert same_bits(quantisation.quantised_setpoint_current(value), expected)
@@ -71,7 +72,9 @@ def test_a_setpoint_is_quantised_as_over_can(value):
 @example(math.nextafter(250.0, math.inf))
 def test_a_coil_temperature_is_quantised_as_over_can(value):
     try:
-        expected = CODEC.decode_status(CODEC.encode_status(Status(14.0, value), 0)).coil_temperature_celsius
+        expected = CODEC.decode_status(CODEC.encode_status(Status(14.0, value), 0))[
+            1
+        ].coil_temperature_celsius
     except OutOfRangeError:
         expected = math.nan
     assert same_bits(quantisation.quantised_coil_temperature(value), expected)
@@ -106,4 +109,4 @@ def test_step_and_limits_of_the_coil_temperature_are_those_of_the_dbc():
 
 def test_the_setpoint_limits_are_those_of_the_dbc():
     assert CODEC.current.steps == quantisation.SETPOINT_STEPS
-    assert (CODEC.current.low, CODEC.current.high) == (0.0, quantisation.SETPOINT_HIGHEST)
+    assert (CODEC.current.low, CODEC.current.high) == (0.0, HIGHEST_CURRENT)

@@ -69,7 +69,7 @@ def failing(monkeypatch):
         monkeypatch.setattr(exchange_module, 'open_bus', opening)
         parameters = DriverParameters(interface='virtual', channel=channel)
         clock = ElectronicsClock(0)
-        exchange = Exchange(parameters, CODEC, clock, lambda *_: None, lockstep=False, steady=Steady())
+        exchange = Exchange(parameters, CODEC, clock, lambda _: None, steady=Steady())
         exchange.start(threaded=threaded)
         return exchange, exchange._bus, far
 
@@ -81,7 +81,7 @@ def failing(monkeypatch):
 def off_frames(far):
     frames = []
     while (frame := far.bus.recv(0.0)) is not None:
-        frames.append(CODEC.decode_setpoint(frame.data))
+        frames.append(CODEC.decode_setpoint(frame.data)[1])
     assert not any(setpoint.enable for setpoint in frames)
     return len(frames)
 
@@ -125,7 +125,7 @@ def test_a_frame_that_the_bus_does_not_take_ends_neither_the_exchange_nor_its_ca
     exchange.watch()  # 0 A is due and not taken
     far.send(sample(0))
     assert exchange.poll()
-    assert not exchange.send_setpoint(exchange.link.latest_stamp, 1.0)
+    assert not exchange.send_setpoint(exchange.link.latest.stamp, 1.0)
     assert exchange.unsent == 2
     assert exchange.unsent_reason == f'{type(error).__name__}: {error}'
     assert exchange.failure == ''

@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-from rich.progress import Progress as ProgressBar
-
 from mount_bags.run.folder import RunFolderError, new_place
+from mount_bags.run.screen import Bar, Screen
 from mount_bringup.settings import checked_settings, defaults_of_nodes, settings_of_options
-from mount_experiments.harness.contract import Experiment, ExperimentError, Order, Outcome
+from mount_experiments.harness.contract import Experiment, ExperimentError, Order, Outcome, Progress
 from mount_models.quantity import with_flattened
 
 Runs = list[tuple[Experiment, Order]]
@@ -38,16 +37,16 @@ def orders(experiments: list[Experiment], options: list[str], out: Path | None, 
     ]
 
 
-def run_all(runs: Runs, progress: ProgressBar) -> list[tuple[Experiment, Outcome]]:
+def run_all(runs: Runs, screen: Screen) -> list[tuple[Experiment, Outcome]]:
     """Run all orders, one bar for each, and return what came of them."""
     outcomes = []
     for experiment, order in runs:
-        task = progress.add_task(experiment.name, total=1.0)
-
-        def tell(share: float, what: str, task: Any = task, name: str = experiment.name) -> None:
-            progress.update(task, completed=share, description=f'{name}: {what}')
-
         order.out.mkdir(parents=True, exist_ok=True)
-        outcomes.append((experiment, experiment.run(order, tell)))
-        progress.update(task, completed=1.0, description=experiment.name)
+        with screen.bar(experiment.name) as show:
+            outcomes.append((experiment, experiment.run(order, _named(experiment.name, show))))
+            show(1.0, experiment.name)
     return outcomes
+
+
+def _named(name: str, show: Bar) -> Progress:
+    return lambda share, what: show(share, f'{name}: {what}')

@@ -4,9 +4,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
-
+from mount_bags.run.screen import Screen, Table
 from mount_experiments.harness.contract import Experiment, Holds, Outcome
 
 _FIGURES = 'figures'
@@ -20,21 +18,21 @@ paper gives too little, or that what was compared here is something else.
 """
 
 
-def print_outcome(experiment: Experiment, outcome: Outcome, console: Console) -> None:
+def print_outcome(experiment: Experiment, outcome: Outcome, screen: Screen) -> None:
     """Print the statements of an experiment and the places of what it made."""
-    table = Table(title=f'{experiment.title} ({experiment.reference})', title_justify='left', show_lines=True)
-    for heading in ('paper', 'says', 'here', 'holds'):
-        table.add_column(heading)
-    for statement in outcome.statements:
-        table.add_row(statement.reference, statement.paper, statement.found, statement.holds.value)
-    console.print(table)
+    rows = [
+        (statement.reference, statement.paper, statement.found, statement.holds.value)
+        for statement in outcome.statements
+    ]
+    heads = ('paper', 'says', 'here', 'holds')
+    screen.table(Table(f'{experiment.title} ({experiment.reference})', 'llll', rows, heads, ruled=True))
     for kind, places in (
         ('figure', outcome.pictures),
         ('recording', outcome.recordings),
         ('page', outcome.pages),
     ):
         for place in places:
-            console.print(f'{kind:11}{place}', soft_wrap=True)
+            screen.say(f'{kind:11}{place}')
 
 
 def write_page(outcomes: Sequence[tuple[Experiment, Outcome]], file: Path) -> None:

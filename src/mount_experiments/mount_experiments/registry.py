@@ -1,34 +1,38 @@
-"""All experiments by name, in the order of the paper's figures."""
+"""All experiments by name, in the order of the paper's figures; each is loaded when it is asked for."""
 
-from mount_experiments.bench import experiment as bench
-from mount_experiments.field_penetration import experiment as field_penetration
-from mount_experiments.force_characteristic import experiment as force_characteristic
+from importlib import import_module
+
 from mount_experiments.harness.contract import Experiment, ExperimentError
-from mount_experiments.inductance_map import experiment as inductance_map
-from mount_experiments.motorway_gap import experiment as motorway_gap
-from mount_experiments.ramp_and_hold import experiment as ramp_and_hold
-from mount_experiments.recorded_drive import experiment as recorded_drive
-from mount_experiments.sawtooth import experiment as sawtooth
-from mount_experiments.sensitivity import experiment as sensitivity
-from mount_experiments.sweep import experiment as sweep
 
 ALL = 'all'
 
-EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment
-    for experiment in (
-        force_characteristic.EXPERIMENT,
-        field_penetration.EXPERIMENT,
-        inductance_map.EXPERIMENT,
-        ramp_and_hold.EXPERIMENT,
-        sawtooth.EXPERIMENT,
-        bench.EXPERIMENT,
-        sweep.EXPERIMENT,
-        motorway_gap.EXPERIMENT,
-        sensitivity.EXPERIMENT,
-        recorded_drive.EXPERIMENT,
-    )
-}
+NAMES = (
+    'force_characteristic',
+    'field_penetration',
+    'inductance_map',
+    'ramp_and_hold',
+    'sawtooth',
+    'bench',
+    'sweep',
+    'motorway_gap',
+    'sensitivity',
+    'recorded_drive',
+)
+"""The names of the experiments, which are those of their folders."""
+
+
+def listed() -> list[tuple[str, str, str]]:
+    """Return name, reference in the paper and title of every experiment, without loading any."""
+    folders = {name: import_module(f'{__package__}.{name}') for name in NAMES}
+    return [(name, folder.REFERENCE, folder.TITLE) for name, folder in folders.items()]
+
+
+def experiment_named(name: str) -> Experiment:
+    """Return the experiment of this name; raises `ExperimentError` for an unknown one."""
+    if name not in NAMES:
+        raise ExperimentError(f'{name!r} is no experiment; known are {", ".join((*NAMES, ALL))}')
+    experiment: Experiment = import_module(f'{__package__}.{name}.experiment').EXPERIMENT
+    return experiment
 
 
 def experiments_named(names: list[str]) -> list[Experiment]:
@@ -36,10 +40,7 @@ def experiments_named(names: list[str]) -> list[Experiment]:
 
     `all` stands for every one that needs nothing of the user's own.
     """
-    unknown = [name for name in names if name not in (*EXPERIMENTS, ALL)]
-    if unknown:
-        known = ', '.join((*EXPERIMENTS, ALL))
-        raise ExperimentError(f'{unknown[0]!r} is no experiment; known are {known}')
+    named = [experiment_named(name) for name in names if name != ALL]
     if ALL not in names:
-        return [EXPERIMENTS[name] for name in names]
-    return [each for each in EXPERIMENTS.values() if not each.needs or each.name in names]
+        return named
+    return [each for each in map(experiment_named, NAMES) if not each.needs or each in named]

@@ -1,6 +1,6 @@
 """The coil temperature of an initialisation: as measured, else as given, else unknown.
 
-Which reading counts is told by stamps alone, so that a recording of the same readings gives the same result.
+The stamps alone decide which reading counts, so that a recording of the same readings gives the same result.
 """
 
 import math

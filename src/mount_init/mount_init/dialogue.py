@@ -75,15 +75,15 @@ class CoilDialogue:
 
     # What the transition does.
 
-    def forget_what_was_heard(self) -> None:
-        """Begin anew after a time without listening: somebody may have sent setpoints until now."""
+    def forget_streams(self) -> None:
+        """Begin anew after a time without subscriptions: another node may have sent setpoints until now."""
         with self._lock:
             self._newest = None
             self._newest_heard = -math.inf
             self._foreign_heard = time.monotonic()
 
     def await_quiet(self, duration: float, ending: threading.Event) -> None:
-        """Return when nobody else has sent a setpoint for `duration` (s), or raise `CoilBusyError` soon.
+        """Return when no other node has sent a setpoint for `duration` (s), or raise `CoilBusyError` soon.
 
         A node that has just been deactivated is given the time to fall silent.
         """

@@ -42,4 +42,4 @@ class SpecimenMismatchError(InitialisationError):
 
 
 class CoilBusyError(InitialisationError):
-    """Somebody else sends setpoints to the coil."""
+    """Another node sends setpoints to the coil."""

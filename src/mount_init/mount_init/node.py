@@ -54,7 +54,7 @@ class MountInit(SafeLifecycleNode):
 
     def activate(self) -> None:
         assert self._dialogue is not None
-        self._listen()
+        self._resume_streams()
         parameters = self._init_parameters
         self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
         ramp = Initialisation(self._specimen, parameters, self._temperatures)
@@ -64,7 +64,7 @@ class MountInit(SafeLifecycleNode):
         result = ramp.result()
         assert ramp.last_stamp is not None
         self._publish_result(ramp.last_stamp, result)
-        self._stop_listening()
+        self._end_streams()
         self._result = (ramp.last_stamp, result)
 
     def deactivate(self) -> None:
@@ -81,29 +81,27 @@ class MountInit(SafeLifecycleNode):
         figures = InitFigures(result, stamp, self._malformed, self._malformed_reason)
         return verdict(figures, self._specimen, self._init_parameters)
 
-    # With the result latched nobody waits for an answer from here: at rest this node costs next to nothing.
+    # With the result latched no sample is answered, so the streams are unsubscribed: that saves CPU time.
 
     def _subscribe_streams(self, path: DataPath) -> None:
         path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
         path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
-        self._deaf = False
+        self._unsubscribed = False
 
-    def _listen(self) -> None:
+    def _resume_streams(self) -> None:
         assert self._dialogue is not None
         assert isinstance(self.data_path, DataPath)
-        self.data_path.wake()
-        if self._deaf:
-            self._dialogue.forget_what_was_heard()
+        if self._unsubscribed:
+            self._dialogue.forget_streams()
             self._subscribe_streams(self.data_path)
 
-    def _stop_listening(self) -> None:
+    def _end_streams(self) -> None:
         assert isinstance(self.data_path, DataPath)
         if self.lockstep:
-            self.data_path.rest()  # the sample that waits for the next ramp must not be missed
-            return
+            return  # the sample that waits for the next ramp must not be missed
         self.data_path.unsubscribe(topics.COIL_RIPPLE)
         self.data_path.unsubscribe(topics.CURRENT_SETPOINT)
-        self._deaf = True
+        self._unsubscribed = True
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
         self._send_setpoint(self._setpoint.pack(stamp, (current,)))

@@ -8,7 +8,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.quantity import Quantity
-from mount_models.sampling import SAMPLE_RATE
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
 
 _WIDE = 'chosen: seven standard deviations or more at 1 % ripple noise'
 
@@ -37,8 +37,8 @@ class InitParameters(NamedTuple):
     tail_duration: Annotated[float, Quantity('s', 'time at 0 A at the end', 0.005, 1.0)] = 0.03
     peak_current: Annotated[
         float,
-        Quantity('A', 'highest current of ramp and current-force table', 2.0, 3.0, 'section 3.2'),
-    ] = 3.0
+        Quantity('A', 'highest current of ramp and current-force table', 2.0, HIGHEST_CURRENT, 'section 3.2'),
+    ] = HIGHEST_CURRENT
     light_pressure: Annotated[
         float,
         Quantity('N', 'normal force in the ready position', 0.0, 20.0, 'chosen; section 3.2'),

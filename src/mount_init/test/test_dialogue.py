@@ -249,7 +249,7 @@ def test_another_node_that_has_just_fallen_silent_is_waited_for(bench):
 
 def test_after_a_time_without_listening_it_is_waited_for_quiet_and_no_old_sample_is_answered(bench):
     bench.sample(1)
-    bench.dialogue.forget_what_was_heard()
+    bench.dialogue.forget_streams()
     bench.ending.set()  # a wait ends at once
     with pytest.raises(CoilBusyError):
         bench.dialogue.await_quiet(100.0, bench.ending)

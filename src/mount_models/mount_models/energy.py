@@ -12,8 +12,8 @@ With these means springs, masses and their exchange of energy balance exactly (d
 velocities changes by the mean force times the way), so what remains unbalanced is an error of a law, not of
 the step. Nothing is found as a remainder: losses come from the laws of the parts.
 
-The velocity after t_n is known once the step is done; so the states before and after a step close the books
-for the time at which it began.
+The velocity after t_n is known once the step is done; so the states before and after a step complete the
+balance for the time at which it began.
 """
 
 import math
@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.hydromount import decoupler_overrun, upper_energy
 
 LOSSES = (
@@ -36,7 +37,7 @@ LOSSES = (
 )
 """Parts that dissipate; the decoupler with its stops, the pads by sliding and by creep."""
 
-ACCOUNT = np.dtype(
+ACCOUNT = record_type(
     [
         (name, 'f8')
         for name in (
@@ -62,7 +63,7 @@ def new_account() -> npt.NDArray[Any]:
 
 
 def imbalance(account: Any) -> float:
-    """Return what is neither stored nor dissipated (J) of the work put in; 0 for perfect books."""
+    """Return what is neither stored nor dissipated (J) of the work put in; 0 for a perfect balance."""
     lost = sum(float(account[name]) for name in LOSSES)
     put_in = float(account['road_work'] + account['engine_work'])
     return put_in - lost - float(account['stored'] - account['first_stored'])

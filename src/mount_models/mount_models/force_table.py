@@ -3,20 +3,17 @@
 Everything here uses the fitted law of `actuator.law`; the simulated truth is `closing`.
 """
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
 from mount_models.actuator.law import ForceLaw, checked_current_for_force, checked_force
-from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.interpolation import each_interpolated, interpolated
+from mount_models.sampling import HIGHEST_CURRENT
 
 FloatArray = npt.NDArray[np.float64]
 
 
 class ForceTableError(ValueError):
-    """A current-force table cannot be built, read or used as asked; the text says why and the remedy."""
+    """A current-force table cannot be built; the text says why and the remedy."""
 
 
 def zero_current_rest_gap(
@@ -29,29 +26,6 @@ def zero_current_rest_gap(
     return (
         gap_at_rest_current + float(checked_force(law, rest_current, gap_at_rest_current)) / spring_stiffness
     )
-
-
-def zero_load_contact_gap(
-    law: ForceLaw,
-    spring_stiffness: float,
-    pad_stiffness: float,
-    rest_gap: float,
-    crossing_gap: float,
-    crossing_current: float,
-) -> float:
-    """Return the gap (m) at which the pads just touch, from the gap measured at the 20 mH crossing.
-
-    There the normal force F_N has already compressed the pads, so d_c = d_20 + F_N / k_p (derived; section
-    3.2 uses d_20). `rest_gap` (m) is that at 0 A. Raises `ForceTableError` if nothing presses the pads.
-    """
-    pull = float(checked_force(law, crossing_current, crossing_gap))
-    normal_force = pull - spring_stiffness * (rest_gap - crossing_gap)
-    if not normal_force >= 0.0:
-        raise ForceTableError(
-            f'normal force at {crossing_current:.3f} A ({normal_force:.1f} N) must not be negative: the pads '
-            f'do not touch at {crossing_gap * 1e6:.1f} um; check both gap estimates and the spring stiffness'
-        )
-    return crossing_gap + normal_force / pad_stiffness
 
 
 def contact_force(spring_stiffness: float, rest_gap: float, contact_gap: float) -> float:
@@ -78,7 +52,7 @@ def current_force_table(
     pad_stiffness: float,
     rest_gap: float,
     contact_gap: float,
-    current_high: float = 3.0,
+    current_high: float = HIGHEST_CURRENT,
     step: float = 0.5,
 ) -> FloatArray:
     """Return the current-force table, shape (2, N): rows current (A) and normal force on the pads (N).
@@ -122,34 +96,6 @@ def checked_table(table: npt.ArrayLike) -> FloatArray:
             f'{rows[1, 0]:g} N and {rows[0, 0]:g} A'
         )
     return rows
-
-
-@compiled
-def table_current(current_row, force_row, normal_force):
-    """Return the current (A) for `normal_force` (N), interpolated; NaN below 0 N or past the last entry."""
-    if not 0.0 <= normal_force <= force_row[-1]:
-        return math.nan
-    return interpolated(normal_force, force_row, current_row)
-
-
-@compiled
-def table_normal_force(current_row, force_row, current):
-    """Return the normal force (N) at `current` (A): 0 up to the contact current, NaN past the last entry."""
-    if not 0.0 <= current <= current_row[-1]:
-        return math.nan
-    return interpolated(current, current_row, force_row)
-
-
-def checked_table_current(table: FloatArray, normal_force: npt.ArrayLike) -> FloatArray:
-    """Return the current (A) for normal forces (N) of any shape, or raise `ForceTableError` outside."""
-    wanted = np.asarray(normal_force, float)
-    inside = (wanted >= 0.0) & (wanted <= table[1, -1])
-    if not inside.all():
-        raise ForceTableError(
-            f'normal force ({float(wanted[~inside].flat[0]):.2f} N) must lie within 0.00 .. '
-            f'{table[1, -1]:.2f} N, which {table[0, -1]:.2f} A reach; demand less force'
-        )
-    return each_interpolated(wanted.ravel(), table[1], table[0]).reshape(wanted.shape)[()]
 
 
 def _highest_normal_force(

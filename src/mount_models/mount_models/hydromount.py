@@ -15,12 +15,10 @@ act on the mean of old and new flow, so they never return energy.
 """
 
 import math
-from typing import Annotated, Any, NamedTuple
-
-import numpy as np
-import numpy.typing as npt
+from typing import Annotated, NamedTuple
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
 
 _RESISTANCE = 'Pa s/m^3'
@@ -63,18 +61,13 @@ class Hydromount(NamedTuple):
     stop_resistance: Annotated[float, Quantity(_RESISTANCE, 'R_st: stops of the decoupler', 0.0, 1e10)] = 6e7
 
 
-HYDROMOUNT_STATE = np.dtype(
+HYDROMOUNT_STATE = record_type(
     [
         (name, 'f8')
         for name in ('upper_volume', 'lower_volume', 'track_flow', 'decoupler_flow', 'passed_volume')
     ]
 )
 """V_1, C_2 P_2 and V_d in m^3, flows in m^3/s, half a step earlier."""
-
-
-def resting_hydromount() -> npt.NDArray[Any]:
-    """Return the state (1,) of a hydromount at rest; pass element 0 to `hydromount_step`."""
-    return np.zeros(1, HYDROMOUNT_STATE)
 
 
 @compiled
@@ -106,20 +99,6 @@ def hydromount_step(hydromount, state, displacement_change, dt):
     state.passed_volume += dt * state.decoupler_flow
     state.upper_volume += hydromount.piston_area * displacement_change - through
     state.lower_volume += through
-
-
-@compiled
-def hydromount_response(hydromount, displacement, dt):
-    """Return the fluid's force (N), (n,), for `displacement` (m), (n,), samples `dt` seconds apart.
-
-    The mount is at rest at the first displacement. Add the force of the elastomer.
-    """
-    force = np.zeros(displacement.size)
-    state = np.zeros(1, HYDROMOUNT_STATE)
-    for k in range(1, displacement.size):
-        hydromount_step(hydromount, state[0], displacement[k] - displacement[k - 1], dt)
-        force[k] = hydromount_force(hydromount, state[0])
-    return force
 
 
 @compiled

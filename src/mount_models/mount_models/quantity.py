@@ -1,4 +1,4 @@
-"""Parameters that are born complete: value, unit, sentence, range and source in one place.
+"""Parameters declared in full: value, unit, sentence, range and source in one place.
 
 A parameter set is a `typing.NamedTuple`, which is immutable, readable by name and understood by
 compiled code. Each field is declared as ``Annotated[float, Quantity(unit, meaning, low, high,

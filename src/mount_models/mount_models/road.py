@@ -6,6 +6,7 @@ depend on the other times of the array.
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -68,13 +69,6 @@ class Sweep(NamedTuple):
     ramp_in: _RampIn = 1.0
 
 
-def named_road(name: str, speed: float = 33.0, seed: int = 1) -> RandomRoad:
-    """Return the road of a name in `ROAD_CLASSES`; raises `RoadError` for an unknown one."""
-    if name not in ROAD_CLASSES:
-        raise RoadError(f'no road class is called {name!r}; known are {", ".join(ROAD_CLASSES)}')
-    return checked(RandomRoad(roughness=ROAD_CLASSES[name], speed=speed, seed=seed))
-
-
 def random_road(times: npt.ArrayLike, road: RandomRoad) -> FloatArray:
     """Return heights (n,) in m at `times` (n,) in s: a sum of waves with random phases.
 
@@ -83,21 +77,22 @@ def random_road(times: npt.ArrayLike, road: RandomRoad) -> FloatArray:
     """
     road = checked(road)
     seconds = _times(times)
-    frequencies, amplitudes, phases = _waves(road)
-    spacing = 1.0 / (_POINTS_PER_WAVE * road.highest_frequency)
-    places = road.speed * seconds / spacing
-    node = np.floor(places).astype(np.int64)
-    first = int(node.min()) // _BLOCK
-    last = (int(node.max()) + 1) // _BLOCK
-    height, slope = _waves_on_grid(frequencies * spacing, amplitudes, phases, first, last)
-    return _cubic(height, slope, node - first * _BLOCK, places - node) * _ramp(seconds, road.ramp_in)
+    places = road.speed * seconds / _spacing(road)
+    first = math.floor(places.min()) // _BLOCK
+    last = (math.floor(places.max()) + 1) // _BLOCK
+    blocks = [_block_of_grid(road, block) for block in range(first, last + 1)]
+    curve = _cubic(np.concatenate(blocks, axis=1), places, first * _BLOCK)
+    return np.asarray(curve * _ramp(seconds, road.ramp_in), dtype=np.float64)
 
 
 def gap_in_road(times: npt.ArrayLike, gap: Gap) -> FloatArray:
     """Return heights (n,) in m at `times` (n,) in s, negative in the gap, else 0. Raises `ParameterError`."""
     gap = checked(gap)
     along = (gap.speed * _times(times) - gap.position) / gap.length
-    return np.where((along > 0.0) & (along < 1.0), -gap.depth * sines(0.5 * along), 0.0)
+    inside = (along > 0.0) & (along < 1.0)
+    height = np.zeros_like(along)
+    height[inside] = -gap.depth * sines(0.5 * along[inside])
+    return height
 
 
 def sweep_road(times: npt.ArrayLike, sweep: Sweep) -> FloatArray:
@@ -116,8 +111,18 @@ _WIDEST_CELL_RATIO = 1.05
 _BLOCK = 256  # points of the grid
 
 
-def _waves(road: RandomRoad) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return frequency (cycles/m), amplitude (m), phase (turns) of each wave, one for a cell of the band."""
+class _Waves(NamedTuple):
+    """One wave (n,) for each cell of the band, and how far it turns from the first point of a block on."""
+
+    turns_per_step: FloatArray
+    amplitudes: FloatArray  # m
+    phases: FloatArray  # turns
+    sines_on: FloatArray  # (n, points of a block)
+    cosines_on: FloatArray
+
+
+@lru_cache(maxsize=4)
+def _waves(road: RandomRoad) -> _Waves:
     if not road.highest_frequency > road.lowest_frequency:
         raise RoadError(
             f'highest_frequency ({road.highest_frequency:g} cycles/m) must lie above lowest_frequency '
@@ -129,7 +134,15 @@ def _waves(road: RandomRoad) -> tuple[FloatArray, FloatArray, FloatArray]:
     middle = np.sqrt(edges[:-1] * edges[1:])
     fall = np.array([exp(-road.waviness * log(ratio)) for ratio in middle / REFERENCE_FREQUENCY])
     amplitudes = np.sqrt(2.0 * road.roughness * fall * np.diff(edges))
-    return frequencies, amplitudes, random.uniform(middle.size)
+    turns = frequencies * _spacing(road)
+    within = np.outer(turns, np.arange(_BLOCK))
+    on = (function(within.ravel()).reshape(within.shape) for function in (sines, cosines))
+    return _Waves(turns, amplitudes, random.uniform(middle.size), *on)
+
+
+def _spacing(road: RandomRoad) -> float:
+    """Return the distance between points of the grid in m."""
+    return 1.0 / (_POINTS_PER_WAVE * road.highest_frequency)
 
 
 def _cell_edges(road: RandomRoad) -> Iterator[float]:
@@ -140,39 +153,46 @@ def _cell_edges(road: RandomRoad) -> Iterator[float]:
     yield road.highest_frequency
 
 
+@lru_cache(maxsize=8)
+def _block_of_grid(road: RandomRoad, block: int) -> FloatArray:
+    """Return height and slope per step, (2, points), of a block of the grid; the next times need it too."""
+    return _sum_of_waves(*_waves(road), block)
+
+
 @compiled
-def _waves_on_grid(turns_per_step, amplitudes, phases, first, last):
-    """Return the sum of the waves and its slope per step at all points of the blocks `first` .. `last`.
+def _sum_of_waves(turns_per_step, amplitudes, phases, sines_on, cosines_on, block):
+    """Return the sum of the waves and its slope per step, (2, points), at the points of a block.
 
     At each point the waves are added in their order, so that a point is the same in whatever company. A block
     begins where its number says; within it, each wave is turned on by what one table holds for all blocks.
     """
-    height, slope = np.zeros((last - first + 1, _BLOCK)), np.zeros((last - first + 1, _BLOCK))
-    sine_on, cosine_on = np.empty(_BLOCK), np.empty(_BLOCK)
+    total = np.zeros((2, _BLOCK))
+    heights, slopes = total[0], total[1]
     for wave in range(turns_per_step.size):
         turns, amplitude = turns_per_step[wave], amplitudes[wave]
+        sine_on, cosine_on = sines_on[wave], cosines_on[wave]
+        sine, cosine = sine_and_cosine(turns * (block * _BLOCK) + phases[wave])
+        a, b = amplitude * cosine, amplitude * sine
+        angle = 2.0 * math.pi * turns
         for place in range(_BLOCK):
-            sine_on[place], cosine_on[place] = sine_and_cosine(turns * place)
-        for block in range(first, last + 1):
-            sine, cosine = sine_and_cosine(turns * (block * _BLOCK) + phases[wave])
-            a, b = amplitude * cosine, amplitude * sine
-            angle = 2.0 * math.pi * turns
-            heights, slopes = height[block - first], slope[block - first]
-            for place in range(_BLOCK):
-                heights[place] += a * cosine_on[place] - b * sine_on[place]
-                slopes[place] -= angle * (a * sine_on[place] + b * cosine_on[place])
-    return height.ravel(), slope.ravel()
+            heights[place] += a * cosine_on[place] - b * sine_on[place]
+            slopes[place] -= angle * (a * sine_on[place] + b * cosine_on[place])
+    return total
 
 
-def _cubic(
-    height: FloatArray, slope: FloatArray, node: npt.NDArray[np.int64], part: FloatArray
-) -> FloatArray:
-    """Return the cubic Hermite curve at `part` (0 .. 1) of the way from each `node` to the next."""
-    rest = 1.0 - part
-    ends = rest * rest * (1.0 + 2.0 * part) * height[node]
-    ends += part * part * (1.0 + 2.0 * rest) * height[node + 1]
-    bend = part * rest * (rest * slope[node] - part * slope[node + 1])
-    return np.asarray(ends + bend, dtype=np.float64)
+@compiled
+def _cubic(points, places, first):
+    """Return the cubic Hermite curve at `places`, in steps of the grid; `points` begin at `first`."""
+    height, slope = points[0], points[1]
+    curve = np.empty(places.size)
+    for k in range(places.size):
+        node = math.floor(places[k])
+        part = places[k] - node
+        rest, left, right = 1.0 - part, node - first, node - first + 1
+        ends = rest * rest * (1.0 + 2.0 * part) * height[left]
+        ends += part * part * (1.0 + 2.0 * rest) * height[right]
+        curve[k] = ends + part * rest * (rest * slope[left] - part * slope[right])
+    return curve
 
 
 def _ramp(seconds: FloatArray, ramp_in: float) -> FloatArray:

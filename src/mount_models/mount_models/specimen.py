@@ -25,6 +25,7 @@ from mount_models.friction.coefficient_check import CoefficientsRefusedError, ch
 from mount_models.friction.contact import FrictionContact
 from mount_models.provenance import ProvenanceError, check_provenance
 from mount_models.quantity import Quantity, quantities
+from mount_models.sampling import HIGHEST_CURRENT
 
 T = TypeVar('T', bound=NamedTuple)
 
@@ -60,7 +61,7 @@ class Specimen:
     ] = 20e-3
     current_limit: Annotated[
         float, Quantity('A', 'largest current of the coil', 0.1, 20.0, 'section 3.2')
-    ] = 3.0
+    ] = HIGHEST_CURRENT
     temperature: TemperatureCompensation | None = None
     friction: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)

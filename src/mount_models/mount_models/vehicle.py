@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.elastomer import Elastomer, branch_step, elastomer_force
 from mount_models.quantity import Quantity
 
@@ -21,11 +22,11 @@ FloatArray = npt.NDArray[np.float64]
 
 _BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
 _BODIES = ('wheel', 'body', 'chassis', 'engine')
-VEHICLE_STATE = np.dtype(
+VEHICLE_STATE = record_type(
     [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + _BRANCHES
 )
 """Heights (m) and velocities (m/s) of the four bodies, forces (N) of the elastomer's branches."""
-ENGINE_STATE = np.dtype([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
+ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
 """Mount displacement x (m), its velocity (m/s), forces (N) of the elastomer's branches."""
 
 
@@ -129,11 +130,6 @@ def resting_vehicle() -> npt.NDArray[Any]:
     return np.zeros(1, VEHICLE_STATE)
 
 
-def resting_engine() -> npt.NDArray[Any]:
-    """Return the state (1,) of an engine at rest; pass element 0 to `engine_step`."""
-    return np.zeros(1, ENGINE_STATE)
-
-
 def modes(vehicle: Vehicle, mount_stiffness: float | None = None) -> FloatArray:
     """Return the four undamped natural frequencies (Hz); `mount_stiffness` in N/m, k_e if not given."""
     mount = vehicle.elastomer.static_stiffness if mount_stiffness is None else mount_stiffness
@@ -145,28 +141,3 @@ def modes(vehicle: Vehicle, mount_stiffness: float | None = None) -> FloatArray:
     scale = 1.0 / np.sqrt(masses)
     squares = np.linalg.eigvalsh(stiffness * np.outer(scale, scale))
     return np.asarray(np.sqrt(squares) / (2.0 * np.pi), dtype=np.float64)
-
-
-def mechanical_energy(vehicle: Vehicle, state: Any, road_height: float = 0.0) -> float:
-    """Return the energy (J) of a record of `VEHICLE_STATE`: motion, springs, springs of the branches."""
-    elastomer = vehicle.elastomer
-    motion = (
-        vehicle.wheel_mass * state['wheel_velocity'] ** 2
-        + vehicle.body_mass * state['body_velocity'] ** 2
-        + vehicle.chassis_mass * state['chassis_velocity'] ** 2
-        + vehicle.engine_mass * state['engine_velocity'] ** 2
-    )
-    springs = (
-        vehicle.tyre_stiffness * (road_height - state['wheel_height']) ** 2
-        + vehicle.suspension_stiffness * (state['wheel_height'] - state['body_height']) ** 2
-        + vehicle.chassis_stiffness * (state['body_height'] - state['chassis_height']) ** 2
-        + elastomer.static_stiffness * (state['engine_height'] - state['chassis_height']) ** 2
-    )
-    branches = 0.0
-    for force, stiffness in (
-        (state['slow_force'], elastomer.slow_stiffness),
-        (state['middle_force'], elastomer.middle_stiffness),
-        (state['fast_force'], elastomer.fast_stiffness),
-    ):
-        branches += force**2 / stiffness if stiffness > 0.0 else 0.0
-    return float(0.5 * (motion + springs + branches))

@@ -7,93 +7,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_models.actuator.closing import ClosingMechanics, closed_state
-from mount_models.actuator.closing import contact_force as true_contact_force
 from mount_models.actuator.law import ForceOutsideLaw, GapOutsideLaw, OutsideLawError, force
-from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.coil.crossing import find_crossing
-from mount_models.coil.gap import gap_from_crossing_current, rest_gap_from_inductance
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
+from mount_models.arithmetic.interpolation import interpolated
 from mount_models.force_table import (
     ForceTableError,
     checked_table,
-    checked_table_current,
     contact_force,
     current_force_table,
     offset_current,
-    table_current,
-    table_normal_force,
-    zero_current_rest_gap,
-    zero_load_contact_gap,
 )
 from mount_models.specimen import default_specimen
 
-MAGNET, COIL, MOUNT = ReluctanceActuator(), RippleCoil(), ClosingMechanics()
 KNOWN = default_specimen()
 LAW, SPRING, PADS = KNOWN.force_law, KNOWN.spring_stiffness, KNOWN.pad_stiffness
 REST, CONTACT = 508e-6, 349e-6
 TABLE = current_force_table(LAW, SPRING, PADS, REST, CONTACT)
-
-
-@pytest.fixture(scope='module')
-def initialised():
-    """Return what an initialisation without noise finds: raw contact gap, corrected contact gap, rest gap."""
-    currents = np.linspace(0.0, 3.0, 1501)
-    gap, inductances = MOUNT.rest_gap, []
-    for current in currents:
-        gap, _ = closed_state(MOUNT, MAGNET, current, gap)
-        inductances.append(incremental_inductance(COIL, MAGNET, current, gap))
-    crossing = find_crossing(currents, inductances)
-    at_crossing = float(gap_from_crossing_current(KNOWN.gap_curves, crossing.current))
-    at_rest_current = float(rest_gap_from_inductance(KNOWN.gap_curves, np.interp(0.2, currents, inductances)))
-    rest = zero_current_rest_gap(LAW, SPRING, at_rest_current, KNOWN.rest_current)
-    contact = zero_load_contact_gap(LAW, SPRING, PADS, rest, at_crossing, crossing.current)
-    return at_crossing, contact, rest
-
-
-def true_normal_forces(currents):
-    return np.array([closed_state(MOUNT, MAGNET, current, MOUNT.contact_gap)[1] for current in currents])
-
-
-def test_an_initialisation_without_noise_finds_both_gaps_within_one_micrometre(initialised):
-    _, contact, rest = initialised
-    assert contact == pytest.approx(MOUNT.contact_gap, abs=1e-6)
-    assert rest == pytest.approx(MOUNT.rest_gap, abs=1e-6)
-
-
-def test_an_initialisation_without_noise_finds_the_contact_force_within_one_per_cent(initialised):
-    _, contact, rest = initialised
-    assert contact_force(SPRING, rest, contact) == pytest.approx(true_contact_force(MOUNT), rel=0.01)
-
-
-def test_the_gap_at_the_crossing_is_not_yet_the_contact_gap(initialised):
-    raw, _, _ = initialised
-    assert 1e6 * raw == pytest.approx(341.2, abs=0.2)
-
-
-def test_correcting_the_contact_gap_to_zero_load_avoids_most_of_the_force_error(initialised):
-    raw, contact, rest = initialised
-    currents = np.linspace(0.48, 1.15, 200)
-    truth = true_normal_forces(currents)
-
-    def error(gap):
-        table = current_force_table(LAW, SPRING, PADS, rest, gap)
-        estimate = np.interp(currents, table[0], table[1])
-        return math.sqrt(np.mean((estimate - truth) ** 2)) / truth.max()
-
-    assert error(contact) < 0.006
-    assert error(raw) > 0.02
-
-
-def test_the_table_meets_the_true_normal_force_within_one_per_cent_of_the_magnets_force(initialised):
-    _, contact, rest = initialised
-    currents = np.linspace(0.48, 3.0, 200)
-    truth = true_normal_forces(currents)
-    table = current_force_table(LAW, SPRING, PADS, rest, contact)
-    error = np.interp(currents, table[0], table[1]) - truth
-    assert np.all(np.abs(error) <= 0.01 * (truth + 22.26))  # of which the spring takes its part
-    strong = truth > 20.0
-    assert np.sqrt(np.mean((error[strong] / truth[strong]) ** 2)) <= 0.01
 
 
 @pytest.mark.parametrize(
@@ -136,42 +64,12 @@ def test_the_last_entry_balances_too():
 
 
 @settings(deadline=None)
-@given(wanted=st.floats(0.0, 1.0))
-def test_current_and_force_lead_back_through_the_table(wanted):
-    normal_force = wanted * TABLE[1, -1]
-    current = table_current(TABLE[0], TABLE[1], normal_force)
-    assert table_normal_force(TABLE[0], TABLE[1], current) == pytest.approx(normal_force, abs=1e-9)
-    assert current == pytest.approx(np.interp(normal_force, TABLE[1], TABLE[0]), abs=1e-12)
-
-
-@settings(deadline=None)
 @given(normal_force=st.floats(0.5, 303.0))
 def test_between_entries_the_table_holds_the_law_within_half_a_per_cent(normal_force):
-    current = table_current(TABLE[0], TABLE[1], normal_force)
+    current = interpolated(normal_force, TABLE[1], TABLE[0])
     gap = CONTACT - normal_force / PADS
     net = force(LAW, current, gap) - SPRING * (REST - gap)
     assert net == pytest.approx(normal_force, rel=0.005)
-
-
-def test_below_the_contact_current_nothing_presses():
-    assert table_normal_force(TABLE[0], TABLE[1], 0.0) == 0.0
-    assert table_normal_force(TABLE[0], TABLE[1], TABLE[0, 0]) == 0.0
-    assert table_normal_force(TABLE[0], TABLE[1], TABLE[0, 0] + 1e-3) > 0.0
-
-
-@pytest.mark.parametrize('value', [-1e-6, 400.0, math.nan])
-def test_outside_the_table_the_answer_is_unknown(value):
-    assert math.isnan(table_current(TABLE[0], TABLE[1], value))
-    assert math.isnan(table_normal_force(TABLE[0], TABLE[1], value))
-    with pytest.raises(ForceTableError, match=r'must lie within 0\.00 \.\. 30.* N, which 3\.00 A reach'):
-        checked_table_current(TABLE, [10.0, value])
-
-
-def test_the_checked_inverse_takes_arrays():
-    assert checked_table_current(TABLE, [[0.0, 50.0]]).shape == (1, 2)
-    assert checked_table_current(TABLE, 100.0) == pytest.approx(
-        table_current(TABLE[0], TABLE[1], 100.0), abs=1e-12
-    )
 
 
 @settings(deadline=None, max_examples=40)
@@ -217,11 +115,6 @@ def test_a_current_beyond_the_law_is_refused():
 def test_a_step_that_is_not_positive_is_refused(step):
     with pytest.raises(ForceTableError, match='must be positive'):
         current_force_table(LAW, SPRING, PADS, REST, CONTACT, step=step)
-
-
-def test_a_crossing_without_contact_is_refused():
-    with pytest.raises(ForceTableError, match='must not be negative'):
-        zero_load_contact_gap(LAW, SPRING, PADS, REST, 345e-6, 0.3)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.energy import ACCOUNT, LOSSES, book_step, imbalance, new_account
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -19,7 +20,7 @@ HYDROMOUNT = Hydromount()
 CONTACT = FrictionContact()
 COEFFICIENTS = FrictionCoefficients()
 DT = 5e-5
-STATE = np.dtype(
+STATE = record_type(
     [
         ('vehicle', VEHICLE_STATE),
         ('hydromount', HYDROMOUNT_STATE),

@@ -12,7 +12,6 @@ from mount_models.road import (
     RoadError,
     Sweep,
     gap_in_road,
-    named_road,
     random_road,
     sweep_road,
 )
@@ -24,7 +23,7 @@ def density(heights, spacing, segment):
 
 @pytest.mark.parametrize('name', ROAD_CLASSES)
 def test_random_road_has_the_density_of_its_class(name):
-    road = named_road(name)._replace(ramp_in=0.0)
+    road = RandomRoad(roughness=ROAD_CLASSES[name], ramp_in=0.0)
     spacing = 0.05
     heights = random_road(np.arange(0.0, 6000.0, spacing) / road.speed, road)
     frequency, found = density(heights, spacing, 8192)
@@ -117,11 +116,6 @@ def test_sweep_begins_level_and_then_has_its_formula():
     assert sweep_road([7.0], sweep)[0] == pytest.approx(
         -0.2 / (2.0 * np.pi * 8.0) * np.cos(2.0 * np.pi * (7.0 + 24.5)), rel=1e-9
     )
-
-
-def test_unknown_road_class_is_refused():
-    with pytest.raises(RoadError, match="no road class is called 'E'; known are motorway, A, B, C, D"):
-        named_road('E')
 
 
 @pytest.mark.parametrize(

@@ -1,1 +1,1 @@
-"""A recording once more through the controller: in the core, through the real node, or to look at."""
+"""A recording once more through the controller: in the core, through the real node, or for viewing."""

@@ -1,7 +1,7 @@
 """Replay through the real nodes over topics: each sample is sent when the one before it was answered.
 
 Player and nodes share this process and one data thread, in a namespace of their own, so that a graph which
-runs in the same domain neither hears nor disturbs them. A sample that is not answered ends the replay.
+runs in the same domain neither receives nor disturbs them. A sample that is not answered ends the replay.
 """
 
 import os
@@ -26,7 +26,8 @@ from mount_replay.core import OFF, ControlAnswers, Progress, RampAnswers, Replay
 from mount_replay.given.input import Column, ControlRun, ReplayError, ReplayInput, Times
 from mount_replay.given.ramps import MeasuredGap, Ramp
 from mount_ros import topics
-from mount_ros.data_path import DataPath, DataThread
+from mount_ros.data_path import DataPath
+from mount_ros.data_thread import DataThread
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import from_bytes, to_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of

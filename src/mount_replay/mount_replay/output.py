@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import String
 
 from mount_bags.bag.writer import BagWriter
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import session_message, session_text
 from mount_replay.core import OFF, ControlAnswers, Replayed
 from mount_replay.given.input import ReplayInput
 from mount_ros import topics
@@ -41,7 +40,7 @@ def write_replay(folder: Path, given: ReplayInput, replayed: Replayed, session: 
     entries.sort(key=lambda entry: entry[:2])
     begin = entries[0][0]
     try:
-        writer.write(prefix + topics.SESSION.name, serialised(String(data=session_text(session))), begin)
+        writer.write(prefix + topics.SESSION.name, session_message(session_text(session)), begin)
         for time, _, topic, raw in entries:
             writer.write(prefix + topic.name, raw, time)
     finally:

@@ -3,13 +3,14 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from mount_bags.bag.recording import Recording
 from mount_bags.run.folder import RunFolder, make_run_folder
 from mount_bags.run.place import open_run
+from mount_bags.run.session import session_parameters, time_text
+from mount_bags.run.versions import versions
 from mount_bringup.chosen import (
     Parameters,
     check_policy,
@@ -36,7 +37,7 @@ REPLAYED_NODES = ('mount_control', 'mount_init')
 
 @dataclass(frozen=True)
 class ReplayOrder:
-    """What the user wants; `changes` are parameters other than those recorded, {node: {parameter: value}}.
+    """What the user orders; `changes` are parameters other than those recorded, {node: {parameter: value}}.
 
     `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one.
     """
@@ -221,21 +222,18 @@ def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
 
 
 def _session(order: ReplayOrder, outcome: ReplayOutcome) -> dict[str, Any]:
-    from mount_bags.run.versions import versions
-
     given = outcome.given
-    recorded = given.session.get('parameters')
     return {
         'scenario': 'replay',
         **given.session,
         'parameters': {
-            **(recorded if isinstance(recorded, dict) else {}),
+            **session_parameters(given.session),
             **{node: dict(values) for node, values in outcome.parameters.items()},
         },
         'replay': {
             'of': given.source,
             'mode': order.mode,
-            'made': datetime.now().astimezone().isoformat(timespec='seconds'),
+            'made': time_text(),
             'changed': {node: dict(values) for node, values in order.changes.items()},
             'table': order.table and Path(order.table).name,
             'notes': list(given.notes),

@@ -1,16 +1,15 @@
 """What a replay says at its end: the figures of `--json`, and the same in words."""
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from mount_bags.compare.signal_difference import Moment
 from mount_bags.events.switching_changes import Switching
-from mount_bags.run.versions import versions
-from mount_bringup.terminal import note
+from mount_bags.run.screen import Screen, Table
+from mount_bags.run.versions import version_differences, versions, versions_sentence
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.agreement import (
     SETTLED,
@@ -21,7 +20,6 @@ from mount_replay.agreement import (
 )
 from mount_replay.core import Replayed
 from mount_replay.given.input import ReplayInput
-from mount_replay.recorded_versions import version_differences, versions_sentence
 from mount_replay.replay import LOCKSTEP, ReplayOutcome
 
 _SHOWN = 8  # switchings in the printed summary
@@ -71,30 +69,29 @@ def replay_figures(outcome: ReplayOutcome) -> dict[str, Any]:
     }
 
 
-def print_replay(outcome: ReplayOutcome, figures: dict[str, Any], console: Console) -> None:
+def print_replay(outcome: ReplayOutcome, figures: dict[str, Any], screen: Screen) -> None:
     """Print what a replay gave."""
-    table = Table(title=f'replay of {figures["source"]}, {figures["mode"]}', show_header=False)
-    table.title_justify = 'left'
-    table.add_column(style='bold')
-    table.add_column()
-    table.add_row('replayed', _replayed_text(figures))
-    table.add_row('settings', _settings_text(outcome))
-    for place, sentence in enumerate(_verdict(outcome)):
-        table.add_row('' if place else 'setpoints', sentence)
+    rows = [
+        ('replayed', _replayed_text(figures)),
+        ('settings', _settings_text(outcome)),
+        *_named('setpoints', _verdict(outcome)),
+    ]
     if outcome.order.foreign is None:
-        table.add_row('versions', versions_sentence(figures['recorded_with'], versions()))
-    table.add_row(
-        'damping switched', _switching_text(Switching(figures['switch_on_s'], figures['switch_off_s']))
-    )
+        rows.append(('versions', versions_sentence(figures['recorded_with'], versions())))
+    switching = Switching(figures['switch_on_s'], figures['switch_off_s'])
+    rows.append(('damping switched', _switching_text(switching)))
     if figures['recorded_switch_on_s'] is not None:
-        for place, sentence in enumerate(_changes_text(figures['switching_changes'])):
-            table.add_row('' if place else 'against the recording', sentence)
-    table.add_row('peak current', _peak_text(figures))
-    for place, sentence in enumerate(_speed_text(outcome, figures)):
-        table.add_row('' if place else 'speed', sentence)
-    console.print(table)
+        rows += _named('against the recording', _changes_text(figures['switching_changes']))
+    rows.append(('peak current', _peak_text(figures)))
+    rows += _named('speed', _speed_text(outcome, figures))
+    screen.table(Table(f'replay of {figures["source"]}, {figures["mode"]}', 'll', rows))
     for sentence in figures['notes']:
-        note(console, sentence)
+        screen.note(sentence)
+
+
+def _named(name: str, sentences: Iterable[str]) -> list[tuple[str, str]]:
+    """Return a row for each sentence, the first with the name."""
+    return [('' if place else name, sentence) for place, sentence in enumerate(sentences)]
 
 
 def _replayed_text(figures: dict[str, Any]) -> str:

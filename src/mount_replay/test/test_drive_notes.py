@@ -3,9 +3,9 @@
 import io
 
 import pytest
-from rich.console import Console
 
 from mount_bags.run.folder import make_run_folder
+from mount_bags.run.screen import Screen
 from mount_bringup.graph.nodes import CONTROL, RECORDER
 from mount_replay.drive import drive
 from mount_replay.drive.drive import DriveOrder
@@ -50,11 +50,11 @@ class Graph:
 @pytest.mark.parametrize('mode', ['real time', 'lock-step'])
 def test_a_drive_that_goes_on_without_its_recording_says_so_once(tmp_path, monkeypatch, mode):
     monkeypatch.setattr(drive, 'Supervisor', Graph)
-    console = Console(record=True, file=io.StringIO())
+    shown = io.StringIO()
     folder = make_run_folder(tmp_path / 'run', 'bench')
     order = DriveOrder('bench', mode, {}, domain=0)
-    drive._drive_graph(order, Excitation(Seat.BENCH, [], 5e-5, 0.0), folder, console, [])
-    assert console.export_text().count('goes on without recording') == 1
+    drive._drive_graph(order, Excitation(Seat.BENCH, [], 5e-5, 0.0), folder, Screen(shown), [])
+    assert shown.getvalue().count('goes on without recording') == 1
 
 
 def test_each_domain_and_namespace_has_a_bus_of_its_own_where_nobody_else_is_given_a_port():

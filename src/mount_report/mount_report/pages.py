@@ -1,15 +1,13 @@
 """Writes the page and the pictures of a report, with a progress bar."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-
-from rich.console import Console
 
 from mount_bags.bag.recording import Recording
 from mount_bags.compare.alignment import ComparisonError
 from mount_bags.compare.compare import compare
-from mount_bringup.progress_bar import progress_bar
-from mount_bringup.terminal import note
+from mount_bags.run.screen import Screen
 from mount_report.report import ReportError, make_report, subjects_of
 from mount_report.run_facts import run_facts
 
@@ -36,33 +34,28 @@ def write_report(
     other: Recording | None,
     file: Path,
     pictures: Path | None,
-    console: Console,
+    screen: Screen,
 ) -> list[Path]:
-    """Write the page to `file` and its figures into `pictures` unless that is None; return those files.
+    """Write the page to `file` and its charts into `pictures` unless that is None; return those files.
 
-    With `other`, it shares the figures and its differences from the first recording are told. What could
+    With `other`, it shares the charts and its differences from the first recording are told. What could
     not be made of the page is printed. Raises `ReportError`.
     """
-    with progress_bar(console, transient=True) as progress:
-        task = progress.add_task('reading', total=1.0)
-
-        def on_step(what: str, share: float) -> None:
-            progress.update(task, description=what, completed=share)
-
+    with screen.bar('reading', transient=True) as show:
         together = [*recordings, *([other] if other is not None else [])]
         subjects = subjects_of(together, run_facts)
-        on_step('comparing', 0.2)
-        comparison = _comparison(recordings[0], other)
-        made = make_report(subjects, comparison, lambda what, share: on_step(what, 0.2 + 0.4 * share))
+        show(0.2, 'comparing')
+        subjects[-1] = replace(subjects[-1], comparison=_comparison(recordings[0], other))
+        made = make_report(subjects, lambda what, share: show(0.2 + 0.4 * share, what))
         for failure in made.failures:
-            note(console, failure)
-        on_step('writing the page', 0.6)
+            screen.note(failure)
+        show(0.6, 'writing the page')
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             made.write_page(file)
             if pictures is None:
                 return []
-            return made.write_pictures(pictures, lambda what, share: on_step(what, 0.7 + 0.3 * share))
+            return made.write_pictures(pictures, lambda what, share: show(0.7 + 0.3 * share, what))
         except OSError as error:
             raise ReportError(
                 f'{error.filename or file} cannot be written: {error.strerror}; choose another --out'

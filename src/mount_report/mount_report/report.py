@@ -4,21 +4,35 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mount_bags.audit.audit import audit
-from mount_bags.audit.losses import losses
 from mount_bags.bag.recording import Recording
 from mount_bags.compare.alignment import ComparisonError, align
-from mount_bags.compare.compare import Comparison
 from mount_report.drawing.interactive import POINTS
 from mount_report.drawing.page import page
-from mount_report.sections import run_sections
-from mount_report.sections import signal_sections as sections
+from mount_report.sections import run_sections, signal_sections
 from mount_report.sections.section import Section
 from mount_report.sections.subject import RunFacts, Subject
 from mount_report.signals import Signals
 
 OnStep = Callable[[str, float], None]
-"""Hears what is being done, and the share of all that is done."""
+"""Called with what is being done, and the share of all that is done."""
+
+MakeSection = Callable[[Sequence[Subject]], Section | None]
+
+SECTIONS: tuple[MakeSection, ...] = (
+    signal_sections.traces,
+    signal_sections.signals,
+    signal_sections.switching,
+    signal_sections.loops,
+    signal_sections.harmonics,
+    signal_sections.spectra,
+    signal_sections.sweep,
+    run_sections.coil,
+    run_sections.tracking,
+    run_sections.losses,
+    run_sections.differences,
+    run_sections.parameters,
+)
+"""What a report holds below its overview; a function returns None where it has nothing to say."""
 
 _TOGETHER = 6  # recordings in one report: more colours cannot be told apart
 
@@ -74,51 +88,24 @@ def subjects_of(
     return [Subject(signals, facts(signals)) for signals in all_signals]
 
 
-def make_report(
-    subjects: Sequence[Subject],
-    comparison: Comparison | None = None,
-    on_step: OnStep = lambda what, share: None,
-) -> Report:
-    """Return the report of `subjects`; a `comparison` adds the differences that it found.
-
-    In the place of a section that could not be made stands why.
-    """
-    audits, found = [], []
-    for place, subject in enumerate(subjects):
-        on_step(f'auditing {subject.name}', 0.3 * place / len(subjects))
-        audits.append(audit(subject.signals.recording))
-        found.append(losses(subject.signals.recording, audits[-1]))
-    makers: list[tuple[str, Callable[[], Section | None]]] = [
-        ('traces', lambda: sections.traces(subjects)),
-        ('signals', lambda: sections.plain(subjects)),
-        ('switching', lambda: sections.switching(subjects)),
-        ('loops', lambda: sections.loops(subjects)),
-        ('harmonics', lambda: sections.harmonic_content(subjects)),
-        ('spectra', lambda: sections.spectra(subjects)),
-        ('sweep', lambda: sections.sweep_view(subjects)),
-        ('coil', lambda: run_sections.coil(subjects)),
-        ('tracking', lambda: run_sections.tracking(subjects)),
-        ('losses', lambda: run_sections.losses(subjects, audits, found)),
-        ('differences', lambda: None if comparison is None else run_sections.differences(comparison)),
-        ('parameters', lambda: run_sections.parameters(subjects)),
-    ]
+def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda what, share: None) -> Report:
+    """Return the report of `subjects`; in the place of a section that could not be made stands why."""
     made: list[Section] = []
     failures: list[str] = []
-    for place, (what, make) in enumerate(makers):
-        on_step(what, 0.3 + 0.7 * place / len(makers))
-        made += _section_or_reason(what, make, failures)
-    # Last, for it also says what the others looked for in vain.
-    overview = _section_or_reason(
-        'overview', lambda: run_sections.overview(subjects, audits, found), failures
-    )
+    for place, make in enumerate(SECTIONS):
+        on_step(make.__name__, place / len(SECTIONS))
+        made += _section_or_reason(make, subjects, failures)
+    # Last, because it also says what the others did not find.
+    overview = _section_or_reason(run_sections.overview, subjects, failures)
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
     return Report(title, [*overview, *made], POINTS // len(subjects), failures)
 
 
-def _section_or_reason(what: str, make: Callable[[], Section | None], failures: list[str]) -> list[Section]:
+def _section_or_reason(make: MakeSection, subjects: Sequence[Subject], failures: list[str]) -> list[Section]:
+    what = make.__name__
     try:
-        section = make()
-    except Exception as error:  # whatever it stumbles over: the other sections are worth having
+        section = make(subjects)
+    except Exception as error:  # of any kind: the other sections are still of use
         reason = str(error) or type(error).__name__
         failures.append(f'section {what} could not be made: {reason}')
         return [Section(what, what.capitalize(), [f'Section {what} could not be made: {reason}'])]

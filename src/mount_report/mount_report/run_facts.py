@@ -1,17 +1,16 @@
 """What a recording's session tells of its run: levels, coil, damper. A report draws and computes with it."""
 
-from typing import Any
-
 import numpy as np
-import yaml
 
+from mount_bags.run.session import SessionError, session_content, session_parameters
 from mount_bringup.chosen import Parameters, chosen_damper, control_parameters, switched_viscous_parameters
 from mount_bringup.mount_choice import seat_of
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
-from mount_report.drive.evaluation import load_drive, tracking_error, wanted_force
-from mount_report.sections.figures import Levels
+from mount_report.drive.evaluation import tracking_error, wanted_force
+from mount_report.drive.signals import load_drive
+from mount_report.sections.charts import Levels
 from mount_report.sections.subject import RunFacts, Tracking
 from mount_report.signals import Signals
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
@@ -33,10 +32,8 @@ def run_facts(signals: Signals) -> RunFacts:
             tracking_remark='the recording has no session that tells which force was wanted',
         )
     try:
-        levels, highest = (
-            switched_viscous_parameters(parameters),
-            control_parameters(parameters).highest_current,
-        )
+        levels = switched_viscous_parameters(parameters)
+        highest = control_parameters(parameters).highest_current
         coil = with_flattened(RippleCoil(), parameters.get('mount_sim', {}), 'coil')
         no_friction = without_friction(seat_of(parameters))
     except (ValueError, TypeError, AttributeError) as error:
@@ -60,13 +57,9 @@ def run_facts(signals: Signals) -> RunFacts:
 def _parameters(session: str) -> Parameters | None:
     """Return the parameters by node, None where the session tells none."""
     try:
-        content: Any = yaml.safe_load(session)
-    except yaml.YAMLError:
+        return session_parameters(session_content(session)) or None
+    except SessionError:
         return None
-    found = content.get('parameters') if isinstance(content, dict) else None
-    if not isinstance(found, dict):
-        return None
-    return {str(node): values for node, values in found.items() if isinstance(values, dict)}
 
 
 def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None, str]:
@@ -83,8 +76,8 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
         return None, f'it cannot be computed: {reason}'
     shift = (drive.zero - signals.zero) / 1e9
     # What the controller wants while damping is off is no force.
-    active = np.interp(drive.true_time, drive.time, drive.damping_active.astype(float)) > 0.5
+    active = np.interp(drive.truth.time, drive.seen.time, drive.seen.damping_active.astype(float)) > 0.5
     shown = np.where(active, wanted, 0.0)
-    tracking = Tracking(drive.true_time + shift, shown, drive.friction_force, error)
+    tracking = Tracking(drive.truth.time + shift, shown, drive.truth.friction_force, error)
     chosen = parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER)
     return tracking, f'wanted is the force of damper {chosen} at the true velocity in the band, without delay'

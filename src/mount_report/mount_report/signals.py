@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import ReadingError, Recording
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import switching_times
 from mount_bags.messages.series import Series, SeriesError
-from mount_bags.messages.time_axis import time_axis
-from mount_bags.run.session_differences import session_text
+from mount_bags.run.session import recorded_session
 from mount_report.drawing.chart import Array
 from mount_ros.messages.event import Mark
 from mount_ros.topics import (
@@ -53,19 +51,19 @@ class Signals:
     def __init__(self, recording: Recording, name: str = '', zero: int | None = None):
         """Take a recording and what to call it; `zero` (ns): where time begins, if not as its axis says."""
         self.recording = recording
-        self.name = name or short_name(recording)
+        self.name = name or recording.short_name
         self.missing: list[str] = []
         self._found: dict[tuple[str, str], Signal | None] = {}
         self._orders: dict[str, tuple[Array, slice | NDArray[np.int64]]] = {}  # times, places of the values
         recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
-        self.axis = time_axis(recording)
+        self.axis = recording.time_axis
         self.zero = self.axis.zero if zero is None else zero
 
     @property
     def session(self) -> str:
         """The text of its session message, empty where it has none."""
         try:
-            return session_text(self.recording)
+            return recorded_session(self.recording)
         except (ReadingError, SeriesError):
             return ''
 

@@ -10,7 +10,7 @@ MARK_DEPTH = 100  # chosen
 
 
 def publisher_qos(topic: Topic) -> QoSProfile:
-    """Return what the publisher of `topic` offers: always reliable, so that nobody is refused."""
+    """Return what the publisher of `topic` offers: always reliable, which suits every subscriber."""
     if topic.delivery is Delivery.LATCHED:
         return _profile(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
     depth = STREAM_DEPTH if topic.delivery is Delivery.STREAM else MARK_DEPTH

@@ -1,7 +1,7 @@
-"""For tests of nodes: ROS domains that nobody else uses, one context, one way to wait; a plugin of pytest.
+"""For tests of nodes: ROS domains of their own, one context, one way to wait; a plugin of pytest.
 
 A participant that was killed stays in its domain's graph for some seconds, and other tests may run at
-the same time; so tests take domains that nobody else on this machine holds. Creating and removing DDS
+the same time; so tests take domains that no other process on this machine holds. Creating and removing DDS
 participants by the hundred is slow and now and then stalls within the middleware; so the nodes of all
 tests of a process live in one context, one after the other.
 """
@@ -31,7 +31,7 @@ Found = TypeVar('Found')
 
 @contextlib.contextmanager
 def free_domain() -> Iterator[int]:
-    """Hold a ROS domain within 1 .. 101 that nobody else holds; raises `OSError` if none is free."""
+    """Hold a ROS domain within 1 .. 101 that no other process holds; raises `OSError` if none is free."""
     folder = Path(tempfile.gettempdir()) / 'engine_mount_domains'
     folder.mkdir(exist_ok=True)
     for number in range(1, _HIGHEST_DOMAIN + 1):

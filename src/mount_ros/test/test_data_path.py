@@ -1,12 +1,13 @@
-"""The data path between two nodes: served at once, now and then, or no more."""
+"""The data path between two nodes: served by the executor, between works, or no more."""
 
 import threading
 
 import pytest
 from rclpy.node import Node
 
-import mount_ros.data_path
-from mount_ros.data_path import DataPath, DataThread, DataThreadEndedError, DataThreadError
+import mount_ros.data_thread
+from mount_ros.data_path import DataPath
+from mount_ros.data_thread import DataThread, DataThreadEndedError, DataThreadError
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
@@ -79,36 +80,11 @@ def test_data_arrives_while_the_owner_serves_nothing(pair):
     wait_until(lambda: receiver.stamps == [1], 'arrival')
 
 
-def test_a_resting_path_still_takes_what_comes_and_a_woken_one_serves_at_once_again(pair):
-    receiver, send = pair
-    receiver.path.rest()
-    receiver.path.rest()  # a second time changes nothing
-    for stamp in range(5):
-        send(stamp)
-    wait_until(lambda: receiver.stamps == [0, 1, 2, 3, 4], 'arrival at rest')
-    receiver.path.wake()
-    receiver.path.wake()
-    send(5)
-    wait_until(lambda: receiver.stamps[-1] == 5, 'arrival after waking')
-    assert receiver.threads == {'data'}
-
-
-def test_what_came_during_rest_is_not_lost_by_waking(pair):
-    receiver, send = pair
-    for turn in range(10):
-        receiver.path.rest()
-        send(turn)
-        receiver.path.wake()
-        wait_until(lambda turn=turn: receiver.stamps[-1:] == [turn], 'arrival')
-    assert receiver.stamps == list(range(10))
-
-
-def test_a_resting_path_can_be_stopped(pair):
-    receiver, _ = pair
-    receiver.path.rest()
-    assert len(_data_threads()) == 2
-    receiver.path.stop()
-    assert len(_data_threads()) == 1  # that of the sender
+def test_a_path_that_was_never_started_can_be_stopped_twice(make_end):
+    end = make_end('idle')
+    end.path.subscribe(DISPLACEMENT, end.take)
+    end.path.stop()
+    end.path.stop()
 
 
 @pytest.mark.parametrize('working', [False, True])
@@ -130,17 +106,8 @@ def test_what_is_no_more_subscribed_is_heard_no_more_until_it_is_again(pair, wor
     assert receiver.stamps == [0, 2, 4, 6, 8]
 
 
-def test_a_path_that_was_never_started_neither_rests_nor_hangs(make_end):
-    end = make_end('idle')
-    end.path.subscribe(DISPLACEMENT, end.take)
-    end.path.rest()
-    end.path.wake()
-    end.path.stop()
-    end.path.stop()
-
-
-@pytest.mark.parametrize('resting', [False, True])
-def test_a_callback_that_raises_costs_its_own_message_only(pair, capfd, resting):
+@pytest.mark.parametrize('working', [False, True])
+def test_a_callback_that_raises_costs_its_own_message_only(pair, capfd, working):
     receiver, send = pair
     take = receiver.take
 
@@ -152,8 +119,8 @@ def test_a_callback_that_raises_costs_its_own_message_only(pair, capfd, resting)
     receiver.take = choke
     receiver.path.subscribe(DISPLACEMENT, choke)
     wait_until(lambda: receiver.path.node.count_subscribers('displacement') == 2, 'second subscription')
-    if resting:
-        receiver.path.rest()
+    if working:
+        receiver.path.attend(lambda: False)
     seen = len(receiver.stamps)
     for stamp in range(4):
         send(stamp)
@@ -333,8 +300,8 @@ def _outcome(call, *arguments):
 
 def test_a_change_that_fails_is_told_to_its_caller_and_the_thread_goes_on(pair):
     receiver, send = pair
-    assert isinstance(_outcome(receiver.path._thread.remove, Node), KeyError)
-    assert isinstance(_outcome(receiver.path._thread.leave, _collapse), ValueError)
+    assert isinstance(_outcome(receiver.path._thread.remove, Node), ValueError)
+    assert _outcome(receiver.path._thread.leave, _collapse) is None  # it is not done anyway
     send(1)
     wait_until(lambda: receiver.stamps == [1], 'arrival')
     assert receiver.path.failure == ''
@@ -366,7 +333,7 @@ def test_who_waits_when_the_thread_ends_gets_the_reason(pair, monkeypatch):
     def fail(executor):
         raise RuntimeError('the executor is broken')
 
-    monkeypatch.setattr(mount_ros.data_path, '_take_effect', fail)
+    monkeypatch.setattr(mount_ros.data_thread, '_take_effect', fail)
     refusal = _outcome(receiver.path.attend, lambda: False)
     assert isinstance(refusal, DataThreadEndedError)
     assert 'RuntimeError: the executor is broken' in str(refusal)
@@ -382,7 +349,7 @@ def test_a_thread_that_does_not_answer_is_not_waited_for_for_ever(pair, monkeypa
 
     receiver.path.attend(block)
     assert blocked.wait(LIMIT)
-    monkeypatch.setattr(mount_ros.data_path, '_PATIENCE', 0.05)
+    monkeypatch.setattr(mount_ros.data_thread, '_PATIENCE', 0.05)
     refusal = _outcome(receiver.path.leave_work)
     release.set()
     monkeypatch.undo()
@@ -397,3 +364,5 @@ def test_a_callback_that_would_wait_for_its_own_thread_is_refused(pair):
     assert 'cannot wait for the data thread' in receiver.path.refusal
     send(1)
     wait_until(lambda: receiver.stamps == [1], 'arrival')
+    receiver.path.stop()
+    assert len(_data_threads()) == 1  # that of the sender

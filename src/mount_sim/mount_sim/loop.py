@@ -7,15 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mount_driver.codec import Status
+from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import STATUS_EVERY, ElectronicsParameters
 from mount_sim.electronics.faults import Fault
-from mount_sim.plant.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
 _LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
 _REMEMBERED = 1024  # samples whose sending time is kept
-_MICROSECONDS = 1_000_000
+_NS = 1000  # ns per us
 
 
 class NoAnswerError(RuntimeError):
@@ -90,7 +91,7 @@ class ElectronicsLoop:
         """Take the next sample if the last one is answered within `wait` s; return whether it was.
 
         Raises `NoAnswerError` when no answer came for `patience` s; the first sample waits for the
-        activation of whoever answers it.
+        activation of the node that answers it.
         """
         if self._asked is not None:
             answer = self._can_end.wait_for_answer(self._asked, wait)
@@ -115,7 +116,7 @@ class ElectronicsLoop:
         taken = self._valid(received, now)
         reading = self._fault.reading(now, mount.measure())
         frame = self._can_end.measurement_frame(
-            number, number * round(SAMPLE_TIME * _MICROSECONDS), reading, mount.enabled
+            number, number * SAMPLE_TIME_NS // _NS, reading, mount.enabled
         )
         arriving = self._fault.frame(now, number, frame)
         self._sent_at[number % _REMEMBERED] = time.time()
@@ -133,7 +134,7 @@ class ElectronicsLoop:
             return None, 0
         late = received.late(self._mount.sample)
         if late >= self._mount.patience:
-            return None, 0  # an answer of the past: whoever sends it must not keep the coil on
+            return None, 0  # an answer to a sample of the past must not keep the coil on
         self._note(received)
         return received.setpoint.current if received.setpoint.enable else 0.0, late
 

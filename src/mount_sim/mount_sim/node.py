@@ -8,7 +8,7 @@ from sensor_msgs.msg import Imu
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
@@ -21,10 +21,8 @@ from mount_sim.electronics.faults import Fault
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.plant import TRUTH
 from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 
-_SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
 _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
 
 
@@ -48,8 +46,6 @@ class MountSim(SafeLifecycleNode):
         self._excitation = build_excitation(self._settings)
         self._fault = Fault(self._settings.fault)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
-        if self._truth.names != TRUTH.names:
-            raise ValueError('sim/truth in the topic registry differs from what the plant gives')
         self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
         self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
         path = self.open_data_path()
@@ -77,7 +73,7 @@ class MountSim(SafeLifecycleNode):
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
         if self.lockstep and interface == 'virtual':
-            # Both ends of the bus live in this process: whoever answers works in the data thread.
+            # Both ends of the bus are in this process: the answering node works in the data thread.
             self._path.attend(self._step)
         else:
             self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
@@ -100,7 +96,7 @@ class MountSim(SafeLifecycleNode):
     def _prepare_mount(self) -> None:
         self._mount = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
         rehearsal = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
-        rehearsal.measure()  # loads the compiled plant before time begins to run
+        rehearsal.measure()  # loads the compiled plant before simulated time begins
         rehearsal.advance(0.0)
 
     def _run(self) -> None:
@@ -131,7 +127,7 @@ class MountSim(SafeLifecycleNode):
         self.get_logger().error(sentence)
 
     def _publish(self, number: int) -> None:
-        stamp = self._time_zero + number * _SAMPLE_NANOSECONDS
+        stamp = self._time_zero + number * SAMPLE_TIME_NS
         truth = self._mount.truth
         if self._loop is not None and not self.lockstep:
             truth['setpoint_latency'] = self._loop.last_latency

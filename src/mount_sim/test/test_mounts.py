@@ -116,7 +116,7 @@ def test_road_and_idle_force_move_the_vehicle_as_its_law_alone_says(make_mount, 
     _, truth = drive(make_mount(mount='elastomer', **chosen))
     excitation = build_excitation(parameters(**chosen))
     displacement, _ = ride_without_friction(
-        Vehicle(), resting_vehicle(), excitation.values, excitation.engine_forces, excitation.step_time
+        Vehicle(), resting_vehicle(), excitation.values[:], excitation.engine_forces[:], excitation.step_time
     )
     np.testing.assert_array_equal(truth['displacement'][1:], displacement[19::20][:-1])
 
@@ -138,7 +138,7 @@ def damped_ride(parameters, mount, **chosen):
     excitation = build_excitation(settings)
     plant, plain = (PlantSimulation(settings.plant, excitation.seat, excitation.step_time) for _ in range(2))
     forces = excitation.engine_forces
-    forces = np.zeros_like(excitation.values) if forces is None else forces
+    forces = np.zeros(len(excitation.values)) if forces is None else forces
     for first in range(0, len(excitation.values), 20):
         step = slice(first, first + 20)
         plant.read(np.zeros(4))

@@ -27,7 +27,7 @@ def driven(tmp_path):
     def drive(times, values, scale=1.0):
         np.save(tmp_path / 'imu_value.npy', values)
         np.save(tmp_path / 'imu_t.npy', times)
-        return acceleration_at(recorded_acceleration(tmp_path / 'imu_value.npy'), scale, STEP)
+        return acceleration_at(recorded_acceleration(tmp_path / 'imu_value.npy'), scale, STEP)[:]
 
     return drive
 

@@ -5,14 +5,8 @@ import pytest
 
 from mount_models.actuator.closing import ClosingError
 from mount_models.quantity import ParameterError
-from mount_ros import topics
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.plant import TRUTH, Plant, PlantSimulation
-
-
-def test_truth_has_the_names_of_its_topic():
-    assert TRUTH.names == topics.SIM_TRUTH.names
-    assert {TRUTH[name] for name in TRUTH.names} == {np.dtype('f8')}
 
 
 def test_truth_bytes_are_its_numbers(make_mount):

@@ -7,12 +7,11 @@ import numpy as np
 
 from mount_bags.audit.latency import setpoint_latency
 from mount_bags.messages.series import Times
-
-LONGEST_SILENCE = 0.020  # s: `setpoint_timeout` of driver and electronics, after which the coil is at 0 A
+from mount_models.sampling import SETPOINT_TIMEOUT
 
 _PAUSE = 500_000_000  # ns, chosen: a control that says nothing for so long may have been deactivated
 _HALF_SAMPLE = 500_000  # ns
-_LATE = round(1e9 * LONGEST_SILENCE)  # ns
+_LATE = round(1e9 * SETPOINT_TIMEOUT)  # ns
 NO_TIMES: Times = np.empty(0, np.int64)
 
 

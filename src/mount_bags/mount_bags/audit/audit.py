@@ -14,10 +14,11 @@ from mount_bags.audit.answers import NO_TIMES, Answers, Control, Setpoints, judg
 from mount_bags.audit.latency import Latency, setpoint_latency
 from mount_bags.audit.node_reports import NodeReport, node_reports
 from mount_bags.bag.recording import Recording
-from mount_bags.bag.statement import RECORDER_RECORD, read_statement
+from mount_bags.bag.statement import read_statement
+from mount_bags.container.stored import RECORDER_RECORD
 from mount_bags.messages.series import Times, registered_topic
 from mount_bags.messages.stamps import missing_samples, regular_rate, stamp_jitter, stamp_statistics
-from mount_bags.messages.time_axis import TimeAxis, time_axis
+from mount_bags.messages.time_axis import TimeAxis
 from mount_bags.messages.topic_times import TopicTimes
 from mount_ros.topics import (
     AIR_GAP,
@@ -78,7 +79,7 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     }
     mounts = [name for name, found in times.items() if _own_topic(found) is DISPLACEMENT and len(found)]
     if mounts:
-        reports, axis = node_reports(recording), time_axis(recording, times)
+        reports, axis = node_reports(recording), recording.time_axis
         for namespace in (name.removesuffix(DISPLACEMENT.name) for name in mounts):
             answers = _answers(times, namespace, _inactive(reports, namespace, axis))
             _add_samples(audits, namespace, _lost_samples(times, audits, namespace), answers)

@@ -4,14 +4,14 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from mount_bags.audit.answers import LONGEST_SILENCE
 from mount_bags.audit.audit import CONTROL, TopicAudit
 from mount_bags.audit.node_reports import NodeReport, node_reports
 from mount_bags.bag.recording import Recording
 from mount_bags.events.automatic_marks import MarkKind
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.messages.series import registered_topic
-from mount_bags.messages.time_axis import TimeAxis, time_axis
+from mount_bags.messages.time_axis import TimeAxis
+from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_ros.topics import DISPLACEMENT
 
 _SAME = 5.0  # s, chosen: a mark that repeats the sentence of a report so soon is of the same fault
@@ -36,7 +36,7 @@ def faults(recording: Recording, audits: Mapping[str, TopicAudit]) -> list[Fault
     They count from control's first answer until it was deactivated for the last time: starting and ending the
     graph have verdicts of their own. Without an answer of control, all count.
     """
-    axis, reports = time_axis(recording), node_reports(recording)
+    axis, reports = recording.time_axis, node_reports(recording)
     found = [*_silences(audits, axis), *_errors(recording, reports, axis)]
     found += _marks(recording, found, axis)
     begin, end = _drive(reports, audits, axis)
@@ -66,7 +66,7 @@ def _silences(audits: Mapping[str, TopicAudit], axis: TimeAxis) -> list[Fault]:
         Fault(
             axis.of_stamp(silence.begin),
             CONTROL,
-            f'no setpoint in time for {1e3 * silence.duration:.0f} ms (limit {1e3 * LONGEST_SILENCE:g} ms): '
+            f'no setpoint in time for {1e3 * silence.duration:.0f} ms (limit {1e3 * SETPOINT_TIMEOUT:g} ms): '
             'the coil went to 0 A',
         )
         for entry in audits.values()

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mount_bags.audit.answers import LONGEST_SILENCE
 from mount_bags.audit.audit import TopicAudit
 from mount_bags.audit.faults import Fault, faults
 from mount_bags.bag.recording import Recording
+from mount_models.sampling import SETPOINT_TIMEOUT
 
 _SHOWN = 5  # faults named one by one
 
@@ -71,7 +71,7 @@ class Losses:
         """Return the unanswered and the late samples in words."""
         if self.unanswered is None:
             return 'cannot be told, no setpoint was recorded'
-        late = f'; {self.late} answered later than {1e3 * LONGEST_SILENCE:g} ms' if self.late else ''
+        late = f'; {self.late} answered later than {1e3 * SETPOINT_TIMEOUT:g} ms' if self.late else ''
         return f'{self.unanswered} of {self.asked} while control was active{late}'
 
     def faults_text(self) -> str:

@@ -43,6 +43,5 @@ def node_reports(recording: Recording) -> list[NodeReport]:
 
 def _report(log_time: int, status) -> NodeReport:
     namespace, _, node = status.name.rpartition('/')
-    level = status.level if isinstance(status.level, int) else status.level[0]
     state = next((entry.value for entry in status.values if entry.key == 'state'), '')
-    return NodeReport(log_time, namespace.strip('/'), node, level, status.message, state)
+    return NodeReport(log_time, namespace.strip('/'), node, status.level, status.message, state)

@@ -4,15 +4,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-from rich.text import Text
-
 from mount_bags.audit.audit import TopicAudit
 from mount_bags.audit.latency import EDGES, Latency
 from mount_bags.audit.losses import Losses
+from mount_bags.run.screen import Table
 
 _TROUBLES = {'duplicated': 'twice', 'out_of_order': 'late'}
+_HEADS = ('topic', 'expected', 'present', 'lost', 'gap ms', 'jitter us')
 _BAR = 40  # characters
 
 
@@ -40,24 +38,21 @@ def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
 
 
 def as_table(audits: Mapping[str, TopicAudit]) -> Table:
-    """Return the figures as a table; columns of troubles that nobody has are left out."""
-    table = Table(title='Was anything lost?', title_justify='left', box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column('topic', no_wrap=True)
-    for title in ('expected', 'present', 'lost', 'gap ms', 'jitter us'):
-        table.add_column(title, justify='right', no_wrap=True)
+    """Return the figures as a table; columns of troubles are left out where no topic has them."""
     troubles = [name for name in _TROUBLES if any(getattr(entry, name) for entry in audits.values())]
-    for name in troubles:
-        table.add_column(_TROUBLES[name], justify='right')
-    for name, entry in audits.items():
-        table.add_row(
+    heads = (*_HEADS, *(_TROUBLES[name] for name in troubles))
+    rows = [
+        (
             name,
             *map(_cell, (entry.expected, entry.present, entry.lost)),
             _scaled(entry.longest_gap_s, 1e3),
             _scaled(entry.jitter_s, 1e6),
             *(_cell(getattr(entry, trouble)) for trouble in troubles),
-            style=None if entry.sound else 'yellow',
         )
-    return table
+        for name, entry in audits.items()
+    ]
+    marked = frozenset(place for place, entry in enumerate(audits.values()) if not entry.sound)
+    return Table('Was anything lost?', 'l' + 'r' * (len(heads) - 1), rows, heads, marked=marked)
 
 
 def sentences(audits: Mapping[str, TopicAudit], found: Losses) -> list[str]:
@@ -72,18 +67,16 @@ def sentences(audits: Mapping[str, TopicAudit], found: Losses) -> list[str]:
     return [*said, _verdict(audits, found)]
 
 
-def latency_lines(audits: Mapping[str, TopicAudit]) -> list[Text]:
+def latency_lines(audits: Mapping[str, TopicAudit]) -> list[str]:
     """Return a histogram, line by line, of each topic whose latency is known."""
     lines = []
     for name, entry in audits.items():
         if entry.latency is not None:
             latency = entry.latency
             lines.append(
-                Text(
-                    f'{name}: from the stamp to the setpoint at the recorder, median '
-                    f'{1e3 * latency.median:.2f} ms, 99 % below {1e3 * latency.p99:.2f} ms, '
-                    f'worst {1e3 * latency.worst:.2f} ms'
-                )
+                f'{name}: from the stamp to the setpoint at the recorder, median '
+                f'{1e3 * latency.median:.2f} ms, 99 % below {1e3 * latency.p99:.2f} ms, '
+                f'worst {1e3 * latency.worst:.2f} ms'
             )
             lines += _bars(latency)
     return lines
@@ -103,19 +96,19 @@ def _verdict(audits: Mapping[str, TopicAudit], found: Losses) -> str:
     told = sum(entry.expected is not None for entry in audits.values() if entry.present)
     untold = sum(entry.expected is None and entry.present > 0 for entry in audits.values())
     if not told:
-        return 'Whether anything was lost cannot be told: no topic has stamps with a rate, nobody counted.'
+        return 'Whether anything was lost cannot be told: no topic has stamps with a rate, none was counted.'
     rest = f'; of {untold} others it cannot be told' if untold else ''
     return f'Nothing is known to be lost: {told} topics are complete{rest}.'
 
 
-def _bars(latency: Latency) -> list[Text]:
+def _bars(latency: Latency) -> list[str]:
     most = max(latency.counts)
     places = [place for place, count in enumerate(latency.counts) if count]
     lines = []
     for place in range(places[0], places[-1] + 1):
         count = latency.counts[place]
         bar = '█' * math.ceil(_BAR * count / most)
-        lines.append(Text(f'  {_range(place):>16} {count:>8} {bar}'))
+        lines.append(f'  {_range(place):>16} {count:>8} {bar}')
     return lines
 
 

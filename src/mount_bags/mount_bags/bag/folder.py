@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mount_bags.bag.metadata import METADATA_NAME, BagInformation, MetadataError, read_metadata
-from mount_bags.bag.piece_topics import BagFile
 from mount_bags.container.mcap_file import McapFile
 from mount_bags.container.sqlite_file import SqliteFile
+from mount_bags.container.stored import StoredFile
 from mount_bags.container.whole_files import COMPRESSED_SUFFIXES
 
 _STORAGES = {'mcap': '.mcap', 'sqlite3': '.db3'}
@@ -46,8 +46,8 @@ def find_pieces(path: Path) -> Found:
     return _described(path, information, present)
 
 
-def open_piece(path: Path) -> BagFile:
-    """Open one file of a recording; raises `McapFileError`."""
+def open_piece(path: Path) -> StoredFile:
+    """Open one file of a recording; raises `StorageError`."""
     return SqliteFile(path) if '.db3' in path.suffixes else McapFile(path)
 
 

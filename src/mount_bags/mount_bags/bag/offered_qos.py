@@ -66,7 +66,7 @@ def qos_documents(offers: Sequence[OfferedQos]) -> list[dict[str, Any]]:
 
 
 def qos_text(offers: Sequence[OfferedQos]) -> str:
-    """Return the YAML list that stands in a channel's metadata; `[]` where nobody offers."""
+    """Return the YAML list that stands in a channel's metadata; `[]` without offers."""
     return yaml.safe_dump(qos_documents(offers), sort_keys=False).rstrip('\n')
 
 

@@ -8,9 +8,9 @@ import yaml
 
 from mount_bags.bag.metadata import NO_TIME, FileInformation
 from mount_bags.bag.offered_qos import OfferedQos, qos_text
-from mount_bags.bag.piece_topics import PIECE_RECORD
 from mount_bags.bag.schemas import schema_text
 from mount_bags.container.record_file import RecordFile
+from mount_bags.container.stored import PIECE_RECORD
 from mount_bags.container.writer import ChunkedMcap
 
 PROFILE = 'ros2'

@@ -16,22 +16,19 @@ from mount_bags.bag.metadata import (
     TopicInformation,
     read_metadata,
 )
+from mount_bags.bag.origin import ZERO_KEY, origin
 from mount_bags.bag.piece_topics import (
-    BagFile,
     Declared,
     declared_topics,
     readable_definition,
     repeated_topics,
 )
-from mount_bags.container.chunks import MESSAGE_HEAD, Contents
-from mount_bags.container.mcap_file import McapFileError
+from mount_bags.container.stored import HEAD, StorageError, StoredFile, StoredMessages
 from mount_bags.messages.columns import ColumnCollector
 from mount_bags.messages.definitions import Definition
 from mount_bags.messages.series import Column, Payloads, Series, Times
+from mount_bags.messages.time_axis import Arrivals, TimeAxis, axis_of
 from mount_bags.messages.topic_times import TimesCollector, TopicTimes
-
-# Key of the custom data in which `engine-mount recover` says what it could not prove.
-RECOVERY_NOTE = 'recovered_unchecked'
 
 
 class ReadingError(ValueError):
@@ -54,7 +51,7 @@ class Recording:
         self.path = path
         self.warnings: list[str] = []
         self.information: BagInformation | None = None
-        self.files: list[BagFile] = self._open()
+        self.files: list[StoredFile] = self._open()
         self._declared: dict[str, Declared] = declared_topics(self.files, self.information)
         self.topics: dict[str, TopicInformation] = {
             name: declared.information for name, declared in self._declared.items()
@@ -62,8 +59,8 @@ class Recording:
         self.missing: dict[str, int] = self._missing()
         self._definitions: dict[str, tuple[Definition | None, str]] = {}
         self._check_topics()
-        self._note_recovery()
         self._series: dict[str, Series] = {}
+        self._time_axis: TimeAxis | None = None
 
     @property
     def message_count(self) -> int:
@@ -76,11 +73,6 @@ class Recording:
         if self.missing or not self._complete or any(file.damaged for file in self.files):
             return False
         return all(file.whole for file in self.files) or self._counts_agree
-
-    @property
-    def all_pieces(self) -> bool:
-        """Whether no file of the recording is known to be missing."""
-        return self._complete
 
     @property
     def described(self) -> bool:
@@ -98,6 +90,19 @@ class Recording:
         """The first and the last receive time in ns, None without messages."""
         ranges = [found for found in (file.time_range() for file in self.files) if found is not None]
         return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
+
+    @property
+    def short_name(self) -> str:
+        """What a person calls it: with the folder of the run where its own is just `recording`."""
+        path = self.path.absolute()
+        return f'{path.parent.name}/{path.name}' if path.name == 'recording' else path.name
+
+    @property
+    def time_axis(self) -> TimeAxis:
+        """The time that people are told, read once: where `times` were read before, without messages."""
+        if self._time_axis is None:
+            self._time_axis = self._axis_of(self.__getitem__)
+        return self._time_axis
 
     def __contains__(self, name: str) -> bool:
         return len(self._candidates(name)) == 1
@@ -163,7 +168,7 @@ class Recording:
 
     # Opening.
 
-    def _open(self) -> list[BagFile]:
+    def _open(self) -> list[StoredFile]:
         try:
             found = find_pieces(self.path)
         except BagFolderError as error:
@@ -175,7 +180,7 @@ class Recording:
         for path in found.paths:
             try:
                 files.append(open_piece(path))
-            except McapFileError as error:
+            except StorageError as error:
                 reasons.append(str(error))
         if not files:
             raise ReadingError('; '.join(reasons) or f'{self.path} holds no MCAP file')
@@ -188,7 +193,7 @@ class Recording:
             self._read_embedded(files)
         return files
 
-    def _read_embedded(self, files: list[BagFile]) -> None:
+    def _read_embedded(self, files: list[StoredFile]) -> None:
         text = files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
         if text:
             try:
@@ -229,11 +234,6 @@ class Recording:
                 what = 'the installed one is used' if definition else 'only its raw bytes can be read'
                 self.warnings.append(f'{name}: {sentence}; {what}')
 
-    def _note_recovery(self) -> None:
-        custom = self.information.custom_data if self.information else {}
-        if custom.get(RECOVERY_NOTE):
-            self.warnings.append(custom[RECOVERY_NOTE])
-
     # Reading.
 
     def times(self) -> dict[str, TopicTimes]:
@@ -247,16 +247,23 @@ class Recording:
         found = {name: collector.times() for name, collector in collectors.items()}
         for name, times in found.items():
             self._note_damage(name, len(times))
+        self._time_axis = self._time_axis or self._axis_of(found.__getitem__)
         return found
 
+    def _axis_of(self, arrivals: Callable[[str], Arrivals]) -> TimeAxis:
+        steps = [step.get(ZERO_KEY) for step in origin(self.information)]
+        types = {name: topic.type for name, topic in self.topics.items() if topic.message_count}
+        first = self.time_range[0] if self.time_range else 0
+        return axis_of(types, arrivals, [zero for zero in steps if isinstance(zero, int)], first)
+
     def _load(self, names: Sequence[str]) -> dict[str, Series]:
-        blocks: dict[str, list[Contents]] = {name: [] for name in names}
+        blocks: dict[str, list[StoredMessages]] = {name: [] for name in names}
         for name, block in self._blocks(names) if names else ():
             blocks[name].append(block)
         return {name: self._series_of(name, found) for name, found in blocks.items()}
 
-    def _series_of(self, name: str, blocks: list[Contents]) -> Series:
-        head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, MESSAGE_HEAD)
+    def _series_of(self, name: str, blocks: list[StoredMessages]) -> Series:
+        head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, HEAD)
         self._note_damage(name, len(head))
         return self._made(name, Payloads([block.payloads() for block in blocks]), head)
 
@@ -287,9 +294,9 @@ class Recording:
             name,
             self.topics[name].type,
             payloads,
-            head['log_time'].astype(np.int64),
-            head['publish_time'].astype(np.int64),
-            sequences=head['sequence'].astype(np.uint32),
+            np.ascontiguousarray(head['log_time']),
+            np.ascontiguousarray(head['publish_time']),
+            sequences=np.ascontiguousarray(head['sequence']),
             columns=columns,
             stamps=stamps,
             definition=definition,
@@ -303,27 +310,23 @@ class Recording:
             self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
             self.missing[name] = expected - present
 
-    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, Contents]]:
+    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, StoredMessages]]:
         """Yield the messages of topics, without those that a piece repeats from the one before."""
         last: dict[str, tuple[bytes, int]] = {}
         watched = frozenset().union(*repeated_topics(self.files))
         for file, repeated in zip(self.files, repeated_topics(self.files), strict=True):
-            channels = {name: np.array(self._declared[name].channels_of(file), np.int64) for name in names}
-            channels = {name: numbers for name, numbers in channels.items() if numbers.size}
+            topics = {name: np.array(self._declared[name].numbers_in(file), np.int64) for name in names}
+            topics = {name: numbers for name, numbers in topics.items() if numbers.size}
             heads = set(repeated)
-            for block in file.blocks([int(number) for numbers in channels.values() for number in numbers]):
-                for name, numbers in channels.items():
-                    found = block.of(numbers) if len(channels) > 1 else block
-                    if not found.offsets.size:
+            for block in file.blocks([int(number) for numbers in topics.values() for number in numbers]):
+                for name, numbers in topics.items():
+                    found = block.of(numbers) if len(topics) > 1 else block
+                    if not len(found):
                         continue
-                    if name in heads and _first(found) == last.get(name):
+                    if name in heads and found.message(0) == last.get(name):
                         found = found.behind_first()
                     heads.discard(name)
-                    if found.offsets.size:
+                    if len(found):
                         if name in watched:
                             last[name] = found.message(-1)
                         yield name, found
-
-
-def _first(block: Contents) -> tuple[bytes, int]:
-    return block.message(0)

@@ -1,4 +1,7 @@
-"""Message definitions and type hashes as rosbag2 puts them into a bag, from the installed packages."""
+"""Message definitions and type hashes as rosbag2 puts them into a bag, from the installed packages.
+
+The texts that rosbags makes of the same types lack their comments: other bytes than rosbag2 writes.
+"""
 
 import importlib.util
 import json

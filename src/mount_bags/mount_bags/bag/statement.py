@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 import yaml
 
-RECORDER_RECORD = 'engine_mount_recorder'  # name of the metadata record at the end of a recording
-
 
 @dataclass(slots=True)
 class Reception:

@@ -23,8 +23,9 @@ from mount_bags.bag.offered_qos import OfferedQos
 from mount_bags.bag.piece import BagTopic, Offers, Piece, Repetition
 from mount_bags.bag.schemas import type_hash
 from mount_bags.bag.split import WHOLE, SplitRule
-from mount_bags.bag.statement import RECORDER_RECORD, Reception, statement
+from mount_bags.bag.statement import Reception, statement
 from mount_bags.container.record_file import RecordFile
+from mount_bags.container.stored import RECORDER_RECORD
 from mount_bags.container.writer import CHUNK_SIZE
 
 _NO_SPACE = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG))
@@ -95,11 +96,6 @@ class BagWriter:
     def size(self) -> int:
         """How many bytes the files have."""
         return sum(piece.file.size for piece in self._pieces)
-
-    @property
-    def piece_count(self) -> int:
-        """How many files the recording has."""
-        return len(self._pieces)
 
     def unwritten(self, handed: int) -> int:
         """Return how many of the messages handed over do not stand on the disk, once writing has failed."""

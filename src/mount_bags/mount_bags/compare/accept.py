@@ -4,15 +4,12 @@ import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
-from std_msgs.msg import String
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.bag.writer import BagWriter
 from mount_bags.compare.compare import compare
@@ -20,8 +17,7 @@ from mount_bags.compare.reference import ANSWERS
 from mount_bags.compare.words import sentences
 from mount_bags.edit.messages import Messages, in_log_order, read_messages
 from mount_bags.messages.series import Payloads
-from mount_bags.run.session_differences import session_text
-from mount_ros.messages.cdr import serialised
+from mount_bags.run.session import recorded_session, session_content, session_message, session_text, time_text
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
@@ -140,12 +136,12 @@ def _of_the_ramp(messages: Messages, air_gap: Messages) -> Messages:
 def _without_paths(session: Messages, source: Recording | None) -> Messages:
     """Return the last session with absolute paths cut to their last part: they mean nothing elsewhere."""
     assert source is not None
-    text = session_text(source)
-    shortened = yaml.safe_dump(_shortened(yaml.safe_load(text)), sort_keys=False)
+    content = session_content(recorded_session(source))
+    shortened = _shortened(content)
     last = session.chosen(np.array([len(session) - 1]))
-    if yaml.safe_load(shortened) == yaml.safe_load(text):
+    if shortened == content:
         return last
-    return replace(last, payloads=Payloads([[serialised(String(data=shortened))]]))
+    return replace(last, payloads=Payloads([[session_message(session_text(shortened))]]))
 
 
 def _shortened(content: Any) -> Any:
@@ -167,9 +163,9 @@ def _changes(before: Recording, run: Recording) -> list[str]:
 
 def _entry(run: Recording, reason: str, versions: Mapping[str, str], changes: list[str]) -> dict[str, Any]:
     return {
-        'date': datetime.now().astimezone().isoformat(timespec='seconds'),
+        'date': time_text(),
         'reason': reason.strip(),
-        'recording': short_name(run),
+        'recording': run.short_name,
         'versions': dict(versions),
         'changes': changes or ['new reference'],
     }

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Series, SeriesError, Times, registered_topic
-from mount_bags.messages.time_axis import TimeAxis, time_axis
+from mount_bags.messages.time_axis import TimeAxis
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
 Places = NDArray[np.int64]
@@ -158,7 +158,7 @@ def _mounts(recording: Recording, paired: Collection[str]) -> dict[str, dict[str
 
 def align(a: Recording, b: Recording) -> Alignments:
     """Return how to match the samples of `a` and `b`; raises `ComparisonError`."""
-    axis = time_axis(a)
+    axis = a.time_axis
     return Alignments({mount: _aligned(*pair, axis) for mount, pair in _anchors(a, b).items()})
 
 

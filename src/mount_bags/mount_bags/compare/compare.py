@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import Recording
 from mount_bags.compare.alignment import (
     Alignment,
@@ -22,7 +21,8 @@ from mount_bags.compare.signal_difference import SignalDifference, signal_differ
 from mount_bags.compare.tolerances import Tolerances
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import SwitchingChange, paired_switchings, switching_times
-from mount_bags.run.session_differences import session_differences, session_texts
+from mount_bags.run.session import recorded_sessions
+from mount_bags.run.session_differences import session_differences
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, EVENT, SESSION, Topic
 
 _TOLD_OTHERWISE = (SESSION, EVENT)  # in words of their own
@@ -136,12 +136,12 @@ def compare(
     marks_a, marks_b = _marks(a, {}), _marks(b, {other: name for name, other in pairs.items()})
     sessions = _sessions(a, b, pairs)
     return Comparison(
-        name_a=short_name(a),
-        name_b=short_name(b),
+        name_a=a.short_name,
+        name_b=b.short_name,
         alignments=alignments,
         topics=tuple(_compared(topic, tolerances, switching) for topic in matched),
-        only_a=_lonely_topics(a, pairs, topics),
-        only_b=_lonely_topics(b, pairs.values(), topics),
+        only_a=_unpaired_topics(a, pairs, topics),
+        only_b=_unpaired_topics(b, pairs.values(), topics),
         sessions=tuple(sessions or ()),
         both_have_session=sessions is not None,
         marks_a=tuple((marks_a - marks_b).elements()),
@@ -170,7 +170,7 @@ def _wanted(registered: Topic | None, topics: Collection[Topic] | None) -> bool:
 def _compared(
     topic: MatchedTopic, tolerances: Tolerances, switching: Mapping[str, list[SwitchingChange]]
 ) -> TopicComparison:
-    (only_a, outside_a), (only_b, outside_b) = topic.lonely_samples()
+    (only_a, outside_a), (only_b, outside_b) = topic.unmatched_samples()
     signals = {
         name: unit
         for name, unit in topic.signals.items()
@@ -208,8 +208,8 @@ def _compared(
 def _remark(topic: MatchedTopic) -> str:
     if topic.a.type != topic.b.type:
         return f'in A it is {topic.a.type}, in B {topic.b.type}'
-    lonely = topic.lonely_signals
-    return f'only one of both has {", ".join(lonely)}' if lonely else ''
+    unmatched = topic.unmatched_signals
+    return f'only one of both has {", ".join(unmatched)}' if unmatched else ''
 
 
 def _is_switch(topic: MatchedTopic, signal: str) -> bool:
@@ -232,7 +232,7 @@ def _in_time(switchings: Iterable[list[SwitchingChange]]) -> tuple[SwitchingChan
     return tuple(sorted((change for each in switchings for change in each), key=lambda change: change.time))
 
 
-def _lonely_topics(
+def _unpaired_topics(
     recording: Recording, paired: Collection[str], topics: Collection[Topic] | None
 ) -> tuple[str, ...]:
     return tuple(
@@ -246,7 +246,7 @@ def _lonely_topics(
 
 def _sessions(a: Recording, b: Recording, pairs: Mapping[str, str]) -> list[str] | None:
     """Return how the sessions differ, mount by mount; None where no mount has one in both."""
-    texts_a, texts_b = session_texts(a), session_texts(b)
+    texts_a, texts_b = recorded_sessions(a), recorded_sessions(b)
     both = [(name, other) for name, other in pairs.items() if texts_a.get(name) and texts_b.get(other)]
     if not both:
         return None

@@ -10,7 +10,7 @@ from mount_bags.compare.hidden_differences import Place, hidden_differences
 from mount_bags.compare.signal_difference import Column
 from mount_bags.messages.layout import OPTIONS
 from mount_bags.messages.series import STAMP, STAMP_BYTES, Series, SeriesError
-from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_bytes
+from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
 from mount_ros.topics import CURRENT_FORCE_TABLE, JOINT_STATE
 
 Places = NDArray[np.int64]
@@ -74,7 +74,7 @@ class MatchedTopic:
         return signals
 
     @property
-    def lonely_signals(self) -> list[str]:
+    def unmatched_signals(self) -> list[str]:
         """The signals that one of the recordings lacks."""
         try:
             return sorted(set(self.a.names) ^ set(self.b.names)) if self.samples else []
@@ -123,7 +123,7 @@ class MatchedTopic:
     def _shown(self) -> set[Place]:
         """Return the places of what signals show, of one recording alone too, and of stamps and names."""
         if self.a.type != JOINT_STATE:
-            return {*STAMP, *((name, 0) for name in (*self.signals, *self.lonely_signals))}
+            return {*STAMP, *((name, 0) for name in (*self.signals, *self.unmatched_signals))}
         places = range(max(len(self.a.names), len(self.b.names)))
         shown = {*STAMP, *((f'name[{place}]', 0) for place in places)}
         if self._has_columns('position'):
@@ -138,7 +138,7 @@ class MatchedTopic:
         layouts = (self.a, self.a.layout), (self.b, self.b.layout)
         return all(layout and layout.numbers[part].count == len(series.names) for series, layout in layouts)
 
-    def lonely_samples(self) -> tuple[tuple[int, int], tuple[int, int]]:
+    def unmatched_samples(self) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return how many samples A and B have alone: (within the time that both cover, outside of it)."""
         both = (self.of_a.keys, self.of_b.keys)
         if not all(map(len, both)):
@@ -163,8 +163,8 @@ class MatchedTopic:
         if self.a.registered is not CURRENT_FORCE_TABLE or not self.samples:
             return None
         try:
-            a, b = (from_bytes(series.payloads[len(series) - 1]) for series in (self.a, self.b))
-        except ForceTableMessageError:
+            a, b = (from_message(series.message(len(series) - 1)) for series in (self.a, self.b))
+        except (ForceTableMessageError, SeriesError):
             return None
         return (a, b) if a.current.shape == b.current.shape else None
 

@@ -30,7 +30,7 @@ def differences_from_reference(
         return ['the replay has other stamps than the reference: it answers other samples']
     told = differences(comparison)
     for topic in ANSWERS:
-        told += _lonely(a, b, topic, comparison)
+        told += _unmatched(a, b, topic, comparison)
     return told
 
 
@@ -38,7 +38,7 @@ def _opened(recording: Recording | str | os.PathLike[str]) -> Recording:
     return recording if isinstance(recording, Recording) else open_recording(recording)
 
 
-def _lonely(a: Recording, b: Recording, topic: Topic, comparison: Comparison) -> list[str]:
+def _unmatched(a: Recording, b: Recording, topic: Topic, comparison: Comparison) -> list[str]:
     traced = a[CONTROL_TRACE.name].stamps
     if not len(traced):
         return ['the reference holds no control_trace: there is nothing to meet']

@@ -4,14 +4,12 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from rich.box import SIMPLE
-from rich.table import Table
-
 from mount_bags.compare.compare import Comparison, TopicComparison
 from mount_bags.compare.lag import Lag
 from mount_bags.compare.quantity_text import quantity_text, time_text
 from mount_bags.compare.signal_difference import Moment, SignalDifference
 from mount_bags.events.switching_changes import SwitchingChange
+from mount_bags.run.screen import Table
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 _ROWS = 10  # of the table
@@ -27,7 +25,7 @@ def sentences(comparison: Comparison) -> list[str]:
         *_reasons(comparison),
         *_samples(comparison),
         *(f'{topic.name}: {topic.remark}' for topic in comparison.topics if topic.remark),
-        *_lonely(comparison),
+        *_unmatched(comparison),
         _rest(comparison),
     ]
 
@@ -53,25 +51,28 @@ def by_importance(signals: Iterable[SignalDifference]) -> list[SignalDifference]
 
 def as_table(comparison: Comparison) -> Table:
     """Return the most important of the differing signals as a table."""
-    table = Table(title='The largest differences', title_justify='left', box=SIMPLE, padding=(0, 1, 0, 0))
-    table.add_column('signal', overflow='fold')  # of two lines, so that all fits into 80 characters
-    for title in ('samples', 'first (s)', 'largest', 'at (s)', 'rms', 'B later'):
-        table.add_column(title, justify='right', no_wrap=True)
     ordered = by_importance(comparison.signals)
-    if len(ordered) > _ROWS:
-        table.caption, table.caption_justify = f'{len(ordered) - _ROWS} more differ; see --json', 'left'
-    for signal in ordered[:_ROWS]:
-        largest = signal.largest
-        table.add_row(
-            f'{signal.mount}{signal.topic}\n{signal.signal}',
-            str(signal.differing),
-            '' if signal.first is None else f'{signal.first.time:.3f}',
-            'unknown' if largest is None else quantity_text(abs(largest.difference), signal.unit),
-            '' if largest is None else f'{largest.time:.3f}',
-            quantity_text(signal.rms, signal.unit),
-            _lag_text(signal.lag),
-        )
-    return table
+    more = len(ordered) - _ROWS
+    return Table(
+        'The largest differences',
+        'lrrrrrr',
+        [_row(signal) for signal in ordered[:_ROWS]],
+        ('signal', 'samples', 'first (s)', 'largest', 'at (s)', 'rms', 'B later'),
+        f'{more} more differ; see --json' if more > 0 else '',
+    )
+
+
+def _row(signal: SignalDifference) -> tuple[str, ...]:
+    largest = signal.largest
+    return (
+        f'{signal.mount}{signal.topic}\n{signal.signal}',  # two lines, so that all fits into 80 characters
+        str(signal.differing),
+        '' if signal.first is None else f'{signal.first.time:.3f}',
+        'unknown' if largest is None else quantity_text(abs(largest.difference), signal.unit),
+        '' if largest is None else f'{largest.time:.3f}',
+        quantity_text(signal.rms, signal.unit),
+        _lag_text(signal.lag),
+    )
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
@@ -195,7 +196,7 @@ def _samples(comparison: Comparison) -> list[str]:
     ]
 
 
-def _lonely(comparison: Comparison) -> list[str]:
+def _unmatched(comparison: Comparison) -> list[str]:
     return [
         f'{what} only in {where}: {_few(names, ", ")}'
         for what, where, names in (

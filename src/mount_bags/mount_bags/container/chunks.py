@@ -18,6 +18,8 @@ from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
 from numpy.typing import NDArray
 
+from mount_bags.container.stored import HEAD, StoredMessages, rows_at
+
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.int64]
 
@@ -32,6 +34,7 @@ MESSAGE_HEAD = np.dtype(
         ('publish_time', '<u8'),
     ]
 )
+_FIELDS = {'topic': 'channel', 'sequence': 'sequence', 'log_time': 'log_time', 'publish_time': 'publish_time'}
 RECORD = struct.Struct('<BQ')  # opcode, length of what follows
 LENGTH_BESIDES_PAYLOAD = MESSAGE_HEAD.itemsize - RECORD.size  # of a message record
 _HEAD = struct.Struct('<QQQII')  # start, end, unpacked size, checksum, length of the compression's name
@@ -56,7 +59,7 @@ class Chunk:
     compression: str
     start_time: int
     end_time: int
-    channels: frozenset[int] | None = None  # those with messages, None where nobody reliable says
+    channels: frozenset[int] | None = None  # those with messages, None where no reliable source tells
     counts: dict[int, int] = field(default_factory=dict)  # messages by channel, once explored
     declarations: tuple[tuple[int, bytes], ...] = ()  # of schemas and channels, once explored
     explored: bool = False
@@ -70,52 +73,11 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Contents:
-    """Message records, where they begin, and the declarations of schemas and channels among them."""
+    """The messages in a chunk, and the declarations of schemas and channels among them."""
 
-    data: Bytes
-    offsets: Offsets
-    heads: np.ndarray
+    messages: StoredMessages
     declarations: tuple[tuple[int, bytes], ...] = ()
     whole: bool = True  # whether the records explain every byte
-
-    def of(self, channels: Offsets) -> 'Contents':
-        """Return the messages of these channels alone."""
-        channel = self.heads['channel']
-        wanted = channel == channels[0] if len(channels) == 1 else np.isin(channel, channels)
-        if wanted.all():
-            return self
-        return Contents(self.data, self.offsets[wanted], self.heads[wanted], self.declarations, self.whole)
-
-    def behind_first(self) -> 'Contents':
-        """Return all messages but the first."""
-        return Contents(self.data, self.offsets[1:], self.heads[1:], self.declarations, self.whole)
-
-    def message(self, place: int) -> tuple[bytes, int]:
-        """Return payload and publish time (ns) of one message."""
-        begin = int(self.offsets[place]) + MESSAGE_HEAD.itemsize
-        length = int(self.heads[place]['length']) - LENGTH_BESIDES_PAYLOAD
-        return self.data[begin : begin + length].tobytes(), int(self.heads[place]['publish_time'])
-
-    def counts(self) -> dict[int, int]:
-        """Return the number of messages by channel."""
-        channels, counts = np.unique(self.heads['channel'], return_counts=True)
-        return dict(zip(channels.tolist(), counts.tolist(), strict=True))
-
-    def beginnings(self, size: int) -> NDArray[np.uint8] | None:
-        """Return the first `size` bytes of each payload as rows, None if one of them is shorter."""
-        if (self.heads['length'] < LENGTH_BESIDES_PAYLOAD + size).any():
-            return None
-        return _rows(self.data, self.offsets + MESSAGE_HEAD.itemsize, size)
-
-    def payloads(self) -> NDArray[np.uint8] | list[bytes]:
-        """Return the payloads as rows if they have one length, else one by one."""
-        begins = self.offsets + MESSAGE_HEAD.itemsize
-        lengths = self.heads['length'].astype(np.int64) - LENGTH_BESIDES_PAYLOAD
-        if lengths.size and (lengths == lengths[0]).all():
-            return _rows(self.data, begins, int(lengths[0]))
-        buffer = self.data.data
-        pairs = zip(begins.tolist(), (begins + lengths).tolist(), strict=True)
-        return [bytes(buffer[begin:end]) for begin, end in pairs]
 
 
 def chunk_at(data: mmap.mmap, position: int) -> Chunk | None:
@@ -197,10 +159,10 @@ def explore(data: mmap.mmap, chunk: Chunk) -> bool:
     if contents is None:
         return False
     chunk.explored = True
-    chunk.counts, chunk.declarations = contents.counts(), contents.declarations
+    chunk.counts, chunk.declarations = contents.messages.counts(), contents.declarations
     chunk.channels = frozenset(chunk.counts)
     if chunk.counts:
-        times = contents.heads['log_time']
+        times = contents.messages.heads['log_time']
         chunk.start_time, chunk.end_time = int(times.min()), int(times.max())
     return True
 
@@ -218,32 +180,22 @@ def records_in(content: bytes) -> Contents:
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             declarations.append((opcode, content[position + RECORD.size : end]))
         position = end
-    return messages_at(content, np.array(offsets, np.int64), tuple(declarations), position == len(content))
+    messages = messages_at(content, np.array(offsets, np.int64))
+    return Contents(messages, tuple(declarations), position == len(content))
 
 
-def messages_at(
-    content: bytes | mmap.mmap,
-    offsets: Offsets,
-    declarations: tuple[tuple[int, bytes], ...] = (),
-    whole: bool = True,
-) -> Contents:
-    """Return the message records that begin at `offsets`."""
+def messages_at(content: bytes | mmap.mmap, offsets: Offsets) -> StoredMessages:
+    """Return the messages whose records begin at `offsets`."""
     data = np.frombuffer(content, np.uint8)
-    return Contents(data, offsets, _heads(data, offsets), declarations, whole)
+    return _messages(data, offsets, _record_heads(data, offsets))
 
 
-def stored_parts(data: bytes, compression: str) -> bytes:
-    """Return what the beginning of packed bytes holds; the rest may be missing, nothing is proven."""
-    try:
-        if compression == 'zstd':
-            return zstandard.ZstdDecompressor().decompressobj().decompress(data)
-        if compression == 'lz4':
-            import lz4.frame
-
-            return lz4.frame.LZ4FrameDecompressor().decompress(data)
-    except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError):
-        return b''
-    return b'' if compression else data
+def _messages(data: Bytes, offsets: Offsets, records: np.ndarray) -> StoredMessages:
+    heads = np.empty(len(records), HEAD)
+    for name, in_record in _FIELDS.items():
+        heads[name] = records[in_record]
+    ends = offsets + RECORD.size + records['length'].astype(np.int64)
+    return StoredMessages(heads, data, offsets + MESSAGE_HEAD.itemsize, ends)
 
 
 def _extents(chunk: Chunk) -> set[int]:
@@ -286,21 +238,22 @@ def _indexed(data: mmap.mmap, chunk: Chunk, content: bytes) -> Contents | None:
     size = len(content)
     if not offsets.size or offsets[0] < 0 or offsets[-1] + MESSAGE_HEAD.itemsize > size:
         return None
-    contents = messages_at(content, offsets)
-    lengths = contents.heads['length'].astype(np.int64)
+    data_of_chunk = np.frombuffer(content, np.uint8)
+    records = _record_heads(data_of_chunk, offsets)
+    lengths = records['length'].astype(np.int64)
     ends = offsets + RECORD.size + lengths
     begins = np.concatenate([offsets, [size]])
     before = np.concatenate([[0], ends])
-    sound = (contents.heads['opcode'] == Opcode.MESSAGE).all() and (lengths >= LENGTH_BESIDES_PAYLOAD).all()
+    sound = (records['opcode'] == Opcode.MESSAGE).all() and (lengths >= LENGTH_BESIDES_PAYLOAD).all()
     if not sound or (before > begins).any():
         return None
     declarations: list[tuple[int, bytes]] = []
     for place in np.flatnonzero(before != begins):
         between = records_in(content[before[place] : begins[place]])
-        if not between.whole or between.offsets.size:
+        if not between.whole or len(between.messages):
             return None
         declarations += between.declarations
-    return Contents(contents.data, offsets, contents.heads, tuple(declarations))
+    return Contents(_messages(data_of_chunk, offsets, records), tuple(declarations))
 
 
 def _index_offsets(data: mmap.mmap, position: int) -> Offsets:
@@ -319,15 +272,7 @@ def _index_offsets(data: mmap.mmap, position: int) -> Offsets:
     return np.sort(np.concatenate(found)) if found else np.empty(0, np.int64)
 
 
-def _heads(data: Bytes, offsets: Offsets) -> np.ndarray:
+def _record_heads(data: Bytes, offsets: Offsets) -> np.ndarray:
     if not offsets.size:
         return np.empty(0, MESSAGE_HEAD)
-    return _rows(data, offsets, MESSAGE_HEAD.itemsize).view(MESSAGE_HEAD)[:, 0]
-
-
-def _rows(data: Bytes, begins: Offsets, width: int) -> NDArray[np.uint8]:
-    """Return `width` bytes from each of `begins` on, which the caller knows to be inside of `data`."""
-    if not (width and len(begins)):
-        return np.empty((len(begins), width), np.uint8)
-    windows = np.lib.stride_tricks.as_strided(data, (data.size - width + 1, width), (1, 1), writeable=False)
-    return windows[begins]
+    return rows_at(data, offsets, MESSAGE_HEAD.itemsize).view(MESSAGE_HEAD)[:, 0]

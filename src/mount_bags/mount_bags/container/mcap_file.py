@@ -15,7 +15,6 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
-from mount_bags.bag.piece_topics import ACCOUNTS
 from mount_bags.container.chunks import (
     MESSAGE_HEAD,
     RECORD,
@@ -30,6 +29,7 @@ from mount_bags.container.chunks import (
     scattered_chunks,
 )
 from mount_bags.container.message_compression import plain
+from mount_bags.container.stored import ACCOUNTS, StorageError, StoredMessages, StoredTopic
 from mount_bags.container.summary import (
     Proof,
     data_proof,
@@ -45,10 +45,6 @@ _LENGTHS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
 _PRIVATE_OPCODE = 0x80  # and above: of other programs, to be skipped
 
 
-class McapFileError(ValueError):
-    """A file is no MCAP file."""
-
-
 @dataclass(frozen=True)
 class Stretch:
     """A part of the file in which something is lost: bytes from `begin` to `end`."""
@@ -58,12 +54,12 @@ class Stretch:
 
 
 class McapFile:
-    """Channels, metadata and message records of one file; what is wrong with it stands in `warnings`."""
+    """Topics, metadata and messages of one file; what is wrong with it stands in `warnings`."""
 
     def __init__(self, path: Path):
         self.path = path
-        self.channels: dict[int, Channel] = {}
-        self.schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._schemas: dict[int, Schema] = {}
         self.metadata: dict[str, dict[str, str]] = {}
         self.records: list[tuple[str, dict[str, str]]] = []
         self.warnings: list[str] = []
@@ -85,6 +81,7 @@ class McapFile:
         self._data_proof: Proof | None = None
         if self._summary.proof is not Proof.SOUND or not self._take_summary():
             self._search()
+        self.topics = {number: self._topic(channel) for number, channel in self._channels.items()}
         self._note_missing_checksums()
 
     @property
@@ -107,31 +104,26 @@ class McapFile:
         """Whether messages are known to be lost inside of it, not only at a cut-off end."""
         return bool(self.undeclared) or any(chunk.damaged for chunk in self.chunks)
 
-    def topic_type(self, channel: int) -> str:
-        """Return the type name of a channel, empty where the file tells none."""
-        schema = self.schemas.get(self.channels[channel].schema_id)
-        return '' if schema is None else schema.name
-
     def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by channel: as written where that is proven, else as readable."""
+        """Return the number of messages by topic: as written where that is proven, else as readable."""
         return dict(self._counts)
 
     def time_range(self) -> tuple[int, int] | None:
         """Return the earliest and the latest log time (ns), None for a file without messages."""
         return self._times
 
-    def blocks(self, channels: Collection[int]) -> Iterator[Contents]:
-        """Yield the messages of `channels` in the order of the file, unpacked where each is packed."""
+    def blocks(self, topics: Collection[int]) -> Iterator[StoredMessages]:
+        """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
         self.data_proof()
-        wanted = np.array(sorted(channels), np.int64)
+        wanted = np.array(sorted(topics), np.int64)
         for chunk in self.chunks:
-            if chunk.channels is None or not chunk.channels.isdisjoint(channels):
+            if chunk.channels is None or not chunk.channels.isdisjoint(topics):
                 contents = self.contents(chunk)
-                if contents is not None and (found := contents.of(wanted)).offsets.size:
+                if contents is not None and len(found := contents.messages.of(wanted)):
                     yield plain(found)
         if self._loose:
             found = messages_at(self._data, np.array(self._loose)).of(wanted)
-            if found.offsets.size:
+            if len(found):
                 yield plain(found)
 
     def attachments(self) -> Iterator[Attachment]:
@@ -163,10 +155,6 @@ class McapFile:
                 self._warn('the checksum of its data section is wrong: some byte of the file is damaged')
         return self._data_proof
 
-    def tail_bytes(self) -> bytes:
-        """Return what is there of the chunk that the end of the file cuts off."""
-        return b'' if self.tail is None else self._data[self.tail.begin : self.tail.end]
-
     # A file with a sound summary.
 
     def _take_summary(self) -> bool:
@@ -178,8 +166,8 @@ class McapFile:
             return False
         if statistics.channel_count > len(summary.channels) or statistics.schema_count > len(summary.schemas):
             return False  # not repeated in the summary
-        self.channels, self.schemas = dict(summary.channels), dict(summary.schemas)
-        if any(channel not in self.channels for channel in statistics.channel_message_counts):
+        self._channels, self._schemas = dict(summary.channels), dict(summary.schemas)
+        if any(channel not in self._channels for channel in statistics.channel_message_counts):
             return False
         self.chunks = sorted((chunk for chunk in chunks if chunk), key=lambda chunk: chunk.position)
         self._counts = dict(statistics.channel_message_counts)
@@ -227,13 +215,13 @@ class McapFile:
     def _search(self) -> None:
         self.chunks, self._loose, self._counts, self._times = [], [], {}, None
         loose_channels, loose_schemas = self._walk_all()
-        self.channels, self.schemas = {}, {}
+        self._channels, self._schemas = {}, {}
         for chunk in self.chunks:
             self._take_explored(chunk)
         if not self.chunks or (self.whole and self._summary.proof is not Proof.WRONG):
             # Nothing better is known, or there is no reason to doubt.
-            self.channels = loose_channels | self.channels
-            self.schemas = loose_schemas | self.schemas
+            self._channels = loose_channels | self._channels
+            self._schemas = loose_schemas | self._schemas
         if self._loose and self.chunks and not self.whole:
             self._drop_loose()
         if self._loose:
@@ -242,7 +230,7 @@ class McapFile:
 
     def _walk_all(self) -> tuple[dict[int, Channel], dict[int, Schema]]:
         """Find the chunks; return the channels and schemas that are declared outside of them."""
-        self.channels, self.schemas = {}, {}
+        self._channels, self._schemas = {}, {}
         end = self._walk(len(MCAP0_MAGIC), len(self._data), into_chunks=True)
         if not (self._footer_found and self._data[end:] == MCAP0_MAGIC):
             self.tail = self._tail(end)
@@ -255,7 +243,7 @@ class McapFile:
         self.closed = bool(self._data_end)
         if self._summary.proof is Proof.WRONG:
             self._warn('the summary at its end is damaged; its chunks are searched for')
-        return self.channels, self.schemas
+        return self._channels, self._schemas
 
     def _add_scattered_chunks(self) -> None:
         """Replace what the walk found by all chunks of the file that their checksums prove."""
@@ -287,7 +275,7 @@ class McapFile:
     def _understood(self, position: int, limit: int, walked: int) -> int:
         """Return where from `position` on the last whole record before `limit` ends.
 
-        What stands beside the messages is taken where nobody has `walked` so far.
+        What stands beside the messages is taken only from `walked` on.
         """
         while position < limit:
             end = self._record_end(position, limit)
@@ -321,10 +309,10 @@ class McapFile:
         if chunk.counts:
             self._widen(chunk.start_time, chunk.end_time)
 
-    def _count(self, contents: Contents) -> None:
-        for channel, count in contents.counts().items():
+    def _count(self, messages: StoredMessages) -> None:
+        for channel, count in messages.counts().items():
             self._counts[channel] = self._counts.get(channel, 0) + count
-        times = contents.heads['log_time']
+        times = messages.heads['log_time']
         self._widen(int(times.min()), int(times.max()))
 
     def _widen(self, first: int, last: int) -> None:
@@ -333,7 +321,7 @@ class McapFile:
         self._times = first, last
 
     def _forget_undeclared(self) -> None:
-        for channel in self._counts.keys() - self.channels.keys():
+        for channel in self._counts.keys() - self._channels.keys():
             count = self._counts.pop(channel)
             self._warn(f'{count} messages of channel {channel} are left out: their topic is not known')
             self.undeclared += count
@@ -396,15 +384,26 @@ class McapFile:
                 self.records.append((metadata.name, dict(metadata.metadata)))
                 self._records_at.add(position)
 
+    def _topic(self, channel: Channel) -> StoredTopic:
+        schema = self._schemas.get(channel.schema_id)
+        return StoredTopic(
+            name=channel.topic,
+            type=schema.name if schema else '',
+            encoding=channel.message_encoding,
+            definition=schema.data if schema else b'',
+            definition_encoding=schema.encoding if schema else '',
+            details=channel.metadata,
+        )
+
     def _declare(self, opcode: int, content: bytes) -> None:
         if opcode == Opcode.SCHEMA:
             schema = parsed(Schema.read, content)
             if schema is not None:
-                self.schemas.setdefault(schema.id, schema)
+                self._schemas.setdefault(schema.id, schema)
         else:
             channel = parsed(Channel.read, content)
             if channel is not None:
-                self.channels.setdefault(channel.id, channel)
+                self._channels.setdefault(channel.id, channel)
 
     def _leave_out(self, chunk: Chunk) -> None:
         chunk.damaged = True
@@ -444,10 +443,10 @@ def _opened(path: Path) -> mmap.mmap:
     try:
         data = mapped(path)
     except FileError as error:
-        raise McapFileError(str(error)) from None
+        raise StorageError(str(error)) from None
     if data[: len(MCAP0_MAGIC)] == MCAP0_MAGIC:
         return data
     known = read_summary(data).proof is Proof.SOUND or next(scattered_chunks(data), None) is not None
     if not known:
-        raise McapFileError(f'{path} is no MCAP file: its first bytes are not those of one')
+        raise StorageError(f'{path} is no MCAP file: its first bytes are not those of one')
     return data

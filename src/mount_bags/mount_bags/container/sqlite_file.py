@@ -6,32 +6,27 @@ log beside it; with one, a copy is read, in which sqlite puts both together.
 
 import shutil
 import sqlite3
-import struct
 import tempfile
 import weakref
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
-from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Schema
+from mcap.records import Attachment
 
-from mount_bags.container.chunks import LENGTH_BESIDES_PAYLOAD, MESSAGE_HEAD, Contents, messages_at
-from mount_bags.container.mcap_file import McapFileError
 from mount_bags.container.message_compression import plain
+from mount_bags.container.stored import HEAD, StorageError, StoredMessages, StoredTopic, stored_messages
 
 _AT_ONCE = 1000  # rows
-_HEAD = struct.Struct('<BQHIQQ')
 _LOGS = ('-wal', '-journal')  # behind the name of the database
 
 
 class SqliteFile:
-    """Topics and messages of a `.db3` file; storage without checksums. The interface of `McapFile`."""
+    """Topics and messages of a `.db3` file; storage without checksums."""
 
     def __init__(self, path: Path):
         self.path = path
-        self.channels: dict[int, Channel] = {}
-        self.schemas: dict[int, Schema] = {}
+        self.topics: dict[int, StoredTopic] = {}
         self.metadata: dict[str, dict[str, str]] = {}
         self.records: list[tuple[str, dict[str, str]]] = []
         self.warnings: list[str] = []
@@ -41,14 +36,14 @@ class SqliteFile:
         self._times: tuple[int, int] | None = None
         self._logs = [log for log in _logs_of(path) if log.is_file() and log.stat().st_size]
         if not path.is_file():
-            raise McapFileError(f'{path} cannot be read: no such file')
+            raise StorageError(f'{path} cannot be read: no such file')
         if path.suffix != '.db3':
-            raise McapFileError(f'{path} is compressed as a whole; unpack it first')
+            raise StorageError(f'{path} is compressed as a whole; unpack it first')
         try:
             self._base = self._connected()
             self._read_topics()
         except sqlite3.Error as error:
-            raise McapFileError(f'{path} is no readable sqlite3 bag: {error}') from None
+            raise StorageError(f'{path} is no readable sqlite3 bag: {error}') from None
         if self._logs:
             names = ', '.join(log.name for log in self._logs)
             self.warnings.append(f'{path.name} was not closed by its writer; read with {names}')
@@ -63,27 +58,23 @@ class SqliteFile:
         """Whether what it says of itself can be relied upon: a closed database has its own checks."""
         return not self._logs
 
-    def topic_type(self, channel: int) -> str:
-        """Return the type name of a channel."""
-        return self.schemas[self.channels[channel].schema_id].name
-
     def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by channel."""
+        """Return the number of messages by topic."""
         return dict(self._counts)
 
     def time_range(self) -> tuple[int, int] | None:
         """Return the earliest and the latest receive time (ns), None for a file without messages."""
         return self._times
 
-    def blocks(self, channels: Collection[int]) -> Iterator[Contents]:
-        """Yield the messages of `channels` in the order of their times."""
-        marks = ','.join(map(str, sorted(channels)))
+    def blocks(self, topics: Collection[int]) -> Iterator[StoredMessages]:
+        """Yield the messages of `topics` in the order of their times."""
+        marks = ','.join(map(str, sorted(topics)))
         wanted = f'topic_id IN ({marks}) ORDER BY timestamp, id'
         query = f'SELECT topic_id, timestamp, data FROM messages WHERE {wanted}'
         try:
             cursor = self._base.execute(query)
             while rows := cursor.fetchmany(_AT_ONCE):
-                yield plain(_as_records(rows))
+                yield plain(_messages(rows))
         except sqlite3.Error as error:
             self.damaged = True
             self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
@@ -101,7 +92,7 @@ class SqliteFile:
             for file in (self.path, *self._logs):
                 shutil.copyfile(file, folder / file.name)
         except OSError as error:
-            raise McapFileError(
+            raise StorageError(
                 f'{self.path} was not closed and cannot be copied to be read with its log: '
                 f'{error.strerror}; make room in {tempfile.gettempdir()}'
             ) from None
@@ -115,17 +106,17 @@ class SqliteFile:
             topic = dict(zip(columns, row, strict=True))
             number, type_name = int(topic['id']), str(topic['type'])
             encoding, text = definitions.get(type_name, ('', ''))
-            self.schemas[number] = Schema(id=number, data=text.encode(), encoding=encoding, name=type_name)
             details = {
                 'offered_qos_profiles': str(topic.get('offered_qos_profiles') or ''),
                 'topic_type_hash': str(topic.get('type_description_hash') or ''),
             }
-            self.channels[number] = Channel(
-                id=number,
-                topic=str(topic['name']),
-                message_encoding=str(topic['serialization_format']),
-                metadata=details,
-                schema_id=number,
+            self.topics[number] = StoredTopic(
+                name=str(topic['name']),
+                type=type_name,
+                encoding=str(topic['serialization_format']),
+                definition=text.encode(),
+                definition_encoding=encoding,
+                details=details,
             )
         counts = self._base.execute('SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id')
         self._counts = dict(counts.fetchall())
@@ -145,13 +136,9 @@ def _logs_of(path: Path) -> list[Path]:
     return [path.with_name(path.name + suffix) for suffix in _LOGS]
 
 
-def _as_records(rows: list[tuple[int, int, bytes]]) -> Contents:
-    """Return rows of the database as the records of an MCAP file, which the reading goes by."""
-    parts: list[bytes] = []
-    offsets, position = [], 0
-    for channel, time, data in rows:
-        length = len(data) + LENGTH_BESIDES_PAYLOAD
-        parts += (_HEAD.pack(Opcode.MESSAGE, length, channel, 0, time, time), data)
-        offsets.append(position)
-        position += MESSAGE_HEAD.itemsize + len(data)
-    return messages_at(b''.join(parts), np.array(offsets, np.int64))
+def _messages(rows: list[tuple[int, int, bytes]]) -> StoredMessages:
+    """Return rows of the database; it tells one time of a message, and no number."""
+    heads = np.zeros(len(rows), HEAD)
+    heads['topic'], heads['log_time'] = [row[0] for row in rows], [row[1] for row in rows]
+    heads['publish_time'] = heads['log_time']
+    return stored_messages(heads, [row[2] for row in rows])

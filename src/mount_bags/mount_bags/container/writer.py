@@ -308,7 +308,7 @@ class ChunkedMcap:
 
 
 def _nothing() -> None:
-    """Nobody wants to know."""
+    """Do nothing: nobody asked to be told."""
 
 
 def _packed(record: McapRecord) -> bytes:

@@ -4,8 +4,8 @@ import hashlib
 from collections.abc import Iterable
 from dataclasses import replace
 
-from mount_bags.bag.piece_topics import ACCOUNTS
 from mount_bags.bag.recording import Recording
+from mount_bags.container.stored import ACCOUNTS
 from mount_bags.edit.verbatim import VerbatimBag
 
 

@@ -3,7 +3,6 @@
 import math
 import os
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.metadata import TopicInformation
-from mount_bags.bag.origin import short_name, with_step
+from mount_bags.bag.origin import ZERO_KEY, with_step
 from mount_bags.bag.recording import Recording
 from mount_bags.edit.beside_messages import lost_beside_messages
 from mount_bags.edit.inherited_statement import sources_of
 from mount_bags.edit.messages import Messages, read_messages, write_messages
 from mount_bags.messages.series import registered_topic
-from mount_bags.messages.time_axis import ZERO_KEY, TimeAxis, time_axis
+from mount_bags.messages.time_axis import TimeAxis
+from mount_bags.run.session import time_text
 from mount_ros.topics import EVENT, Delivery
 
 _ALL = slice(None)
@@ -53,10 +53,10 @@ def cut(
     Times are in s on the time axis of `recording`, which the piece keeps; None is its beginning, or its end
     with the last message. Messages keep their bytes, log and publish times. Of latched topics and of `event`
     the last message before `begin` comes with it, and so do attachments and metadata. What the recorder lost
-    is told of the piece too: nobody knows when that was. `reason` goes into the note of origin. Raises
+    is told of the piece too: when that was is not known. `reason` goes into the note of origin. Raises
     `CutError`.
     """
-    span = _checked_span(recording, time_axis(recording), begin, end)
+    span = _checked_span(recording, recording.time_axis, begin, end)
     parts, losses, carried, read = [], [], 0, {}
     for name in recording:
         messages, damages = read_messages(recording, name)
@@ -69,7 +69,7 @@ def cut(
     if not count:
         raise CutError(f'{recording.path} has no message {span}; it ends at {span.whole:.3f} s')
     distro = recording.information.ros_distro if recording.information else ''
-    custom = with_step([recording], _step(recording, span, reason))
+    custom = with_step([recording.information], _step(recording, span, reason))
     write_messages(out, parts, [recording], sources_of(recording, read), custom, distro)
     losses += [f'{name} is lost by damage' for name in lost_beside_messages([recording])]
     return Cut(Path(out), span.begin, span.end, count, carried, tuple(losses))
@@ -142,10 +142,10 @@ def _carried(topic: TopicInformation) -> slice:
 def _step(recording: Recording, span: _Span, reason: str) -> dict[str, Any]:
     return {
         'did': 'cut',
-        'recording': short_name(recording),
+        'recording': recording.short_name,
         'from_s': span.begin,
         'to_s': span.end,
         ZERO_KEY: span.zero,
-        'made': datetime.now().astimezone().isoformat(timespec='seconds'),
+        'made': time_text(),
         **({'reason': reason} if reason else {}),
     }

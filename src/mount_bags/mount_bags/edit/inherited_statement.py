@@ -10,7 +10,8 @@ from collections.abc import Iterable, Mapping
 import yaml
 
 from mount_bags.bag.recording import Recording
-from mount_bags.bag.statement import RECORDER_RECORD, Reception, excerpt_statement, read_statement
+from mount_bags.bag.statement import Reception, excerpt_statement, read_statement
+from mount_bags.container.stored import RECORDER_RECORD
 
 SOURCES = 'sources'  # key in the record of the recorder
 

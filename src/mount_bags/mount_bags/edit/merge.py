@@ -4,19 +4,19 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.metadata import TopicInformation
-from mount_bags.bag.origin import short_name, with_step
+from mount_bags.bag.origin import with_step
 from mount_bags.bag.recording import Recording
 from mount_bags.edit.beside_messages import lost_beside_messages
 from mount_bags.edit.inherited_statement import sources_of, united
 from mount_bags.edit.messages import Messages, joined_payloads, read_messages, write_messages
 from mount_bags.messages.series import Times, registered_topic
+from mount_bags.run.session import time_text
 from mount_bags.run.session_differences import session_differences
 from mount_ros.topics import SESSION, Delivery
 
@@ -68,12 +68,12 @@ def merge(
         repeated += sum(map(len, found)) - len(parts[-1])
     step = {
         'did': 'merge',
-        'recordings': [short_name(recording) for recording in recordings],
-        'made': datetime.now().astimezone().isoformat(timespec='seconds'),
+        'recordings': [recording.short_name for recording in recordings],
+        'made': time_text(),
     }
     distros = [recording.information.ros_distro for recording in recordings if recording.information]
     sources = united(map(sources_of, recordings, read))
-    custom = with_step(recordings, step)
+    custom = with_step([recording.information for recording in recordings], step)
     kept = write_messages(out, parts, recordings, sources, custom, next(iter(distros), ''))
     losses += [f'{name} is lost by damage' for name in lost_beside_messages(recordings)]
     return Merge(Path(out), kept, repeated, tuple(_holes(recordings)), tuple(losses))

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.metadata import TopicInformation
-from mount_bags.bag.piece_topics import BagFile
 from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.bag.statement import RECORDER_RECORD
+from mount_bags.container.stored import RECORDER_RECORD, StoredTopic
 from mount_bags.edit.beside_messages import copy_beside_messages
 from mount_bags.edit.inherited_statement import Sources, inherited_statement
 from mount_bags.edit.verbatim import VerbatimBag
@@ -23,11 +22,11 @@ _LARGE = 500_000  # messages, chosen: about 100 MB
 class Messages:
     """Messages of one topic in the order of their log times (ns).
 
-    `declared` is the file with its channel that says what they are; None only where there are none.
+    `declared` is what their file says of them; None only where there are none.
     """
 
     topic: TopicInformation
-    declared: tuple[BagFile, int] | None
+    declared: StoredTopic | None
     log_times: Times
     publish_times: Times
     payloads: Payloads
@@ -76,7 +75,7 @@ def write_messages(
     """
     bag = VerbatimBag(folder)
     try:
-        channels = [bag.channel(*part.declared) if part.declared else 0 for part in parts]
+        channels = [bag.topic(part.declared) if part.declared else 0 for part in parts]
         for number, place in in_log_order(parts):
             part = parts[number]
             times = int(part.log_times[place]), int(part.publish_times[place])
@@ -108,14 +107,12 @@ def joined_payloads(payloads: Iterable[Payloads]) -> Payloads:
     return Payloads([_pieces(each) for each in payloads if len(each)])
 
 
-def _declaration(recording: Recording, name: str) -> tuple[BagFile, int] | None:
-    channels = (
-        (file, number, channel) for file in recording.files for number, channel in file.channels.items()
-    )
-    return next(((file, number) for file, number, channel in channels if channel.topic == name), None)
+def _declaration(recording: Recording, name: str) -> StoredTopic | None:
+    topics = (topic for file in recording.files for topic in file.topics.values())
+    return next((topic for topic in topics if topic.name == name), None)
 
 
-def _in_order(topic: TopicInformation, declared: tuple[BagFile, int] | None, series: Series) -> Messages:
+def _in_order(topic: TopicInformation, declared: StoredTopic | None, series: Series) -> Messages:
     messages = Messages(
         topic, declared, series.receive_times, series.publish_times, series.payloads, series.sequences
     )

@@ -1,10 +1,8 @@
 """Makes a sound recording out of a cut or damaged one: whatever is proven, and what is left is told.
 
-Every whole chunk is taken as it is, with topics, quality of service, times and custom data. Of a chunk that
-the end of the file cuts off, its beginning can be unpacked where its compression allows: zstd in blocks of
-128 KiB at most, so a chunk of 64 KiB is all or nothing. No checksum vouches for such messages. They are
-kept only where the file shows no other damage and each one is a whole record of a known topic, of its
-encoding, within the times of its chunk; the new recording says so whenever it is opened.
+Every whole chunk is taken as it is, with topics, quality of service, times and custom data. A chunk that the
+end of the file cuts off is lost: no checksum holds for a part of it, and of 64 KiB packed by zstd, in blocks
+of up to 128 KiB, nothing can be unpacked.
 """
 
 import itertools
@@ -12,23 +10,18 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
-import numpy as np
-
 from mount_bags.bag.metadata import NO_TIME
-from mount_bags.bag.piece_topics import BagFile, repeated_topics
-from mount_bags.bag.recording import RECOVERY_NOTE, Recording, open_recording
-from mount_bags.bag.statement import RECORDER_RECORD, read_statement
-from mount_bags.container.chunks import Contents, records_in, stored_parts
+from mount_bags.bag.piece_topics import repeated_topics
+from mount_bags.bag.recording import Recording, open_recording
+from mount_bags.bag.statement import read_statement
 from mount_bags.container.mcap_file import McapFile
-from mount_bags.container.message_compression import plain
+from mount_bags.container.stored import RECORDER_RECORD, StoredMessages
 from mount_bags.edit.beside_messages import copy_beside_messages, lost_beside_messages
 from mount_bags.edit.inherited_statement import inherited_statement, sources_of
 from mount_bags.edit.verbatim import VerbatimBag
 
-_ZEROS = 16  # chosen: so many zeros at the end of a cut file are room that was never written
 _SECOND = 1e9  # ns
 
 Progress = Callable[[int, int], None]  # messages done, messages in all
@@ -42,13 +35,12 @@ class RecoveryError(ValueError):
 class Recovery:
     """What was kept and what is lost; NaN and None where it cannot be told.
 
-    `unchecked` of the kept messages come from a chunk without its checksum; `lost` is an estimate from
-    bytes unless `lost_is_counted`. `lost_before` never reached the file: its recorder says so itself.
+    `lost` is an estimate from bytes unless `lost_is_counted`. `lost_before` never reached the file: its
+    recorder says so itself.
     """
 
     folder: Path
     kept: int
-    unchecked: int
     lost: int | None
     lost_is_counted: bool
     kept_seconds: float
@@ -96,14 +88,12 @@ def recover(
     recording = open_recording(path)
     bag = VerbatimBag(out)
     try:
-        copied = _copy(recording, bag, progress or _silent)
+        stored = _copy(recording, bag, progress or _silent)
         bag.flush()
         if not bag.kept:
             raise RecoveryError(f'{path} holds no message that can be recovered: {_reasons(recording)}')
         custom = dict(recording.information.custom_data) if recording.information else {}
-        if copied.unchecked:
-            custom[RECOVERY_NOTE] = copied.note
-        custom['recovered_from'] = _origin(recording, copied)
+        custom['recovered_from'] = f'{recording.path.name}: {stored} messages'
         copy_beside_messages([recording], bag)
         sources = sources_of(recording, bag.kept_by_topic)
         if sources:
@@ -112,121 +102,54 @@ def recover(
     except BaseException:
         bag.discard()
         raise
-    return _balance(recording, bag, copied)
+    return _balance(recording, bag, stored)
 
 
-@dataclass
-class _Copied:
-    stored: int = 0  # messages of whole chunks, repetitions included
-    unchecked: int = 0
-    first_unchecked: int = 0  # ns
-
-    @property
-    def note(self) -> str:
-        first = datetime.fromtimestamp(self.first_unchecked / _SECOND).isoformat(timespec='milliseconds')
-        return (
-            f'the last {self.unchecked} messages, from {first} on, come from a cut-off chunk: they are '
-            'whole records, but no checksum vouches for their numbers'
-        )
-
-
-def _copy(recording: Recording, bag: VerbatimBag, progress: Progress) -> _Copied:
-    copied, expected = _Copied(), recording.message_count
+def _copy(recording: Recording, bag: VerbatimBag, progress: Progress) -> int:
+    """Write all messages to `bag` and return how many the files hold, repetitions included."""
+    stored, expected = 0, recording.message_count
     last: dict[str, tuple[bytes, int]] = {}
     watched = frozenset().union(*repeated_topics(recording.files))
     for file, repeated in zip(recording.files, repeated_topics(recording.files), strict=True):
-        targets = {number: bag.channel(file, number) for number in file.channels}
-        names = {number: channel.topic for number, channel in file.channels.items()}
+        targets = {number: bag.topic(topic) for number, topic in file.topics.items()}
         pending = set(repeated)
-        for contents, is_checked in _all_contents(file):
-            for channel, raw, log_time, publish_time, sequence in _messages(contents):
-                copied.stored += is_checked
-                name = names[channel]
+        for block in file.blocks(file.topics.keys()):
+            for number, raw, log_time, publish_time, sequence in _messages(block):
+                stored += 1
+                name = file.topics[number].name
                 if name in watched:
                     is_first, same = name in pending, last.get(name) == (raw, publish_time)
                     pending.discard(name)
                     last[name] = raw, publish_time
                     if is_first and same:
                         continue
-                bag.write(targets[channel], raw, log_time, publish_time, sequence)
-                if not is_checked:
-                    copied.first_unchecked = copied.first_unchecked or log_time
-                    copied.unchecked += 1
+                bag.write(targets[number], raw, log_time, publish_time, sequence)
             progress(bag.kept + bag.pending, expected)
-    return copied
+    return stored
 
 
-def _all_contents(file: BagFile) -> Iterator[tuple[Contents, bool]]:
-    """Yield everything in a file, and whether it is as proven as the file can prove."""
-    for contents in file.blocks(file.channels.keys()):
-        yield contents, True
-    if isinstance(file, McapFile):
-        rest = _salvaged(file)
-        if rest is not None and rest.offsets.size:
-            yield rest, False
-
-
-def _messages(contents: Contents) -> Iterator[tuple[int, bytes, int, int, int]]:
-    heads = contents.heads
-    raws = map(bytes, contents.payloads())
-    columns = (heads[name].tolist() for name in ('channel', 'log_time', 'publish_time', 'sequence'))
-    for channel, log_time, publish_time, sequence, raw in zip(*columns, raws, strict=True):
-        yield channel, raw, log_time, publish_time, sequence
-
-
-def _salvaged(file: McapFile) -> Contents | None:
-    """Return the credible messages of the chunk that the end of the file cuts off."""
-    tail = file.tail
-    if tail is None or any(chunk.damaged for chunk in file.chunks):
-        return None
-    if [stretch.begin for stretch in file.unexplained] != [tail.position]:
-        return None  # with other damage in the file, this may be more than a cut
-    content = stored_parts(_without_zeros(file.tail_bytes()), tail.compression)
-    contents = records_in(content)
-    encodings = _encodings(file)
-    for place, (channel, raw, log_time, _, _) in enumerate(_messages(contents)):
-        credible = encodings.get(channel) == raw[:4] and tail.start_time <= log_time <= tail.end_time
-        if not credible:
-            contents = Contents(contents.data, contents.offsets[:place], contents.heads[:place])
-            break
-    return plain(contents)
-
-
-def _encodings(file: McapFile) -> dict[int, bytes]:
-    """Return the first four bytes of a message by channel: kind of encoding and options."""
-    found: dict[int, bytes] = {}
-    for chunk in file.chunks:
-        missing = (chunk.channels or frozenset()) - found.keys()
-        contents = file.contents(chunk) if missing else None
-        if contents is not None:
-            numbers, places = np.unique(contents.heads['channel'], return_index=True)
-            for number, place in zip(numbers.tolist(), places.tolist(), strict=True):
-                found.setdefault(number, contents.message(place)[0][:4])
-    return found
-
-
-def _without_zeros(data: bytes) -> bytes:
-    stripped = data.rstrip(b'\0')
-    return stripped if len(data) - len(stripped) >= _ZEROS else data
+def _messages(block: StoredMessages) -> Iterator[tuple[int, bytes, int, int, int]]:
+    raws = map(bytes, block.payloads())
+    columns = (block.heads[name].tolist() for name in ('topic', 'log_time', 'publish_time', 'sequence'))
+    for number, log_time, publish_time, sequence, raw in zip(*columns, raws, strict=True):
+        yield number, raw, log_time, publish_time, sequence
 
 
 # What is kept and what is lost.
 
 
-def _balance(recording: Recording, bag: VerbatimBag, copied: _Copied) -> Recovery:
+def _balance(recording: Recording, bag: VerbatimBag, stored: int) -> Recovery:
     files = [file for file in recording.files if isinstance(file, McapFile)]
     lost_bytes = sum(_lost_bytes(file) for file in files)
     size = sum(file.path.stat().st_size for file in recording.files)
     expected = _expected(recording)
-    here = copied.stored + copied.unchecked
-    lost = max(0, expected - here) if expected is not None else _estimate(files, here)
+    lost = max(0, expected - stored) if expected is not None else _estimate(files, stored)
     inside = sum(_lost_inside(file) for file in files) / _SECOND
     span = bag.time_range or (0, 0)
     complete = recording.whole and not (lost and expected is not None)
     return Recovery(
         folder=bag.folder,
         kept=bag.kept,
-        unchecked=copied.unchecked,
         lost=0 if complete else lost,
         lost_is_counted=expected is not None,
         kept_seconds=(span[1] - span[0]) / _SECOND - inside,
@@ -236,7 +159,7 @@ def _balance(recording: Recording, bag: VerbatimBag, copied: _Copied) -> Recover
         all_messages=complete,
         lost_beside=tuple(lost_beside_messages([recording])),
         lost_before=_lost_before(recording),
-        notes=(*recording.warnings, *((copied.note,) if copied.unchecked else ())),
+        notes=tuple(recording.warnings),
     )
 
 
@@ -255,7 +178,7 @@ def _estimate(files: Sequence[McapFile], kept: int) -> int | None:
 
 
 def _expected(recording: Recording) -> int | None:
-    """Return how many messages there once were, None if nobody reliable says."""
+    """Return how many messages there once were, None if no reliable source tells."""
     if recording.proven:
         return sum(sum(file.message_counts().values()) for file in recording.files)
     information = recording.information
@@ -285,7 +208,7 @@ def _lost_inside(file: McapFile) -> int:
 
 
 def _lost_at_ends(recording: Recording, kept: tuple[int, int]) -> float:
-    """Return the s before the first and behind the last kept message, NaN if nobody says."""
+    """Return the s before the first and behind the last kept message, NaN if no source tells."""
     first, last = kept
     information = recording.information
     if recording.proven and recording.time_range:
@@ -300,11 +223,6 @@ def _lost_at_ends(recording: Recording, kept: tuple[int, int]) -> float:
     return (max(0, first - begin) + max(0, end - last)) / _SECOND
 
 
-def _origin(recording: Recording, copied: _Copied) -> str:
-    kept = copied.stored + copied.unchecked
-    return f'{recording.path.name}: {kept} messages, {copied.unchecked} of them without a checksum'
-
-
 def _reasons(recording: Recording) -> str:
     return '; '.join(recording.warnings) or 'it is empty'
 
@@ -314,4 +232,4 @@ def _size(count: int) -> str:
 
 
 def _silent(done: int, of: int) -> None:
-    """Nobody looks."""
+    """Show no progress."""

@@ -17,10 +17,10 @@ from mount_bags.bag.metadata import (
     embedded_text,
     metadata_text,
 )
-from mount_bags.bag.offered_qos import OfferedQos, QosError, read_qos
-from mount_bags.bag.piece_topics import BagFile
+from mount_bags.bag.piece_topics import offers_of
 from mount_bags.bag.writer import create_folder
 from mount_bags.container.record_file import RecordFile
+from mount_bags.container.stored import StoredTopic
 from mount_bags.container.writer import ChunkedMcap
 
 _PROFILE = 'ros2'
@@ -65,24 +65,22 @@ class VerbatimBag:
             counts[topic.name] = counts.get(topic.name, 0) + self._container.message_counts.get(number, 0)
         return counts
 
-    def channel(self, file: BagFile, number: int) -> int:
-        """Declare a channel of another file and return its number here; equal ones are declared once."""
-        channel = file.channels[number]
-        schema = file.schemas.get(channel.schema_id)
-        key = (schema.name, schema.encoding, schema.data) if schema else ('', '', b'')
-        schema_id = self._schemas.get(key) or self._container.add_schema(*key)
-        self._schemas[key] = schema_id
-        wanted = (channel.topic, channel.message_encoding, schema_id)
+    def topic(self, topic: StoredTopic) -> int:
+        """Declare a topic of another file and return the number of its channel; equal ones share it."""
+        definition = (topic.type, topic.definition_encoding, topic.definition)
+        schema_id = self._schemas.get(definition) or self._container.add_schema(*definition)
+        self._schemas[definition] = schema_id
+        wanted = (topic.name, topic.encoding, schema_id)
         if wanted not in self._channels:
-            added = self._container.add_channel(*wanted, channel.metadata)
+            added = self._container.add_channel(*wanted, topic.details)
             self._channels[wanted] = added
             self._topics[added] = TopicInformation(
-                name=channel.topic,
-                type=schema.name if schema else '',
+                name=topic.name,
+                type=topic.type,
                 message_count=0,
-                serialization_format=channel.message_encoding,
-                offered_qos=_offers(channel.metadata),
-                type_hash=channel.metadata.get('topic_type_hash', ''),
+                serialization_format=topic.encoding,
+                offered_qos=offers_of(topic),
+                type_hash=topic.details.get('topic_type_hash', ''),
             )
         return self._channels[wanted]
 
@@ -142,10 +140,3 @@ class VerbatimBag:
             ros_distro=ros_distro or 'jazzy',
             custom_data=custom_data,
         )
-
-
-def _offers(metadata: Mapping[str, str]) -> tuple[OfferedQos, ...]:
-    try:
-        return read_qos(metadata.get('offered_qos_profiles', ''))
-    except QosError:
-        return ()

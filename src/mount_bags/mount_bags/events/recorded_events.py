@@ -8,7 +8,7 @@ import numpy as np
 from mount_bags.bag.recording import Recording
 from mount_bags.events.event_marks import Mark, read_marks
 from mount_bags.messages.series import Series, SeriesError, registered_topic
-from mount_bags.messages.time_axis import TimeAxis, time_axis
+from mount_bags.messages.time_axis import TimeAxis
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
 SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
@@ -106,7 +106,7 @@ def _changes(trace: Series) -> list[RecordedEvent]:
 def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
     if not events:
         return 'it has none, and damping was never switched; cut by --from and --to'
-    axis = time_axis(recording)
+    axis = recording.time_axis
     shown = [
         f'{number} {event.kind} at {event_time(event, axis):.3f} s'
         for number, event in enumerate(events[:12], 1)

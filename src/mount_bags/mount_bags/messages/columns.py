@@ -3,12 +3,10 @@
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from numpy.lib.recfunctions import repack_fields
 
-from mount_bags.container.chunks import MESSAGE_HEAD, Contents
+from mount_bags.container.stored import HEAD, StoredMessages
 from mount_bags.messages.series import Column, Payloads, Series, SeriesError, Times
 
-_KEPT = ['log_time', 'publish_time', 'sequence']  # of the head of a message
 _BLOCK = 4096  # messages, chosen: 3 MB of the longest ones of this project
 
 MakeSeries = Callable[[Payloads, np.ndarray], Series]
@@ -27,11 +25,11 @@ class ColumnCollector:
         self._waiting_heads: list[np.ndarray] = []
         self._count = 0
 
-    def add(self, block: Contents) -> None:
+    def add(self, block: StoredMessages) -> None:
         """Take the messages in `block`."""
         self._waiting.append(block.payloads())
         self._waiting_heads.append(block.heads)
-        self._count += len(block.heads)
+        self._count += len(block)
         if self._count >= _BLOCK:
             self._take()
 
@@ -40,13 +38,13 @@ class ColumnCollector:
         if self._count:
             self._take()
         if not self._heads:
-            return np.empty(0, MESSAGE_HEAD), {}, None
+            return np.empty(0, HEAD), {}, None
         columns = {name: np.concatenate(parts) for name, parts in self._columns.items()}
         stamps = None if self._stamps is None else np.concatenate(self._stamps)
         return np.concatenate(self._heads), columns, stamps
 
     def _take(self) -> None:
-        heads = repack_fields(np.concatenate(self._waiting_heads)[_KEPT])
+        heads = np.concatenate(self._waiting_heads)
         series = self._make_series(Payloads(self._waiting), heads)
         self._heads.append(heads)
         self._waiting, self._waiting_heads, self._count = [], [], 0

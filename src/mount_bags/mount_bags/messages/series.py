@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.messages.decoding import decode
-from mount_bags.messages.definitions import Definition, installed_class, installed_definition
+from mount_bags.messages.definitions import Definition, installed_definition
 from mount_bags.messages.layout import HEAD, OPTIONS, Layout, LayoutError, layout_of
 from mount_ros.topics import JOINT_STATE, RACK_TOPICS, TOPICS, Scalar, Topic
 
@@ -56,7 +56,7 @@ class Series:
     the messages' headers), all in ns; `sequences` are the publisher's numbers, 0 where it gave none.
     `series[name]` is a column: of a `JointState` the position of
     that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
-    `time` and `values` are the same for all columns at once, as arrays to plot.
+    `time` is that of all columns, to plot.
     """
 
     def __init__(
@@ -150,19 +150,6 @@ class Series:
             return np.asarray(times * 1e-9, np.float64)
         return np.asarray((times - self._zero) * 1e-9, np.float64)
 
-    @property
-    def values(self) -> Column:
-        """All columns side by side, messages x names, in the units `units`; raises `SeriesError`."""
-        values = np.empty((len(self), len(self.names)))
-        for place, name in enumerate(self.names):
-            values[:, place] = self[name]
-        return values
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """The units of `values`, empty where the registry does not know one."""
-        return tuple(self.unit(name) for name in self.names)
-
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
         """The names of the columns."""
@@ -200,12 +187,11 @@ class Series:
         return next((scalar.derivative_unit for scalar in self._scalars() if scalar.name == name), '')
 
     def message(self, index: int) -> Any:
-        """Return message `index`, deserialised; raises `SeriesError`.
-
-        Of a type that is not installed, or that was another when it was recorded: a plain object with the
-        fields as attributes.
-        """
-        return self._deserialised(index)
+        """Return message `index` as an object with its fields as attributes; raises `SeriesError`."""
+        try:
+            return decode(self.payloads[index], self._definition)
+        except LayoutError as error:
+            raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
 
     def content(self, index: int) -> bytes:
         """Return the bytes of message `index` without its stamp and without the options of its encoding."""
@@ -219,8 +205,8 @@ class Series:
         return raw[: OPTIONS.start] + raw[OPTIONS.stop : place] + raw[place + STAMP_BYTES :]
 
     def messages(self) -> Iterator[Any]:
-        """Yield all messages, deserialised."""
-        return (self._deserialised(index) for index in range(len(self)))
+        """Yield all messages."""
+        return (self.message(index) for index in range(len(self)))
 
     def _stamp(self, message: Any) -> int:
         if not hasattr(message, 'header'):
@@ -256,15 +242,6 @@ class Series:
         except ValueError as error:
             raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
 
-    @functools.cached_property
-    def _class(self) -> type | None:
-        """The installed class of the messages, None where it is missing or has other fields."""
-        definition = self._definition
-        try:
-            return installed_class(self.type) if installed_definition(self.type) == definition else None
-        except ValueError:
-            return None
-
     def _joint_column(self, name: str, part: str) -> Column:
         if name not in self.names:
             raise SeriesError(
@@ -296,21 +273,6 @@ class Series:
     @functools.cached_property
     def _decoded(self) -> list[Any]:
         return list(self.messages())
-
-    def _deserialised(self, index: int) -> Any:
-        kind, raw = self._class, self.payloads[index]
-        if kind is None:
-            try:
-                return decode(raw, self._definition)
-            except LayoutError as error:
-                raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
-        # Only needed where messages differ in shape: the fast way does without the middleware.
-        from rclpy.serialization import deserialize_message
-
-        try:
-            return deserialize_message(raw, kind)
-        except Exception as error:  # the binding raises a type of its own that it does not export
-            raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
 
 
 def registered_topic(name: str, type_name: str) -> Topic | None:

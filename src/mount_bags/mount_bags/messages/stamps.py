@@ -124,7 +124,7 @@ def stamp_jitter(stamps: NDArray[np.int64], rate: float) -> StampJitter:
 
 
 def regular_rate(stamps: NDArray[np.int64]) -> float | None:
-    """Return the rate (Hz) of samples that nobody declared, None where their stamps (ns) show none.
+    """Return the rate (Hz) of samples without a declared one, None where their stamps (ns) show none.
 
     Regular are at least 10 samples of which nearly none is repeated, where most steps are one period and
     nearly all are within a quarter of a period of whole ones.

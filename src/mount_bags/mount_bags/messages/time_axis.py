@@ -1,20 +1,15 @@
 """The one time that people are told: s from the first displacement sample of a recording."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.origin import origin
-from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import SeriesError, Times, registered_topic
-from mount_bags.messages.topic_times import TopicTimes
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
-ZERO_KEY = 'zero_ns'  # in the note of origin: a piece keeps the time of what it was cut from
-
 _ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)
-_NONE: Times = np.empty(0, np.int64)
 _OTHER_CLOCK = 86_400.0  # s, chosen: what is so far off was told on another clock
 
 
@@ -67,27 +62,33 @@ class TimeAxis:
         return int(_between(stamp, self._stamps, self._received)[0])
 
 
-def time_axis(recording: Recording, times: Mapping[str, TopicTimes] | None = None) -> TimeAxis:
-    """Return the time axis of a recording; `times`, where known already, spare the reading of its samples."""
-    told = [step[ZERO_KEY] for step in origin(recording) if isinstance(step.get(ZERO_KEY), int)]
+class Arrivals(Protocol):
+    """Samples of a topic: when they were taken and when they came in, ns."""
+
+    @property
+    def stamps(self) -> Times | None: ...
+    @property
+    def receive_times(self) -> Times: ...
+
+
+def axis_of(
+    types: Mapping[str, str], arrivals: Callable[[str], Arrivals], told: Sequence[int], first: int
+) -> TimeAxis:
+    """Return the axis of a recording with the topics {name: type} that have messages, read by `arrivals`.
+
+    `told` are the zeros (ns) that it inherits, `first` is its first log time (ns).
+    """
     for topic in _ANCHORS:
-        for name, information in recording.topics.items():
-            if registered_topic(name, information.type) is topic and information.message_count:
-                stamps, received = _arrivals(recording, name, times)
-                if stamps.size:
-                    return TimeAxis(stamps, received, told)
-    first = np.array([recording.time_range[0] if recording.time_range else 0])
-    return TimeAxis(first, first, told)
-
-
-def _arrivals(recording: Recording, name: str, times: Mapping[str, TopicTimes] | None) -> tuple[Times, Times]:
-    """Return stamps and times of reception, none where the messages of a foreign topic have no stamps."""
-    found = recording[name] if times is None else times[name]
-    try:
-        stamps = found.stamps
-    except SeriesError:
-        stamps = None
-    return (_NONE, _NONE) if stamps is None else (stamps, found.receive_times)
+        for name in (name for name, kind in types.items() if registered_topic(name, kind) is topic):
+            found = arrivals(name)
+            try:
+                stamps = found.stamps
+            except SeriesError:  # of a foreign topic
+                continue
+            if stamps is not None and stamps.size:
+                return TimeAxis(stamps, found.receive_times, told)
+    only = np.array([first])
+    return TimeAxis(only, only, told)
 
 
 def _between(places: Times, known: Times, wanted: Times) -> Times:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.container.chunks import Contents
+from mount_bags.container.stored import StoredMessages
 from mount_bags.messages.definitions import Definition
 from mount_bags.messages.series import Payloads, Series, Times
 
@@ -41,12 +41,12 @@ class TimesCollector:
         self._sent: list[Times] = []
         self._first: bytes | None = None
 
-    def add(self, block: Contents) -> None:
+    def add(self, block: StoredMessages) -> None:
         """Take the times of the messages in `block`."""
         if self._first is None:
             self._first = block.message(0)[0]
-        self._received.append(block.heads['log_time'].astype(np.int64))
-        self._sent.append(block.heads['publish_time'].astype(np.int64))
+        self._received.append(block.heads['log_time'].copy())
+        self._sent.append(block.heads['publish_time'].copy())
         if not self._obstacle:
             stamps = _stamps_in(block)
             if stamps is None:
@@ -80,7 +80,7 @@ def _begins_with_header(definition: Definition) -> bool:
     )
 
 
-def _stamps_in(block: Contents) -> Times | None:
+def _stamps_in(block: StoredMessages) -> Times | None:
     rows = block.beginnings(_STAMP_END)
     if rows is None:
         return None

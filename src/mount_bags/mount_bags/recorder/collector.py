@@ -14,8 +14,10 @@ from collections.abc import Callable
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from mount_ros.data_path import DataThread, Work, io_node
+from mount_ros.data_path import io_node
+from mount_ros.data_thread import DataThread, Work
 from mount_ros.messages.types import message_class
+from mount_ros.private_rclpy import Taken, raw_taker
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import Topic
 
@@ -23,7 +25,7 @@ Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns), both of the system clock."""
 
 _PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold five seconds
-_SHARED_PERIOD = 0.02  # s, chosen: the same where nobody looks at the recording while it grows
+_SHARED_PERIOD = 0.02  # s, chosen: the same where the recording is not watched while it grows
 
 
 class Collector:
@@ -51,7 +53,7 @@ class Collector:
         self._taken_at = 0.0
         self._works: list[Work] = [self._take_when_due]
         self._attended: list[Work] = []
-        self._receivers: list[tuple[Subscription, Receive]] = []
+        self._receivers: list[tuple[Subscription, Callable[[], Taken | None], Receive]] = []
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
 
@@ -65,17 +67,17 @@ class Collector:
         subscription = self.node.create_subscription(
             message_class(topic.type), topic.name, _never_called, recording_qos(topic), raw=True
         )
-        self._receivers.append((subscription, receive))
+        self._receivers.append((subscription, raw_taker(subscription), receive))
         return subscription
 
     def sender(self, topic: Topic) -> Callable[[bytes], None]:
         """Create a publisher of `topic` and return the function that publishes its bytes, from any thread."""
         publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
-        return publisher.handle.publish_raw
+        return publisher.publish
 
     def unmatched(self) -> list[str]:
         """Return the names of the topics that no publisher has been found for yet."""
-        return sorted(s.topic_name for s, _ in self._receivers if s.get_publisher_count() == 0)
+        return sorted(s.topic_name for s, *_ in self._receivers if s.get_publisher_count() == 0)
 
     def attend(self, work: Work) -> None:
         """Let the thread that serves the publishers do `work` too while it serves; `work` must not raise."""
@@ -125,12 +127,10 @@ class Collector:
 
     def _take_batch(self) -> None:
         batch: list[tuple[int, int, bytes, Receive]] = []
-        for subscription, receive in self._receivers:
-            handle, kind = subscription.handle, subscription.msg_type
-            with handle:
-                while (taken := handle.take_message(kind, True)) is not None:
-                    raw, times = taken
-                    batch.append((times['received_timestamp'], times['source_timestamp'], raw, receive))
+        for _, take, receive in self._receivers:
+            while (taken := take()) is not None:
+                raw, times = taken
+                batch.append((times['received_timestamp'], times['source_timestamp'], raw, receive))
         batch.sort(key=operator.itemgetter(0))
         for received, sent, raw, receive in batch:
             try:

@@ -10,17 +10,16 @@ OVERSHOOT = 0.5
 _ROUNDING = 1e-12
 
 
-def check_range(even: EvenSignal, resampled: FloatArray, first: float, step_time: float) -> None:
-    """Raise `SignalError` where resampled values leave the range of the samples by more than `OVERSHOOT`."""
-    low, high = float(even.values.min()), float(even.values.max())
+def check_range(even: EvenSignal, value: float, at: float, low: float, high: float) -> None:
+    """Raise `SignalError` if the resampled `value` at `at` s leaves `low` .. `high` by more than `OVERSHOOT`.
+
+    `low` and `high` are the least and the greatest of the samples.
+    """
     margin = OVERSHOOT * (high - low) + _ROUNDING * max(abs(low), abs(high))
-    beyond = np.maximum(low - resampled, resampled - high)
-    if beyond.max() <= margin:
+    if low - margin <= value <= high + margin:
         return
-    worst = int(beyond.argmax())
-    at = first + worst * step_time
     raise SignalError(
-        f'{even.name}: resampled it is {resampled[worst]:.4g} at {at:.4f} s, near sample '
+        f'{even.name}: resampled it is {value:.4g} at {at:.4f} s, near sample '
         f'{round(at / even.period)}; its samples are {low:.4g} .. {high:.4g}, and it may leave that range by '
         f'{OVERSHOOT:g} of it: are samples there faulty? Cut or repair them'
     )

@@ -5,5 +5,5 @@ class GraphError(RuntimeError):
     """The graph could not be started or broke down; the text names the node and its reason."""
 
 
-class Interrupted(Exception):  # noqa: N818 - no error: the user wants to end
+class Interrupted(Exception):  # noqa: N818 - no error: the user ends it
     """The user asked to end."""

@@ -59,7 +59,7 @@ def ending_order(nodes: Sequence[GraphNode]) -> list[GraphNode]:
 
 @dataclass(frozen=True)
 class GraphSettings:
-    """Where the graph lives and with which parameters: {node: {parameter: value}}.
+    """Where the graph runs and with which parameters: {node: {parameter: value}}.
 
     The nodes live `together` in one process with one data thread, or each in a process of its own. While one
     of them works in lock-step the others wait for it anyway, and handing over to another thread or process

@@ -12,15 +12,13 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
-from rich.console import Console
-from rich.live import Live
-from rich.text import Text
 
 from mount_bags.bag.writer import RecordingError
 from mount_bags.node import NAME, MountRecorder
 from mount_bags.recorder.diagnosis import OnFull
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.recorder.snapshot import snapshot_folder
+from mount_bags.run.screen import Screen
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_ros.nodes.hosting import ros_context, transition
@@ -37,7 +35,7 @@ _KEYS = 'm or space: mark, Ctrl-C: end'
 
 @dataclass(frozen=True)
 class RecordOrder:
-    """What the user wants; no names of topics are all, `duration` in s, None without an end."""
+    """What the user orders; no names of topics are all, `duration` in s, None without an end."""
 
     out: Path
     parameters: RecorderParameters
@@ -56,7 +54,7 @@ class RecordOutcome:
     failure: str
 
 
-def record(order: RecordOrder, console: Console) -> RecordOutcome:
+def record(order: RecordOrder, screen: Screen) -> RecordOutcome:
     """Record until Ctrl-C, SIGTERM or the end of the duration; raises a `ValueError` with the reason."""
     names = chosen_topics(order.topics)
     asked: list[bool] = []  # to end, by a signal; no lock: a second one may come amid the first
@@ -64,8 +62,8 @@ def record(order: RecordOrder, console: Console) -> RecordOutcome:
         recorder = _LoneRecorder(order, names, context)
         try:
             recorder.begin()
-            console.print(f'recording {len(names)} topics', soft_wrap=True)
-            _watch(recorder, order, asked, console)
+            screen.say(f'recording {len(names)} topics')
+            _watch(recorder, order, asked, screen)
         finally:
             outcome = recorder.end()
     return outcome
@@ -146,21 +144,18 @@ class _LoneRecorder:
         return RecordOutcome(folders, _number(figures, 'lost'), failure)
 
 
-def _watch(recorder: _LoneRecorder, order: RecordOrder, asked: list[bool], console: Console) -> None:
+def _watch(recorder: _LoneRecorder, order: RecordOrder, asked: list[bool], screen: Screen) -> None:
     begin = time.monotonic()
     end = begin + order.duration if order.duration is not None else float('inf')
     line = _Line(begin)
     stopping = order.parameters.on_full == OnFull.STOP.value
-    with (
-        Keyboard() as keyboard,
-        Live(console=console, auto_refresh=False, transient=True, redirect_stderr=False) as live,
-    ):
+    with Keyboard() as keyboard, screen.line('') as show:
         hint = f'  ({_KEYS})' if keyboard.present else ''
         while not asked and (now := time.monotonic()) < end:
             figures = recorder.figures()
             if figures['failed'] and stopping:
                 return
-            live.update(Text(line.text(figures, now) + hint, no_wrap=True, overflow='ellipsis'), refresh=True)
+            show(line.text(figures, now) + hint)
             for key in keyboard.wait(min(_LINE_PERIOD, end - now)):
                 if key in MARK_KEYS:
                     recorder.mark()

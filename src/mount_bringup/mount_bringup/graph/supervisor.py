@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rclpy
-import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
@@ -310,11 +309,6 @@ class Supervisor:
                 'level': str(status.level[0]),
                 'sentence': status.message,
             }
-
-
-def session_text(content: dict[str, object]) -> str:
-    """Return the session message of a run as YAML."""
-    return yaml.safe_dump(content, sort_keys=False)
 
 
 def _plain(log_line: str) -> str:

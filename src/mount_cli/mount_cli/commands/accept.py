@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import terminal
+from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
 

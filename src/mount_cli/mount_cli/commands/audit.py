@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
 from mount_cli.commands.options import JsonFile
+from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
 control left samples without a setpoint, on faults, or when nothing can be read.
@@ -30,19 +30,19 @@ def audit(
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
-    import json
-
     from mount_bags.audit.audit import audit as audited
     from mount_bags.audit.losses import losses
     from mount_bags.audit.report import as_json, as_table, latency_lines, sentences
     from mount_bags.run.place import open_run
+    from mount_cli.screen import TerminalScreen
+    from mount_report.json_file import write_json
 
     console = terminal()
     with console.status('reading'):
         opened = open_run(recording)
         audits = audited(opened)
         found = losses(opened, audits)
-    console.print(as_table(audits))
+    TerminalScreen(console).table(as_table(audits))
     for line in latency_lines(audits):
         console.print(line, soft_wrap=True)
     for sentence in sentences(audits, found):
@@ -50,6 +50,6 @@ def audit(
     for warning in opened.warnings:
         note(console, warning)
     if json_file is not None:
-        json_file.write_text(json.dumps(as_json(audits, found), indent=2) + '\n', encoding='utf-8')
+        write_json(as_json(audits, found), json_file)
     if not found.sound:
         raise typer.Exit(1)

@@ -8,8 +8,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from mount_bringup.progress_bar import progress_bar
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_models.specimen import Specimen
@@ -89,6 +88,7 @@ def actuator(
     Refused are outliers, too few gaps or currents, and a law that is not positive, rising with the current
     and falling with the gap within the measured range. Then no file is written.
     """
+    from mount_cli.screen import progress_bar
     from mount_identification.actuator.fit import fit_force_law
     from mount_identification.rack.recordings import GivenValues, read_force
     from mount_identification.specimen import check_targets, with_force_law
@@ -145,7 +145,7 @@ def actuator(
         'rms_by_gap': [{'gap_m': g, 'rms_n': r} for g, r in zip(fit.gaps, fit.gap_rms, strict=True)],
     }
     if figure is not None:
-        from mount_identification.calibration_figure import draw_force_law
+        from mount_identification.calibration_pictures import draw_force_law
 
         draw_force_law(points, law, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
@@ -186,6 +186,7 @@ def inductance(
     The temperature with most recordings is that of the curves. With recordings at a second one the
     compensation is measured, else it is stated from the conductivity's coefficient and the base's force law.
     """
+    from mount_cli.screen import TerminalScreen, progress_bar
     from mount_identification.coil.inductance import GapOrder, calibrate_inductance
     from mount_identification.rack.recordings import read_ripple
     from mount_identification.specimen import check_targets, with_gap_curves
@@ -218,14 +219,15 @@ def inductance(
     specimen = with_gap_curves(
         starting, name, result.calibration, result.compensation, result.compensated_by, area, files
     )
+    screen = TerminalScreen(console)
     for table in result.tables():
-        console.print(table)
+        screen.table(table)
     for sentence in result.sentences():
         console.print(sentence, soft_wrap=True)
     for warning in result.warnings:
         note(console, warning, 'warning')
     if figure is not None:
-        from mount_identification.calibration_figure import draw_gap_curves
+        from mount_identification.calibration_pictures import draw_gap_curves
 
         draw_gap_curves(result, order, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
@@ -247,6 +249,7 @@ def rack(
     """Write recordings of the simulated rack: force.csv, ripple at 16 fixed gaps, friction of the pads."""
     from dataclasses import replace
 
+    from mount_cli.screen import progress_bar
     from mount_models.friction.coefficient import FrictionCoefficients
     from mount_models.friction.contact import FrictionContact
     from mount_sim.rack.coil import Rack, drawn_rack, write_force, write_ripple
@@ -366,7 +369,7 @@ def _write(
     """Write figures and specimen where they are wanted, and say which parts are of other specimens."""
     from mount_identification.specimen import foreign_parts
     from mount_models.specimen import save_specimen
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     if json_file is not None:
         write_json(figures, json_file)

@@ -1,13 +1,12 @@
 """`engine-mount compare`: what is different between two recordings, in words."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, refuse, terminal
 from mount_cli.commands.options import JsonFile
+from mount_cli.terminal import note, refuse, terminal
 
 EPILOG = """Examples:
 
@@ -60,6 +59,8 @@ def _told(
     from mount_bags.compare.tolerances import Tolerances
     from mount_bags.compare.words import as_json, as_table, sentences
     from mount_bags.run.place import open_run
+    from mount_cli.screen import TerminalScreen
+    from mount_report.json_file import write_json
 
     console = terminal()
     recordings = open_run(a), open_run(b)
@@ -68,7 +69,7 @@ def _told(
     for sentence in sentences(comparison):
         console.print(f'- {sentence}', soft_wrap=True)
     if comparison.differing:
-        console.print(as_table(comparison))
+        TerminalScreen(console).table(as_table(comparison))
     console.print(
         f'Times are from the first displacement sample of A; {comparison.alignments.sentence}.',
         soft_wrap=True,
@@ -77,9 +78,9 @@ def _told(
         for warning in recording.warnings:
             note(console, f'{recording.path}: {warning}')
     if json_file is not None:
-        json_file.write_text(json.dumps(as_json(comparison), indent=2, allow_nan=False) + '\n')
+        write_json(as_json(comparison), json_file)
     if figure is not None:
-        from mount_report.compare_figure import draw_comparison
+        from mount_report.compare_picture import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
         console.print(f'figure {figure}', soft_wrap=True)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 EPILOG = """Examples:
 
@@ -40,7 +40,6 @@ def cut(
     """
     from mount_bags.edit.cut import cut as cut_recording
     from mount_bags.events.recorded_events import event_time, find_event
-    from mount_bags.messages.time_axis import time_axis
     from mount_bags.run.place import open_run
 
     if bool(event) == bool(begin or end):
@@ -50,7 +49,7 @@ def cut(
     reason = ''
     if event:
         found = find_event(opened, event)
-        time = event_time(found, time_axis(opened))
+        time = event_time(found, opened.time_axis)
         first, last = max(0.0, time - _seconds(before)), time + _seconds(after)
         reason = f'{found.kind} at {time:.3f} s' + (f': {found.text}' if found.text else '')
     target = out or _beside(opened.path, first, last)

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
 from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
+from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
 control was active, no fault, and the recording whole; 1 when one of these did not hold, or nothing was
@@ -66,7 +66,7 @@ def drive(
     out: NewFolder = None,
     json_file: JsonFile = None,
     report: Annotated[
-        bool, typer.Option('--report/--no-report', help='draw the figure and write the page about the run')
+        bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
     on_full: Annotated[
         str, typer.Option(help='full disk: stop the run, or continue without recording')
@@ -84,10 +84,11 @@ def drive(
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.mount_choice import with_control_of_mount
     from mount_bringup.settings import SettingError, checked_settings, settings_of_options
+    from mount_cli.screen import TerminalScreen
     from mount_replay.drive.drive import DriveOrder, record_drive, recorder_parameters
     from mount_replay.drive.recorder_options import recorder_options
-    from mount_report.drive.summary import write_json
     from mount_report.drive.telling import tell_drive, tell_snapshots
+    from mount_report.json_file import write_json
 
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
@@ -122,12 +123,13 @@ def drive(
     chosen = chosen_domain(domain)
     order = DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart)
     console = terminal()
-    folder, run, complaints = record_drive(order, console)
+    screen = TerminalScreen(console)
+    folder, run, complaints = record_drive(order, screen)
     recorder = recorder_parameters(order)
     if recorder.snapshot:
-        told = tell_snapshots(folder, recorder, run, console)
+        told = tell_snapshots(folder, recorder, run, screen)
     else:
-        told = tell_drive(folder, parameters, run, console, report=report)
+        told = tell_drive(folder, parameters, run, screen, report=report)
     complaints += told.complaints
     if json_file is not None:
         write_json(told.figures, json_file)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import terminal
+from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
 
@@ -15,7 +15,7 @@ EPILOG = """Examples:
 
 `engine-mount experiment sawtooth --set sawtooth.friction.b_offset=-14` - with other pads
 
-`engine-mount experiment all --page docs/experiments.md` - all, with the page and its pictures
+`engine-mount experiment all --page docs/explanation/experiments.md` - all, with the page and its pictures
 """
 
 
@@ -47,28 +47,29 @@ def experiment(
 
     A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
     """
-    from mount_bringup.progress_bar import progress_bar
-    from mount_bringup.settings import SettingError
-    from mount_experiments.orders import orders, run_all
-    from mount_experiments.page import print_outcome, write_page
-    from mount_experiments.registry import EXPERIMENTS, experiments_named
-    from mount_report.drive.summary import write_json
+    from mount_experiments.registry import experiments_named, listed
 
     console = terminal()
     if show:
-        for known in EXPERIMENTS.values():
-            console.print(f'{known.name:22}{known.reference:15}{known.title}', soft_wrap=True)
+        for name, reference, title in listed():
+            console.print(f'{name:22}{reference:15}{title}', soft_wrap=True)
         return
+    from mount_bringup.settings import SettingError
+    from mount_cli.screen import TerminalScreen
+    from mount_experiments.orders import orders, run_all
+    from mount_experiments.page import print_outcome, write_page
+    from mount_report.json_file import write_json
+
     if not names:
         raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')
     try:
         given = orders(experiments_named(names), settings or [], out, graph=graph)
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
-    with progress_bar(console) as progress:
-        outcomes = run_all(given, progress)
+    screen = TerminalScreen(console)
+    outcomes = run_all(given, screen)
     for known, outcome in outcomes:
-        print_outcome(known, outcome, console)
+        print_outcome(known, outcome, screen)
     if json_file is not None:
         figures = {known.name: outcome.figures for known, outcome in outcomes}
         write_json(figures if len(figures) > 1 else next(iter(figures.values())), json_file)

@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_identification.friction.identify import Identification
@@ -75,13 +75,13 @@ def friction(
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
-    from mount_bringup.progress_bar import progress_bar
     from mount_cli.commands.calibrate import note_foreign
+    from mount_cli.screen import progress_bar
     from mount_identification.friction.files import parsed_channels
     from mount_identification.friction.identify import IdentifyOrder, figures, identify
     from mount_identification.specimen import check_targets, foreign_parts, with_friction
     from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     console = terminal()
     check_targets(out, json_file, figure)
@@ -96,7 +96,7 @@ def friction(
     specimen = with_friction(starting, name, found) if out is not None else None
     _print(found, console)
     if figure is not None:
-        from mount_identification.friction.figure import draw_identification
+        from mount_identification.friction.picture import draw_identification
 
         draw_identification(found, figure)
         console.print(f'figure {figure}', soft_wrap=True)
@@ -140,7 +140,7 @@ def drift(
     from mount_identification.drift.identify import figures, identify_drift
     from mount_identification.specimen import check_targets
     from mount_models.specimen import chosen_specimen
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     console = terminal()
     check_targets(json_file, figure)
@@ -157,7 +157,7 @@ def drift(
         told[meant[0]] = value
     result = identify_drift(recordings, chosen_specimen(str(specimen) if specimen else ''), told)
     if figure is not None:
-        from mount_identification.drift.figure import draw_drift
+        from mount_identification.drift.picture import draw_drift
 
         draw_drift(result, figure)
         console.print(f'figure {figure}', soft_wrap=True)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 EPILOG = 'Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`'
 

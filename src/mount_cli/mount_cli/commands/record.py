@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from mount_bringup.terminal import terminal
 from mount_cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
+from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
 loss, when the disk was full, or when nothing could be recorded; 2 for a wrong use of the command.
@@ -48,6 +48,7 @@ def record(
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.record import RecordOrder
     from mount_bringup.graph.record import record as run_record
+    from mount_cli.screen import TerminalScreen
     from mount_replay.drive.recorder_options import checked_recorder, recorder_options
 
     if duration is not None and not duration > 0.0:
@@ -62,7 +63,7 @@ def record(
         duration=duration,
     )
     console = terminal()
-    outcome = run_record(order, console)
+    outcome = run_record(order, TerminalScreen(console))
     if outcome.failure:
         _print('note', outcome.failure, console)
     sound = [_told(folder, console) for folder in outcome.folders]

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 INCOMPLETE = 3
 
@@ -20,9 +20,7 @@ Examples:
 `engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
 
 All chunks whose checksum holds are kept, with topics, times, session, attachments, metadata and what the
-recorder says of its own losses. Of a last chunk that was cut off,
-whole messages are kept where its compression lets its beginning be read; no checksum vouches for
-these, and the new recording says so each time it is opened. The original is not touched.
+recorder says of its own losses. A last chunk that was cut off is lost. The original is not touched.
 """
 
 
@@ -35,7 +33,7 @@ def recover(
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
     from mount_bags.edit.recover import recover as recovered
     from mount_bags.run.place import recording_place
-    from mount_bringup.progress_bar import progress_bar
+    from mount_cli.screen import progress_bar
 
     console = terminal()
     source = recording_place(recording)

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from mount_bringup.terminal import terminal
 from mount_cli.commands.options import Domain, JsonFile, NewFolder
+from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
 
@@ -84,6 +84,7 @@ def replay(
     console = terminal()
     changes = _changes(settings or [])
     if live:
+        from mount_cli.screen import TerminalScreen
         from mount_replay.live.live import LiveOrder, play_live
 
         if maps or table or out or json_file:
@@ -91,7 +92,7 @@ def replay(
         order = LiveOrder(
             recording, rate, start, topic_names, with_control, changes, chosen_domain(domain), namespace
         )
-        play_live(order, console)
+        play_live(order, TerminalScreen(console))
         return
     if rate != 1.0 or start or topic_names or with_control or namespace:
         raise typer.BadParameter('--rate, --from, --topics, --with-control and --namespace go with --live')
@@ -112,11 +113,11 @@ def _replay(
     domain: int,
     console: Console,
 ) -> None:
-    from mount_bringup.progress_bar import progress_bar
+    from mount_cli.screen import TerminalScreen, progress_bar
     from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder
     from mount_replay.replay import replay as run_replay
     from mount_replay.summary import print_replay, replay_figures
-    from mount_report.drive.summary import write_json
+    from mount_report.json_file import write_json
 
     mode = LOCKSTEP if lockstep else CORE
     order = ReplayOrder(recording, mode, changes, table, foreign, out, domain)
@@ -124,7 +125,7 @@ def _replay(
         task = progress.add_task(f'replaying ({mode})', total=1.0)
         outcome = run_replay(order, lambda share: progress.update(task, completed=share))
     figures = replay_figures(outcome)
-    print_replay(outcome, figures, console)
+    print_replay(outcome, figures, TerminalScreen(console))
     assert outcome.folder is not None
     write_json(figures, outcome.folder.summary)
     if json_file is not None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mount_bringup.terminal import note, terminal
+from mount_cli.terminal import note, terminal
 
 EPILOG = """Examples:
 
@@ -14,7 +14,7 @@ EPILOG = """Examples:
 
 `engine-mount report bags/first --compare bags/second --out difference.html` - and what is different
 
-`engine-mount report drive_1 drive_2 drive_3 --out three.html --png pictures` - in the same figures
+`engine-mount report drive_1 drive_2 drive_3 --out three.html --png pictures` - in the same charts
 """
 
 
@@ -39,18 +39,19 @@ def report(
         ),
     ] = None,
 ) -> None:
-    """Write one HTML page that works without network, and its figures as PNG.
+    """Write one HTML page that works without network, and its charts as PNG.
 
-    Several recordings share the figures. What a recording lacks stands in the page in words.
+    Several recordings share the charts. What a recording lacks stands in the page in words.
     """
     from mount_bags.run.place import open_run
+    from mount_cli.screen import TerminalScreen
     from mount_report.pages import default_page, default_pictures, write_report
 
     console = terminal()
     opened = [open_run(path) for path in recordings]
     compared = None if other is None else open_run(other)
     file = out or default_page(recordings[0])
-    files = write_report(opened, compared, file, pictures or default_pictures(file), console)
+    files = write_report(opened, compared, file, pictures or default_pictures(file), TerminalScreen(console))
     for recording in (*opened, *([compared] if compared else [])):
         for warning in recording.warnings:
             note(console, f'{recording.path}: {warning}')

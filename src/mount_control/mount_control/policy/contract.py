@@ -13,7 +13,7 @@ The names that each policy's module has:
 `Law`
     NamedTuple of numbers, or of such: what `design` works out of the parameters.
 `STATE`
-    Record type of the memory, of `f8` and `i8`; the latter never negative, at least one field.
+    `record_type` of the memory, of `f8` and `i8`; the latter never negative, at least one field.
 `TRACE`
     {field: unit} of the policy's own intermediates, all `f8`, one of them `predicted_velocity`, the velocity
     that `step` returns. Those in m or m/s are 0 at the first sample after `start` at its displacement:
@@ -38,6 +38,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_models.arithmetic.record import record_type
 from mount_models.quantity import ParameterError
 
 _BEFORE = {'displacement': 'm', 'velocity': 'm/s'}
@@ -86,4 +87,4 @@ def trace_fields(policy: Policy) -> dict[str, str]:
 
 def trace_dtype(policy: Policy) -> np.dtype:
     """Return the record type of one traced step."""
-    return np.dtype([(name, 'f8') for name in trace_fields(policy)])
+    return record_type([(name, 'f8') for name in trace_fields(policy)])

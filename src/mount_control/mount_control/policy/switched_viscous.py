@@ -7,11 +7,10 @@ velocity in the band, turned ahead by the delay of the loop.
 import math
 from typing import Annotated, NamedTuple
 
-import numpy as np
-
 from mount_control import band_pass, switching
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
 from mount_models.damper import damper_curve, damper_force
 from mount_models.quantity import ParameterError, Quantity
 from mount_models.sampling import SAMPLE_TIME
@@ -75,7 +74,7 @@ class Law(NamedTuple):
     damper_step: float
 
 
-STATE = np.dtype([('band', band_pass.STATE), ('switching', switching.STATE)])
+STATE = record_type([('band', band_pass.STATE), ('switching', switching.STATE)])
 TRACE = {
     'band_displacement': 'm',
     'band_velocity': 'm/s',

@@ -7,10 +7,10 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
-from mount_experiments.harness.closed_loop import FloatArray, Ride
 from mount_experiments.harness.contract import ExperimentError
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity
+from mount_report.drive.signals import DriveSignals, FloatArray
 from mount_report.sections.periodic import cycle_work, distortion, harmonics, whole_periods
 
 HYDRO, OFF, COULOMB = 'hydromount', 'friction, 0 A', 'Coulomb'
@@ -41,31 +41,32 @@ class Loop:
     figures: dict[str, Any]
 
 
-def loop_of(ridden: Ride, parameters: BenchParameters, damper: str) -> Loop:
+def loop_of(drive: DriveSignals, parameters: BenchParameters, damper: str) -> Loop:
     """Return the evaluated periods of a run with the characteristic `damper`, '' for none.
 
     Raises `ExperimentError` if fewer were recorded.
     """
-    part, periods = whole_periods(ridden.time, parameters.frequency, parameters.periods)
+    truth = drive.truth
+    part, periods = whole_periods(truth.time, parameters.frequency, parameters.periods)
     if periods < parameters.periods:
         raise ExperimentError(
-            f'{periods} whole periods of {parameters.periods} were recorded in {ridden.recording}'
+            f'{periods} whole periods of {parameters.periods} were recorded in {drive.recording}'
         )
-    time = ridden.time[part]
-    wanted = damper_curve(damper).force(ridden.velocity[part]) if damper else np.zeros(len(time))
-    friction = ridden.friction_force[part]
-    figures = _figures_of(time, ridden.displacement[part], ridden.mount_force[part], parameters)
+    time = truth.time[part]
+    wanted = damper_curve(damper).force(truth.velocity[part]) if damper else np.zeros(len(time))
+    friction = truth.friction_force[part]
+    figures = _figures_of(time, truth.displacement[part], truth.mount_force[part], parameters)
     figures['friction_harmonics_n'] = harmonics(time, friction, parameters.frequency, ORDERS).tolist()
     figures['wanted_harmonics_n'] = harmonics(time, wanted, parameters.frequency, ORDERS).tolist()
     figures['steepest_share'] = _steepest(friction)
-    figures['damping_active_share'] = _active_share(ridden, time)
+    figures['damping_active_share'] = _active_share(drive, time)
     return Loop(
-        ridden.displacement[part], ridden.velocity[part], ridden.mount_force[part], friction, wanted, figures
+        truth.displacement[part], truth.velocity[part], truth.mount_force[part], friction, wanted, figures
     )
 
 
-def _active_share(ridden: Ride, time: FloatArray) -> float:
-    seen = ridden.seen
+def _active_share(drive: DriveSignals, time: FloatArray) -> float:
+    seen = drive.seen
     within = (seen.time >= time[0]) & (seen.time <= time[-1])
     return float(np.mean(seen.damping_active[within]))
 

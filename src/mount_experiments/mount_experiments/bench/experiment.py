@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mount_experiments.bench import REFERENCE, TITLE
 from mount_experiments.bench.evaluation import (
     COULOMB,
     HYDRO,
@@ -17,7 +18,7 @@ from mount_experiments.bench.evaluation import (
     coulomb_loop,
     loop_of,
 )
-from mount_experiments.harness.closed_loop import Ride, mode_of, ride
+from mount_experiments.harness.closed_loop import driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -28,6 +29,7 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_models.damper import damper_curve
+from mount_report.drive.signals import DriveSignals
 
 NAME = 'bench'
 FAMILY = ('viscous_1000', 'viscous_2000', 'viscous_3000', 'viscous_4000')
@@ -38,27 +40,27 @@ _ODD = (2, 4, 6)  # places of the third, fifth and seventh
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Move every mount on the sine, record it, and evaluate the recordings."""
-    from mount_experiments.bench import figures as drawing
+    from mount_experiments.bench import pictures as drawn
 
     parameters = parameters_of(order, NAME, BenchParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
     names = dampers_of(parameters)
     mounts = {name: {'mount': 'friction', 'damper': name} for name in names}
     mounts |= {OFF: {'mount': 'friction_off'}, HYDRO: {'mount': 'hydro'}}
-    rides = {}
+    drives = {}
     for number, (name, mount) in enumerate(mounts.items()):
         progress(0.95 * number / len(mounts), f'rack, {name}')
-        rides[name] = ride(order, name.replace(', ', '_').replace(' ', ''), _own(parameters, mount), NAME)
+        drives[name] = driven(order, name.replace(', ', '_').replace(' ', ''), _own(parameters, mount), NAME)
     progress(0.95, 'pictures')
-    loops = {name: loop_of(each, parameters, name if name in names else '') for name, each in rides.items()}
+    loops = {name: loop_of(each, parameters, name if name in names else '') for name, each in drives.items()}
     loops[COULOMB] = coulomb_loop(loops[HYDRO], parameters)
-    figures = _figures(loops, rides, parameters, mode_of(order))
+    figures = _figures(loops, drives, parameters, mode_of(order))
     title = f'{parameters.frequency:g} Hz, {1e3 * parameters.amplitude:g} mm'
     pictures = [
-        drawing.draw_hysteresis(loops, names, title, order.out / 'bench_hysteresis.png'),
-        drawing.draw_harmonics(loops, parameters.damper, title, order.out / 'bench_harmonics.png'),
+        drawn.draw_hysteresis(loops, names, title, order.out / 'bench_hysteresis.png'),
+        drawn.draw_harmonics(loops, parameters.damper, title, order.out / 'bench_harmonics.png'),
     ]
-    return Outcome(figures, pictures, [each.recording for each in rides.values()], _statements(figures))
+    return Outcome(figures, pictures, [each.recording for each in drives.values()], _statements(figures))
 
 
 def dampers_of(parameters: BenchParameters) -> list[str]:
@@ -84,7 +86,7 @@ def _own(parameters: BenchParameters, mount: Mapping[str, str]) -> dict[str, dic
 
 
 def _figures(
-    loops: dict[str, Loop], rides: dict[str, Ride], parameters: BenchParameters, mode: str
+    loops: dict[str, Loop], drives: dict[str, DriveSignals], parameters: BenchParameters, mode: str
 ) -> dict[str, Any]:
     hydro = np.array(loops[HYDRO].figures['harmonics_n'])
     runs = {name: loop.figures for name, loop in loops.items()}
@@ -100,7 +102,7 @@ def _figures(
         'sine_steepest_share': 2.0 * math.sin(math.pi * parameters.frequency * 1e-3),
         'mode': mode,
         'runs': runs,
-        'recordings': {name: each.recording.parent.name for name, each in rides.items()},
+        'recordings': {name: each.recording.parent.name for name, each in drives.items()},
     }
 
 
@@ -171,7 +173,7 @@ def _on_harmonics(runs: dict[str, Any], family: list[str]) -> Statement:
         'Fig. 13, right; Sec. 7',
         'The friction mount has lower force harmonics than the original mount up to the 8th.',
         f'Lower than the simulated hydromount: {told}. The even ones prove nothing: the simulated hydromount '
-        'has them only through an assumed asymmetry of its upper chamber (see docs/results.md).',
+        'has them only through an assumed asymmetry of its upper chamber (see docs/explanation/results.md).',
         Holds.YES if everywhere else Holds.PARTLY if anywhere else Holds.NO,
     )
 
@@ -207,8 +209,8 @@ def _listed(numbers: list[int]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Friction mount and hydromount on a test rack',
-    reference='Fig. 13',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The rack moves the mount on a sine, by default 8 Hz and 1 mm. Initialisation and controller run as '
         'in the car, once with each damper characteristic, once with 0 A, and once with the original '

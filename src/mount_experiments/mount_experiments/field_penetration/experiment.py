@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_experiments.field_penetration import REFERENCE, TITLE
 from mount_experiments.field_penetration.plate_field import equivalent_depth, flux_density_change
 from mount_experiments.harness.contract import (
     Experiment,
@@ -228,8 +229,8 @@ def _told(currents: list[float], differences: list[float]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title="How far the ripple's field enters the iron",
-    reference='Fig. 3',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'Lines: diffusion into a plate in one dimension with the permeability of the mean current, in the '
         'periodic state of the switched bridge. Dots: the same from a finite-element computation in two '

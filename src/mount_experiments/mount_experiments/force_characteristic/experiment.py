@@ -5,12 +5,14 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from mount_experiments.force_characteristic import REFERENCE, TITLE
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
@@ -19,13 +21,14 @@ from mount_models.actuator.law import TABLE_1, GapOutsideLaw, check_gap, checked
 from mount_models.actuator.reluctance import ReluctanceActuator, core_flux_density
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import Quantity
+from mount_models.sampling import HIGHEST_CURRENT
 from mount_models.specimen import Specimen, default_specimen
 from mount_sim.rack.fixed_gaps import RigMeasurements, RigNoise, measure_actuator
 
 NAME = 'force_characteristic'
 
 _GAPS_UM = (275.0, 300.0, 349.0, 400.0, 450.0, 492.0, 545.0)
-_CURRENTS = np.linspace(0.0, 3.0, 61)
+_CURRENTS = np.linspace(0.0, HIGHEST_CURRENT, 61)
 _WEIGHED = 20.0  # N: relative errors count from here, as for the fit of the specimen
 
 
@@ -33,7 +36,7 @@ class ForceParameters(NamedTuple):
     """The load cell of the rig and the true actuator on it."""
 
     force_noise: Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)] = 0.5
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    seed: Seed = 1
     actuator: ReluctanceActuator = ReluctanceActuator()
 
 
@@ -92,7 +95,7 @@ def _draw(measured: RigMeasurements, specimen: Specimen, file: Path) -> Path:
         'Force over current at held gaps: measured on the true actuator, and laws (Fig. 2)', 6.0
     )
     axes = figure.subplots()
-    fine = np.linspace(0.0, 3.0, 301)
+    fine = np.linspace(0.0, HIGHEST_CURRENT, 301)
     for gap, force, colour in zip(measured.gaps, measured.force, family(measured.gaps.size), strict=True):
         axes.plot(measured.currents, force, '.', color=colour, markersize=5)
         axes.plot(
@@ -181,8 +184,8 @@ def _rms(values: Any) -> float:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Force of the actuator over current and gap',
-    reference='Fig. 2',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The gap of the simulated actuator is held, the current stepped, the force measured with a noisy '
         'load cell (dots). Solid lines are the law of the shipped specimen, Eqs (3), (4) fitted to a '

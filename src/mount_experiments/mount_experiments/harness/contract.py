@@ -4,11 +4,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
-from mount_models.quantity import flattened, with_flattened
+from mount_models.quantity import Quantity, flattened, with_flattened
 
 P = TypeVar('P', bound=NamedTuple)
+
+Seed = Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)]
 
 Progress = Callable[[float, str], None]
 """Takes the share that is done, 0 .. 1, and what is being done."""

@@ -1,7 +1,6 @@
 """Fig. 4: incremental inductance over current, at held gaps and on the assembled actuator; its sections."""
 
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -9,18 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.run.versions import versions
-from mount_bringup.graph.supervisor import session_text
+from mount_bags.run.session import new_session, session_text
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
 from mount_experiments.harness.drawing import BLUE, RED, family, finish, new_figure
+from mount_experiments.inductance_map import REFERENCE, TITLE
 from mount_models.actuator.closing import ClosingMechanics, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.crossing import find_crossing
@@ -53,7 +53,7 @@ class InductanceParameters(NamedTuple):
     ripple_noise: Annotated[
         float, Quantity('1', 'relative standard deviation of the slopes of one ripple', 0.0, 0.5)
     ] = 0.01
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    seed: Seed = 1
     actuator: ReluctanceActuator = ReluctanceActuator()
     coil: RippleCoil = RippleCoil()
     mechanics: ClosingMechanics = ClosingMechanics()
@@ -112,18 +112,14 @@ def _record_ramp(order: Order, parameters: InductanceParameters, progress: Progr
         **flattened(parameters.coil, 'coil'),
         **flattened(parameters.mechanics, 'mechanics'),
     }
-    session = session_text(
-        {
-            'scenario': NAME,
-            'mode': 'core',
-            'started': datetime.now().astimezone().isoformat(timespec='seconds'),
-            'parameters': {NAME: flattened(parameters), 'mount_sim': sim},
-            'versions': versions(),
-        }
-    )
+    told = {NAME: flattened(parameters), 'mount_sim': sim}
+    session = new_session({'scenario': NAME, 'mode': 'core', 'parameters': told})
     folder = order.out / NAME
     outcome = record_core(
-        folder, {'mount_sim': sim}, session, lambda share: progress(0.2 + 0.6 * share, 'ramp of the actuator')
+        folder,
+        {'mount_sim': sim},
+        session_text(session),
+        lambda share: progress(0.2 + 0.6 * share, 'ramp of the actuator'),
     )
     if outcome.result is None:
         raise ValueError('the initialisation gave no result; the recording ends before it')
@@ -286,8 +282,8 @@ def _told(ranges: list[list[float]]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Incremental inductance over current and gap',
-    reference='Fig. 4',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'Thin lines: the gap of the simulated actuator is held on the rig and the current stepped; each '
         'point averages 50 ripples. Thick line: the current ramp of the initialisation on the assembled '

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from mount_control.policy import switched_viscous
-from mount_experiments.harness.closed_loop import FloatArray, Ride
 from mount_report.drive.evaluation import switching
+from mount_report.drive.signals import DriveSignals, FloatArray
 
 FRICTION, HYDRO, OFF = 'friction', 'hydromount', 'friction, 0 A'
 WINDOW = (0.2, 1.2)  # s after the switch-on level was exceeded: damping has come on, the gap still rings
@@ -17,7 +17,7 @@ WINDOW = (0.2, 1.2)  # s after the switch-on level was exceeded: damping has com
 class Crossing:
     """The three mounts over one gap; `exceeded` (s) is when the friction mount first left the on level."""
 
-    rides: dict[str, Ride]
+    drives: dict[str, DriveSignals]
     exceeded: float | None
 
 
@@ -36,36 +36,31 @@ def figures_of(crossing: Crossing, control: switched_viscous.Parameters) -> dict
                 'highest_current_a',
             )
         )
-    friction = crossing.rides[FRICTION]
-    changes = switching(friction.seen)
+    seen, truth = crossing.drives[FRICTION].seen, crossing.drives[FRICTION].truth
+    changes = switching(seen)
     on = next((time for time in changes.on if time >= crossing.exceeded), None)
     off = None if on is None else next((time for time in changes.off if time > on), None)
     begin, end = (crossing.exceeded + edge for edge in WINDOW)
     rms, peak = {}, {}
-    for name, ridden in crossing.rides.items():
-        window = (ridden.time >= begin) & (ridden.time < end)
-        rms[name] = float(np.sqrt(np.mean(ridden.displacement[window] ** 2)))
-        peak[name] = float(np.max(np.abs(ridden.displacement[ridden.time >= crossing.exceeded])))
+    for name, drive in crossing.drives.items():
+        time, displacement = drive.truth.time, drive.truth.displacement
+        rms[name] = float(np.sqrt(np.mean(displacement[(time >= begin) & (time < end)] ** 2)))
+        peak[name] = float(np.max(np.abs(displacement[time >= crossing.exceeded])))
+
+    def left(values: FloatArray) -> float | None:
+        return None if off is None else off - _last_above(seen.time, values, control.switch_off_level, off)
+
     return found | {
         'on_delay_s': None if on is None else on - crossing.exceeded,
         'on_duration_s': None if on is None or off is None else off - on,
-        'off_delay_s': None if off is None else off - _last_above(friction, control, off),
-        'off_delay_in_band_s': None if off is None else off - _last_above_in_band(friction, control, off),
+        'off_delay_s': left(seen.displacement),
+        'off_delay_in_band_s': left(seen.band_displacement),  # which control compares with the level
         'rms_m': rms,
         'peak_m': peak,
-        'highest_current_a': float(friction.coil_current.max()),
+        'highest_current_a': float(truth.coil_current.max()),
     }
 
 
-def _last_above(ridden: Ride, control: switched_viscous.Parameters, off: float) -> float:
-    """Return when the displacement was last at or above the switch-off level before damping went off."""
-    return _last(ridden.seen.time, ridden.seen.displacement, control.switch_off_level, off)
-
-
-def _last_above_in_band(ridden: Ride, control: switched_viscous.Parameters, off: float) -> float:
-    """Return the same of the band-passed displacement, which the control compares with the level."""
-    return _last(ridden.band_time, ridden.band_displacement, control.switch_off_level, off)
-
-
-def _last(time: FloatArray, values: FloatArray, level: float, before: float) -> float:
+def _last_above(time: FloatArray, values: FloatArray, level: float, before: float) -> float:
+    """Return when `values` were last at or beyond the `level`, earlier than `before` (s)."""
     return float(time[np.flatnonzero((time < before) & (np.abs(values) >= level))[-1]])

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.policy import switched_viscous
-from mount_experiments.harness.closed_loop import Ride, mode_of, ride
+from mount_experiments.harness.closed_loop import driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -15,7 +15,8 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
-from mount_experiments.harness.numbers import numbers_of
+from mount_experiments.harness.number_list import numbers_of
+from mount_experiments.motorway_gap import REFERENCE, TITLE
 from mount_experiments.motorway_gap.evaluation import (
     FRICTION,
     HYDRO,
@@ -26,6 +27,7 @@ from mount_experiments.motorway_gap.evaluation import (
 )
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity, with_flattened
+from mount_report.drive.signals import Seen
 
 NAME = 'motorway_gap'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', OFF: 'friction_off'}
@@ -46,7 +48,7 @@ class GapParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Drive every mount over gaps of several depths, record it, and evaluate the recordings."""
-    from mount_experiments.motorway_gap.figures import draw_gap
+    from mount_experiments.motorway_gap.pictures import draw_gap
 
     parameters = parameters_of(order, NAME, GapParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
@@ -55,18 +57,20 @@ def run(order: Order, progress: Progress) -> Outcome:
     depths = sorted({*compared, parameters.gap_depth})
     crossings: dict[float, Crossing] = {}
     for number, depth in enumerate(depths):
-        rides = {}
+        drives = {}
         for place, (name, mount) in enumerate(_MOUNTS.items()):
             share = (number + place / len(_MOUNTS)) / len(depths)
             progress(0.95 * share, f'gap of {1e3 * depth:g} mm, {name}')
             label = f'{1e3 * depth:g}mm_{name.replace(", ", "_").replace(" ", "")}'
-            rides[name] = ride(order, label, _own(parameters, depth, mount), NAME)
-        crossings[depth] = Crossing(rides, _exceeded(rides[FRICTION], control.switch_on_level, parameters))
+            drives[name] = driven(order, label, _own(parameters, depth, mount), NAME)
+        crossings[depth] = Crossing(
+            drives, _exceeded(drives[FRICTION].seen, control.switch_on_level, parameters)
+        )
     progress(0.95, 'pictures')
     figures = _figures(crossings, parameters, control, mode_of(order))
     shown = crossings[parameters.gap_depth]
     picture = draw_gap(shown, parameters.gap_depth, control, order.out / 'motorway_gap.png')
-    recordings = [each.recording for crossing in crossings.values() for each in crossing.rides.values()]
+    recordings = [each.recording for crossing in crossings.values() for each in crossing.drives.values()]
     return Outcome(figures, [picture], recordings, _statements(figures))
 
 
@@ -83,9 +87,8 @@ def _own(parameters: GapParameters, depth: float, mount: str) -> dict[str, dict[
     }
 
 
-def _exceeded(ridden: Ride, level: float, parameters: GapParameters) -> float | None:
+def _exceeded(seen: Seen, level: float, parameters: GapParameters) -> float | None:
     """Return when the displacement first left the level behind the gap's beginning, None for never."""
-    seen = ridden.seen
     above = np.flatnonzero((seen.time >= parameters.gap_time) & (np.abs(seen.displacement) > level))
     return float(seen.time[above[0]]) if above.size else None
 
@@ -212,8 +215,8 @@ def _span(durations: list[float]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Over a gap in the motorway',
-    reference='Fig. 15',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'A car at 119 km/h on a good road meets a gap; the paper does not tell its size, so three depths are '
         'driven, each with the friction mount, the same without current, and the original hydromount. Times '

@@ -11,11 +11,18 @@ from mount_experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
 from mount_experiments.harness.drawing import BLUE, GREY, RED, finish, new_figure
-from mount_experiments.harness.rack_recording import SUBSTEPS, record_friction_rack
+from mount_experiments.harness.rack_recording import (
+    SUBSTEPS,
+    DisplacementNoise,
+    ForceNoise,
+    record_friction_rack,
+)
+from mount_experiments.ramp_and_hold import REFERENCE, TITLE
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.ramp_hold import contact_of_response, printed_formulas
 from mount_identification.friction.recording import FloatArray, FrictionRecording
@@ -46,11 +53,9 @@ class RampParameters(NamedTuple):
     normal_force: Annotated[
         float, Quantity('N', 'constant; high enough that nothing slides', 10.0, 1000.0)
     ] = 250.0
-    force_noise: Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)] = 0.1
-    displacement_noise: Annotated[
-        float, Quantity('m', 'standard deviation of the displacement sensor', 0.0, 1e-5)
-    ] = 20e-9
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    force_noise: ForceNoise = 0.1
+    displacement_noise: DisplacementNoise = 20e-9
+    seed: Seed = 1
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
 
@@ -250,8 +255,8 @@ def _told(errors: dict[str, float]) -> str:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Ramp and hold of the sticking contact',
-    reference='Fig. 7',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The motor of the rack, a spring p in series with the pads, pulls them by a short ramp and holds. '
         'Nothing slides; the parallel pair of spring and damper relaxes. The joint stiffness comes from the '

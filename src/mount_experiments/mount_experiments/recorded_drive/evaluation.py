@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mount_experiments.harness.closed_loop import FloatArray, Ride
 from mount_experiments.harness.contract import ExperimentError
 from mount_models.sampling import SAMPLE_TIME
+from mount_report.drive.signals import DriveSignals, FloatArray
 
 FRICTION, HYDRO, ELASTOMER = 'friction mount', 'hydromount', 'elastomer alone'
 BANDS = ((1.0, 5.0), (5.0, 12.0), (12.0, 30.0))
@@ -28,10 +28,10 @@ class Spectra:
     force: FloatArray
 
 
-def spectra_of(ridden: Ride) -> Spectra:
+def spectra_of(drive: DriveSignals) -> Spectra:
     """Return the amplitude densities of displacement and mount force (Welch, Hann window)."""
-    frequency, displacement = _density(ridden.displacement)
-    _, force = _density(ridden.mount_force)
+    frequency, displacement = _density(drive.truth.displacement)
+    _, force = _density(drive.truth.mount_force)
     return Spectra(frequency, np.sqrt(displacement), np.sqrt(force))
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.policy import switched_viscous
-from mount_experiments.harness.closed_loop import FloatArray, Ride, mode_of, ride
+from mount_experiments.harness.closed_loop import driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     ExperimentError,
@@ -17,6 +17,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
+from mount_experiments.recorded_drive import REFERENCE, TITLE
 from mount_experiments.recorded_drive.evaluation import (
     BANDS,
     ELASTOMER,
@@ -34,6 +35,7 @@ from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity, with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.evaluation import switching
+from mount_report.drive.signals import DriveSignals, FloatArray, Truth
 from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario, recorded_signal
 
 NAME = 'recorded_drive'
@@ -55,7 +57,7 @@ class RecordedDriveParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Drive every mount on the recording, and evaluate spectra and bands."""
-    from mount_experiments.recorded_drive import figures as drawing
+    from mount_experiments.recorded_drive import pictures as drawn
     from mount_experiments.recorded_drive.page import write_recorded_drive
 
     parameters = parameters_of(order, NAME, RecordedDriveParameters())
@@ -73,19 +75,19 @@ def run(order: Order, progress: Progress) -> Outcome:
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
     rate = recorded_signal(_scenario(parameters)).rate  # refuses what cannot be read
     control = with_flattened(switched_viscous.Parameters(), order.settings.get('mount_control', {}))
-    rides = {}
+    drives = {}
     for number, (name, mount) in enumerate(_MOUNTS.items()):
         progress(0.95 * number / len(_MOUNTS), name)
-        rides[name] = ride(order, name.replace(' ', '_'), _own(parameters, mount), NAME)
+        drives[name] = driven(order, name.replace(' ', '_'), _own(parameters, mount), NAME)
     progress(0.95, 'pictures')
-    spectra = {name: spectra_of(each) for name, each in rides.items()}
-    figures = _figures(rides, parameters, control, mode_of(order))
+    spectra = {name: spectra_of(each) for name, each in drives.items()}
+    figures = _figures(drives, parameters, control, mode_of(order))
     pictures = [
-        drawing.draw_spectra(spectra, order.out / 'recorded_drive_spectra.png'),
-        drawing.draw_traces(rides, control, order.out / 'recorded_drive.png'),
+        drawn.draw_spectra(spectra, order.out / 'recorded_drive_spectra.png'),
+        drawn.draw_traces(drives, control, order.out / 'recorded_drive.png'),
     ]
     page = write_recorded_drive(figures, pictures, rate, order.out / f'{NAME}.md')
-    recordings = [each.recording for each in rides.values()]
+    recordings = [each.recording for each in drives.values()]
     return Outcome(figures, pictures, recordings, statements(figures), [page])
 
 
@@ -107,23 +109,22 @@ def _own(parameters: RecordedDriveParameters, mount: str) -> dict[str, dict[str,
 
 
 def _figures(
-    rides: dict[str, Ride],
+    drives: dict[str, DriveSignals],
     parameters: RecordedDriveParameters,
     control: switched_viscous.Parameters,
     mode: str,
 ) -> dict[str, Any]:
-    friction = rides[FRICTION]
-    seen = friction.seen
-    active = np.interp(friction.time, seen.time, seen.damping_active.astype(float)) > 0.5
+    seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
+    active = np.interp(truth.time, seen.time, seen.damping_active.astype(float)) > 0.5
     events = near(active, 1.0 / control.eigenfrequency)
     changes = switching(seen)
     return {
         'source': Path(parameters.file).name,
         'column': parameters.column,
         'scale': parameters.scale,
-        'duration_s': float(friction.time[-1] - friction.time[0] + SAMPLE_TIME),
-        'acceleration_rms_m_s2': _rms(friction.chassis_acceleration),
-        'acceleration_band_rms_m_s2': rms_in_bands(friction.chassis_acceleration),
+        'duration_s': float(truth.time[-1] - truth.time[0] + SAMPLE_TIME),
+        'acceleration_rms_m_s2': _rms(truth.chassis_acceleration),
+        'acceleration_band_rms_m_s2': rms_in_bands(truth.chassis_acceleration),
         'damper': parameters.damper,
         'switch_on_level_m': control.switch_on_level,
         'switch_off_level_m': control.switch_off_level,
@@ -135,19 +136,19 @@ def _figures(
         'events_margin_s': 1.0 / control.eigenfrequency,
         'bands_hz': [list(band) for band in BANDS],
         'mode': mode,
-        'runs': {name: _figures_of(each, active, events) for name, each in rides.items()},
+        'runs': {name: _figures_of(each.truth, active, events) for name, each in drives.items()},
     }
 
 
-def _figures_of(ridden: Ride, active: BoolArray, events: BoolArray) -> dict[str, Any]:
+def _figures_of(truth: Truth, active: BoolArray, events: BoolArray) -> dict[str, Any]:
     return {
-        'displacement_rms_m': _rms(ridden.displacement),
-        'displacement_peak_m': float(np.max(np.abs(ridden.displacement))),
-        'displacement_rms_while_friction_is_on_m': _rms(ridden.displacement[active]),
-        **_bands_of('displacement', 'm', ridden.displacement, events),
-        'force_rms_n': _rms(ridden.mount_force),
-        'force_peak_n': float(np.max(np.abs(ridden.mount_force))),
-        **_bands_of('force', 'n', ridden.mount_force, events),
+        'displacement_rms_m': _rms(truth.displacement),
+        'displacement_peak_m': float(np.max(np.abs(truth.displacement))),
+        'displacement_rms_while_friction_is_on_m': _rms(truth.displacement[active]),
+        **_bands_of('displacement', 'm', truth.displacement, events),
+        'force_rms_n': _rms(truth.mount_force),
+        'force_peak_n': float(np.max(np.abs(truth.mount_force))),
+        **_bands_of('force', 'n', truth.mount_force, events),
     }
 
 
@@ -213,8 +214,8 @@ def _lower(values: list[float]) -> Holds:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='A recorded drive',
-    reference='Sec. 7',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The vertical acceleration that a real car recorded moves the chassis side of the mount, with '
         'friction mount, original hydromount and elastomer alone in the seat. Spectra and bands come from '

@@ -12,10 +12,17 @@ from mount_experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Seed,
     Statement,
     parameters_of,
 )
-from mount_experiments.harness.rack_recording import SUBSTEPS, record_friction_rack
+from mount_experiments.harness.rack_recording import (
+    SUBSTEPS,
+    DisplacementNoise,
+    ForceNoise,
+    record_friction_rack,
+)
+from mount_experiments.sawtooth import REFERENCE, TITLE
 from mount_experiments.sawtooth.evaluation import Run, evaluate
 from mount_identification.friction.recording import FloatArray
 from mount_identification.friction.slip_regions import slip_regions
@@ -41,18 +48,16 @@ class SawtoothParameters(NamedTuple):
     highest_normal_force: Annotated[float, Quantity('N', 'last normal force', 10.0, 300.0, 'Sec. 4')] = 120.0
     normal_force_step: Annotated[float, Quantity('N', 'step between them', 1.0, 300.0)] = 20.0
     shown_normal_force: Annotated[float, Quantity('N', 'drawn in detail', 10.0, 300.0, 'Fig. 9')] = 100.0
-    force_noise: Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)] = 0.5
-    displacement_noise: Annotated[
-        float, Quantity('m', 'standard deviation of the displacement sensor', 0.0, 1e-5)
-    ] = 20e-9
-    seed: Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)] = 1
+    force_noise: ForceNoise = 0.5
+    displacement_noise: DisplacementNoise = 20e-9
+    seed: Seed = 1
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
 
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Move the rack at every normal force, record it, and evaluate the recordings."""
-    from mount_experiments.sawtooth import figures
+    from mount_experiments.sawtooth import pictures as drawn
 
     parameters = parameters_of(order, NAME, SawtoothParameters())
     _check_order(parameters)
@@ -65,10 +70,10 @@ def run(order: Order, progress: Progress) -> Outcome:
     progress(0.95, 'pictures')
     shown = runs[int(np.argmin(np.abs(np.array(loads) - parameters.shown_normal_force)))]
     pictures = [
-        figures.draw_time(shown, order.out / 'sawtooth_force.png'),
-        figures.draw_lines(shown, order.out / 'sawtooth_mu_over_u.png'),
-        figures.draw_parameters(runs, parameters.friction, order.out / 'sawtooth_a_b.png'),
-        figures.draw_models(shown, order.out / 'sawtooth_models.png'),
+        drawn.draw_time(shown, order.out / 'sawtooth_force.png'),
+        drawn.draw_lines(shown, order.out / 'sawtooth_mu_over_u.png'),
+        drawn.draw_parameters(runs, parameters.friction, order.out / 'sawtooth_a_b.png'),
+        drawn.draw_models(shown, order.out / 'sawtooth_models.png'),
     ]
     results = _figures(runs, shown, parameters)
     return Outcome(results, pictures, recordings, _statements(results))
@@ -251,8 +256,8 @@ def _rms(values: FloatArray) -> float:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Friction contact alone on a saw tooth',
-    reference='Figs. 8 to 11',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The simulated pads (full model) are moved between two turning points at constant speed and constant '
         'normal force; after every second turning point the speed grows by 1 mm/s. Displacement, friction '

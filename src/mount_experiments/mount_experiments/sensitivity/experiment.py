@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import FloatArray, settings_of_run
+from mount_experiments.harness.closed_loop import settings_of_run
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -15,7 +15,8 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
-from mount_experiments.harness.numbers import numbers_of
+from mount_experiments.harness.number_list import numbers_of
+from mount_experiments.sensitivity import REFERENCE, TITLE
 from mount_experiments.sensitivity.grid import Job, run_all
 from mount_experiments.sensitivity.maps import (
     Axes,
@@ -28,6 +29,7 @@ from mount_experiments.sweep.evaluation import BELOW_ISOLATION, FIRST_FREQUENCY,
 from mount_models.damper import damper_curve
 from mount_models.hydromount import Hydromount
 from mount_models.quantity import checked
+from mount_report.drive.signals import FloatArray
 
 NAME = 'sensitivity'
 _BENCH_FREQUENCY, _BENCH_AMPLITUDE, _BENCH_SECONDS = 8.0, 1e-3, 4.75
@@ -36,7 +38,7 @@ _HIGHEST_LEVEL = 1.0  # m/s
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Run all combinations, and write maps and a page from the numbers."""
-    from mount_experiments.sensitivity import figures as drawing
+    from mount_experiments.sensitivity import pictures as drawn
     from mount_experiments.sensitivity.page import in_short, write_results
 
     parameters = parameters_of(order, NAME, SensitivityParameters())
@@ -52,8 +54,8 @@ def run(order: Order, progress: Progress) -> Outcome:
     progress(0.97, 'pictures')
     folder = order.out / 'figures'
     pictures = [
-        drawing.draw_peaks(maps, folder / 'sensitivity_displacement.png'),
-        drawing.draw_acceleration(maps, folder / 'sensitivity_acceleration.png'),
+        drawn.draw_peaks(maps, folder / 'sensitivity_displacement.png'),
+        drawn.draw_acceleration(maps, folder / 'sensitivity_acceleration.png'),
     ]
     page = write_results(maps, parameters, len(jobs), pictures, order.out / 'results.md')
     statements = _statements(maps, in_short(maps))
@@ -203,8 +205,8 @@ def _statements(maps: Maps, told: dict[str, str]) -> list[Statement]:
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='What the comparison with the hydromount depends on',
-    reference='Figs. 13, 14',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The paper gives neither the road level nor whether the engine ran, and nothing of its hydromount. '
         'So the sweep is run with all combinations of road level, resistance of the decoupler, asymmetry of '

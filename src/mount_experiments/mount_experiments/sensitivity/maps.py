@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
-from mount_experiments.harness.closed_loop import FloatArray
 from mount_models.quantity import Quantity
+from mount_report.drive.signals import FloatArray
 
 EVEN_WITHIN = 0.02
 """Two mounts count as even where their ratio differs from 1 by at most so much (chosen)."""

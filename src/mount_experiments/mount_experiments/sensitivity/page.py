@@ -12,8 +12,8 @@ from mount_experiments.sensitivity.reference import agreement
 from mount_experiments.sweep.evaluation import ISOLATION_BANDS
 
 if TYPE_CHECKING:
-    from mount_experiments.harness.closed_loop import FloatArray
     from mount_experiments.sensitivity.maps import Maps, SensitivityParameters
+    from mount_report.drive.signals import FloatArray
 
 _EVEN = (2, 4, 6, 8)
 _HEAD = """# Friction mount or hydromount: what the answer depends on

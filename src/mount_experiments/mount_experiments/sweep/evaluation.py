@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import FloatArray, Ride
 from mount_report.drive.evaluation import switching
+from mount_report.drive.signals import DriveSignals, FloatArray
 from mount_report.sections.sweep import peak_per_band, rms_per_band
 
 FRICTION, HYDRO, OFF, ALWAYS = 'friction', 'hydromount', 'friction, 0 A', 'friction, always on'
@@ -25,7 +25,7 @@ Band = tuple[float, float]
 class SweepRun:
     """One run of the sweep: its signals, and the frequency (Hz) at each sample."""
 
-    ride: Ride
+    drive: DriveSignals
     frequency: FloatArray
 
 
@@ -55,19 +55,19 @@ def defined_peak(edges: list[float], peaks: list[float], level: float) -> Band |
 
 def figures_of(passed: SweepRun, level: float) -> dict[str, Any]:
     """Return peaks, rms and switching frequencies of one run; `level` (m) is that of switching on."""
-    ridden, frequency = passed.ride, passed.frequency
-    edges, peaks = peak_per_band(frequency, ridden.displacement)
-    _, rms = rms_per_band(frequency, ridden.chassis_acceleration)
-    changes = switching(ridden.seen)
+    truth, frequency = passed.drive.truth, passed.frequency
+    edges, peaks = peak_per_band(frequency, truth.displacement)
+    _, rms = rms_per_band(frequency, truth.chassis_acceleration)
+    changes = switching(passed.drive.seen)
     return {
         'band_edges_hz': [*edges.tolist(), float(edges[-1]) + 1.0],
         'peak_displacement_m': peaks.tolist(),
         'chassis_acceleration_rms': rms.tolist(),
-        'resonance_peak_m': peak_in(frequency, ridden.displacement, RESONANCE),
-        'highest_peak_m': peak_in(frequency, ridden.displacement, BELOW_ISOLATION),
+        'resonance_peak_m': peak_in(frequency, truth.displacement, RESONANCE),
+        'highest_peak_m': peak_in(frequency, truth.displacement, BELOW_ISOLATION),
         'defined_peak': defined_peak(edges.tolist(), peaks.tolist(), level),
-        'isolation_rms': [rms_in(frequency, ridden.chassis_acceleration, band) for band in ISOLATION_BANDS],
-        'resonance_rms': rms_in(frequency, ridden.chassis_acceleration, RESONANCE),
+        'isolation_rms': [rms_in(frequency, truth.chassis_acceleration, band) for band in ISOLATION_BANDS],
+        'resonance_rms': rms_in(frequency, truth.chassis_acceleration, RESONANCE),
         'switched_on_hz': [FIRST_FREQUENCY + RATE * time for time in changes.on],
         'switched_off_hz': [FIRST_FREQUENCY + RATE * time for time in changes.off],
     }

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.policy import switched_viscous
-from mount_experiments.harness.closed_loop import mode_of, ride
+from mount_experiments.harness.closed_loop import driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -15,6 +15,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
+from mount_experiments.sweep import REFERENCE, TITLE
 from mount_experiments.sweep.evaluation import (
     ALWAYS,
     DEFINED_PEAK,
@@ -54,7 +55,7 @@ class SweepParameters(NamedTuple):
 
 def run(order: Order, progress: Progress) -> Outcome:
     """Drive every mount through the sweep, record it, and evaluate the recordings."""
-    from mount_experiments.sweep import figures as drawing
+    from mount_experiments.sweep import pictures as drawn
 
     parameters = parameters_of(order, NAME, SweepParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
@@ -66,22 +67,22 @@ def run(order: Order, progress: Progress) -> Outcome:
         progress(0.95 * number / len(mounts), f'sweep, {name}')
         idle = parameters.idle_amplitude if name in (FRICTION_IDLE, HYDRO_IDLE) else 0.0
         label = name.replace(', ', '_').replace(' ', '_')
-        ridden = ride(order, label, _own(parameters, mount, idle), NAME)
-        runs[name] = SweepRun(ridden, FIRST_FREQUENCY + RATE * ridden.time)
+        drive = driven(order, label, _own(parameters, mount, idle), NAME)
+        runs[name] = SweepRun(drive, FIRST_FREQUENCY + RATE * drive.truth.time)
     progress(0.95, 'pictures')
     figures = _figures(runs, parameters, mode_of(order), _switch_on_level(order))
     pictures = [
-        drawing.draw_sweep(runs[FRICTION], runs[HYDRO], 'road alone (Fig. 14)', order.out / 'sweep.png'),
-        drawing.draw_peaks(runs, order.out / 'sweep_peaks.png'),
+        drawn.draw_sweep(runs[FRICTION], runs[HYDRO], 'road alone (Fig. 14)', order.out / 'sweep.png'),
+        drawn.draw_peaks(runs, order.out / 'sweep_peaks.png'),
     ]
     if FRICTION_IDLE in runs:
         title = f'road, and the engine idling with {parameters.idle_amplitude:g} N'
         pictures.append(
-            drawing.draw_sweep(
+            drawn.draw_sweep(
                 runs[FRICTION_IDLE], runs[HYDRO_IDLE], title, order.out / 'sweep_engine_idling.png'
             )
         )
-    recordings = [each.ride.recording for each in runs.values()]
+    recordings = [each.drive.recording for each in runs.values()]
     return Outcome(figures, pictures, recordings, _statements(figures))
 
 
@@ -182,7 +183,7 @@ def _on_damping(figures: dict[str, Any]) -> Statement:
         f'Largest displacement from 7 to 10 Hz in mm: {told}. So {share:.2f} of the hydromount; damping '
         f'always on leaves {undamped:.2f} of the undamped one. Counted as far higher '
         f'below {FAR_HIGHER:g} of the hydromount (chosen). Against the hydromount this depends on the '
-        'road level (docs/results.md).',
+        'road level (docs/explanation/results.md).',
         Holds.YES if share < FAR_HIGHER else Holds.PARTLY if share < 1.0 else Holds.NO,
     )
 
@@ -211,21 +212,22 @@ def _on_noise(figures: dict[str, Any]) -> Statement:
         reference,
         paper,
         f'Rms of the friction mount over that of the hydromount, {"; ".join(told)}. The paper does not say '
-        'whether the engine ran; both road level and idle force are assumed here (docs/results.md).',
+        'whether the engine ran; both road level and idle force are assumed here '
+        '(docs/explanation/results.md).',
         Holds.YES if all(lower) else Holds.PARTLY if any(lower) else Holds.NO,
     )
 
 
 EXPERIMENT = Experiment(
     name=NAME,
-    title='Front wheels from 1 to 50 Hz',
-    reference='Fig. 14',
+    title=TITLE,
+    reference=REFERENCE,
     summary=(
         'The road under the wheel is a sine whose frequency rises by 1 Hz per second at a constant amplitude '
         'of its velocity (chosen). The same sweep is driven with the friction mount, the original '
         'hydromount, the friction mount without current and with damping always on, and with an idling '
         'engine; displacement and chassis acceleration come from the recordings. Which of the two '
-        'mounts is better depends on what the paper does not give: docs/results.md.'
+        'mounts is better depends on what the paper does not give: docs/explanation/results.md.'
     ),
     defaults=SweepParameters(),
     run=run,

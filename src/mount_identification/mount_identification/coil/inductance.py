@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
+from mount_bags.run.screen import Table
 from mount_identification.coil.gap_calibration import (
     GapCalibration,
     GapPoint,
@@ -106,32 +106,29 @@ class InductanceResult:
         }
 
     def _residuals(self) -> Table:
-        table = Table(title='gap curves: error of the curve as a gap (um)', title_justify='left')
-        for heading in ('air gap (um)', 'L at rest (mH)', 'error', 'crossing (A)', 'error'):
-            table.add_column(heading, justify='right')
-        errors = zip(
-            self.calibration.inductance.gap_errors, self.calibration.crossing.gap_errors, strict=True
-        )
-        for point, (rest, contact) in zip(self.calibration.points, errors, strict=True):
-            table.add_row(
+        points, inductance = self.calibration.points, self.calibration.inductance
+        errors = zip(points, inductance.gap_errors, self.calibration.crossing.gap_errors, strict=True)
+        rows = [
+            (
                 f'{point.gap * 1e6:.1f}',
                 f'{point.inductance * 1e3:.3f}',
                 f'{rest * 1e6:+.2f}',
                 f'{point.crossing_current:.4f}',
                 f'{contact * 1e6:+.2f}',
             )
-        return table
+            for point, rest, contact in errors
+        ]
+        heads = ('air gap (um)', 'L at rest (mH)', 'error', 'crossing (A)', 'error')
+        return Table('gap curves: error of the curve as a gap (um)', 'rrrrr', rows, heads)
 
     def _temperatures(self) -> Table:
-        table = Table(title='largest gap error by coil temperature (um)', title_justify='left')
-        for heading in ('degC', 'at rest', 'compensated', 'at contact', 'compensated'):
-            table.add_column(heading, justify='right')
-        table.add_column('from')
-        for row in self.left:
-            cells = ('rest_uncompensated_um', 'rest_um', 'contact_uncompensated_um', 'contact_um')
-            source = _SOURCES[row['source']]
-            table.add_row(f'{row["celsius"]:.0f}', *(f'{row[name]:.1f}' for name in cells), source)
-        return table
+        names = ('rest_uncompensated_um', 'rest_um', 'contact_uncompensated_um', 'contact_um')
+        rows = [
+            (f'{row["celsius"]:.0f}', *(f'{row[name]:.1f}' for name in names), _SOURCES[row['source']])
+            for row in self.left
+        ]
+        heads = ('degC', 'at rest', 'compensated', 'at contact', 'compensated', 'from')
+        return Table('largest gap error by coil temperature (um)', 'rrrrrl', rows, heads)
 
 
 def calibrate_inductance(

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run
+from mount_bags.run.session import recorded_session, session_content
 from mount_identification.drift.law import FEWEST, Drift, DriftError, fitted_drift
 from mount_identification.friction.files import TOPICS, read_recording
 from mount_models.specimen import Specimen
-from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE, SESSION
+from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE
 
 _SLIDING = 0.5  # of the highest speed: pads slide there (chosen)
 
@@ -149,9 +149,9 @@ def _state(path: Path, specimen: Specimen, hours: float | None) -> State:
 def _started(recording: Recording, path: Path) -> float:
     """Return when the session began, in hours of the clock."""
     try:
-        content = yaml.safe_load(recording.latched(SESSION.name).data)
-        return datetime.fromisoformat(content['started']).timestamp() / 3600.0
-    except (KeyError, TypeError, ValueError, AttributeError, yaml.YAMLError) as error:
+        started = session_content(recorded_session(recording))['started']
+        return datetime.fromisoformat(started).timestamp() / 3600.0
+    except (KeyError, TypeError, ValueError) as error:
         raise DriftError(
             f'{path} does not tell when it began ({error}); give the hours of all by --hours FILE=H'
         ) from None

@@ -55,8 +55,6 @@ class CoefficientFit:
     with_load: bool
     a_rms: float
     b_rms_mm: float
-    a_model: FloatArray
-    b_model: FloatArray
     covariances: tuple[ProductCovariance, ...]
 
 
@@ -95,8 +93,6 @@ def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> Coef
         with_load,
         float(np.sqrt(np.mean((a - [line.a for line in lines]) ** 2))),
         1e-3 * float(np.sqrt(np.mean((b - [line.b for line in lines]) ** 2))),
-        a,
-        b,
         tuple(covariances),
     )
 

@@ -51,11 +51,6 @@ class FrictionRecording:
         """Root of the mean square of the force, N: what errors are related to."""
         return float(np.sqrt(np.mean(self.force**2)))
 
-    @property
-    def mean_normal_force(self) -> float:
-        """Mean normal force of both directions, N."""
-        return float(np.mean(self.normal_force))
-
 
 def checked_recording(
     name: str,

@@ -58,9 +58,6 @@ TABLE_1 = ForceLaw(
 )
 """The authors' prototype as printed in Table 1; the guarded range lies well within the hard limits."""
 
-TABLE_1_HARD_LIMITS = (148e-6, 546e-6)
-"""Gaps (m) beyond which Table 1 no longer rises with current and falls with gap, 1 mA .. 3 A (derived)."""
-
 
 @compiled
 def force(law, current, gap):

@@ -2,20 +2,29 @@
 
 A named tuple is taken apart number by number at each call of a compiled function; for a law with fifty
 parameters that costs more than the law. Bytes cost nothing: compiled code looks at them through
-``parameters.view(DTYPE)[0]`` and then reads `record.field` as it would read the tuple's.
+``parameters.view(DTYPE)[0]`` and then reads `record.field` as it would read the tuple's. So does code that
+is not compiled, because the elements of such a type are `np.record`.
 """
 
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
+Field = tuple[str, Any]  # name, and type as numpy takes it
+
+
+def record_type(fields: Sequence[Field]) -> np.dtype:
+    """Return the type of a record of these fields, which are its attributes, compiled or not."""
+    return np.dtype((np.record, list(fields)))
+
 
 @functools.cache
 def record_dtype(kind: type[NamedTuple]) -> np.dtype:
     """Return the record type of a named tuple of numbers, or of such tuples, from its annotations."""
-    return np.dtype([(name, _field_type(hint)) for name, hint in get_type_hints(kind).items()])
+    return record_type([(name, _field_type(hint)) for name, hint in get_type_hints(kind).items()])
 
 
 def record_bytes(parameters: NamedTuple) -> NDArray[np.uint8]:

@@ -4,24 +4,19 @@ import contextlib
 import math
 import zlib
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.text import Text
-
 from mount_bags.recorder.parameters import RecorderParameters, split_of
 from mount_bags.run.folder import RunFolder, make_run_folder
-from mount_bags.run.versions import versions
+from mount_bags.run.screen import Screen
+from mount_bags.run.session import new_session, session_text
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
-from mount_bringup.graph.supervisor import Supervisor, session_text
+from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
-from mount_bringup.progress_bar import progress_bar
-from mount_bringup.terminal import note
 from mount_control.diagnosis import fault_sentence
 from mount_models.quantity import with_flattened
 from mount_replay.drive.preflight import preflight
@@ -30,8 +25,8 @@ from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
 
 # A ROS domain has 250 UDP ports from 7400 on (RTPS 2.2, section 9.6.1.1), of which two for each participant
-# are in use. The bus takes one behind them: higher up the kernel gives them to anybody, and the bus would not
-# open.
+# are in use. The bus takes one behind them: higher up the kernel gives them to any process, and the bus
+# would not open.
 _FIRST_PORT, _PORTS_OF_DOMAIN = 7530, 250  # behind 59 participants
 _PLACES = 119  # namespaces told apart by their ports
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
@@ -39,7 +34,7 @@ _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts a
 
 @dataclass(frozen=True)
 class DriveOrder:
-    """What the user wants."""
+    """What the user orders."""
 
     scenario: str
     mode: str  # 'real time', 'lock-step' or 'core'
@@ -51,19 +46,19 @@ class DriveOrder:
     apart: bool = False  # in lock-step too every node has a process of its own
 
 
-def record_drive(order: DriveOrder, console: Console) -> tuple[RunFolder, dict[str, Any], list[str]]:
+def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str, Any], list[str]]:
     """Drive and record; return the folder, what the run itself knows, and what was not as it should be.
 
     Raises `Interrupted`, `GraphError` or a `ValueError` with the reason.
     """
     excitation = preflight(order.parameters)
     for remark in excitation.notes:
-        note(console, remark)
+        screen.note(remark)
     folder = make_run_folder(order.out, order.scenario)
     complaints: list[str] = []
     if order.mode == 'core':
-        return folder, _drive_in_core(order, excitation, folder, console, complaints), complaints
-    return folder, _drive_graph(order, excitation, folder, console, complaints), complaints
+        return folder, _drive_in_core(order, excitation, folder, screen, complaints), complaints
+    return folder, _drive_graph(order, excitation, folder, screen, complaints), complaints
 
 
 def recorder_parameters(order: DriveOrder) -> RecorderParameters:
@@ -72,7 +67,7 @@ def recorder_parameters(order: DriveOrder) -> RecorderParameters:
 
 
 def _drive_graph(
-    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, screen: Screen, complaints: list[str]
 ) -> dict[str, Any]:
     lockstep = order.mode == 'lock-step'
     settings = GraphSettings(
@@ -85,14 +80,14 @@ def _drive_graph(
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
     with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
         try:
-            with console.status('starting') as status:
+            with screen.line('starting') as show:
                 supervisor.start(
                     lambda all_parameters: _session(order, all_parameters),
-                    lambda what: status.update(Text(what)),
+                    show,
                 )
             duration = excitation.start + excitation.duration
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
-            _watch_drive(order, supervisor, limit, console)
+            _watch_drive(order, supervisor, limit, screen)
             figures = supervisor.figures(SIM)
             complaints += _beyond_range(int(figures['beyond_range']), float(figures['first_beyond_range_s']))
             complaints += _control_faults(int(supervisor.figures(CONTROL).get('faults', 0)))
@@ -102,7 +97,7 @@ def _drive_graph(
                 supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
             for sentence in supervisor.notes:
-                note(console, sentence)
+                screen.note(sentence)
     return {
         'scenario': order.scenario,
         'mode': order.mode,
@@ -114,18 +109,18 @@ def _drive_graph(
     }
 
 
-def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, console: Console) -> None:
+def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, screen: Screen) -> None:
     # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
     keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
-    with keyboard as keys, progress_bar(console) as progress:
-        set_mark = supervisor.mark_setter(lambda answer: console.print(answer, soft_wrap=True))
+    with keyboard as keys, screen.bar(f'driving ({order.scenario})') as show:
+        set_mark = supervisor.mark_setter(screen.say)
         hint = '; m or space: mark' if keys is not None and keys.present else ''
-        task = progress.add_task(f'driving ({order.scenario}{hint})', total=1.0)
+        show(0.0, f'driving ({order.scenario}{hint})')
 
         def finished() -> bool:
             figures = supervisor.figures(SIM)
             share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
-            progress.update(task, completed=share)
+            show(share)
             for key in keys.wait(0.0) if keys is not None else ():
                 if key in MARK_KEYS:
                     set_mark()
@@ -135,15 +130,14 @@ def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, consol
 
 
 def _drive_in_core(
-    order: DriveOrder, excitation: Excitation, folder: RunFolder, console: Console, complaints: list[str]
+    order: DriveOrder, excitation: Excitation, folder: RunFolder, screen: Screen, complaints: list[str]
 ) -> dict[str, Any]:
-    with progress_bar(console) as progress:
-        task = progress.add_task(f'driving ({order.scenario})', total=1.0)
+    with screen.bar(f'driving ({order.scenario})') as show:
         outcome = record_core(
             folder.recording,
             order.parameters,
             _session(order, order.parameters),
-            lambda share: progress.update(task, completed=share),
+            show,
             excitation=excitation,
             namespace=order.namespace,
             split=split_of(recorder_parameters(order)),
@@ -198,12 +192,5 @@ def _port(order: DriveOrder) -> int:
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
-    return session_text(
-        {
-            'scenario': order.scenario,
-            'mode': order.mode,
-            'started': datetime.now().astimezone().isoformat(timespec='seconds'),
-            'parameters': {node: dict(values) for node, values in parameters.items()},
-            'versions': versions(),
-        }
-    )
+    told = {node: dict(values) for node, values in parameters.items()}
+    return session_text(new_session({'scenario': order.scenario, 'mode': order.mode, 'parameters': told}))

@@ -181,7 +181,7 @@ def _on_one_grid(signals: dict[str, EvenSignal], notes: list[str]) -> tuple[Time
         )
         raise ReplayError(f'no overlap of {_SHORTEST:g} s or more: {spans}')
     columns = {
-        name: resampled(even, SAMPLE_TIME, (begin - even.begin) / SECOND, count)
+        name: resampled(even, SAMPLE_TIME, (begin - even.begin) / SECOND, count)[:]
         for name, even in signals.items()
     }
     notes += [

@@ -9,13 +9,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from mount_bags.bag.origin import short_name
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Payloads
-from mount_bags.messages.time_axis import time_axis
+from mount_bags.run.session import SessionError, recorded_session, session_content, session_parameters
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
 from mount_control.settings import policy_parameters
@@ -135,8 +133,8 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     """
     recording.load(topic.name for topic in _READ if topic.name in recording)
     displacement = _displacement(recording)
-    notes = Notes(time_axis(recording).zero)
-    session = recorded_session(recording, notes)
+    notes = Notes(recording.time_axis.zero)
+    session = _session_of(recording, notes)
     parameters = _parameters_of(session, notes)
     gaps = measured_gaps(recording)
     if gap is not None and not gaps:
@@ -162,7 +160,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     messages = {topic.name: _messages(recording, topic) for topic in _INPUTS if has(recording, topic)}
     series = recording[topics.DISPLACEMENT.name]
     log_shift = int(series.receive_times[0] - series.stamps[0])
-    name = short_name(recording)
+    name = recording.short_name
     changes = recorded_changes(recording)
     return ReplayInput(
         name, parts, parameters, answers, messages, notes.zero, log_shift, session, notes, changes
@@ -403,7 +401,7 @@ def _was_activated_between(
             return True
     if any(before <= gap.stamp < after for gap in gaps):
         return True
-    # A controller that hears nothing for so long gives up its table; one that hears and says nothing is off.
+    # Without samples for so long a controller discards its table; with samples and no answers it is off.
     heard = all_stamps[(all_stamps >= before) & (all_stamps <= after)]
     return after - before > _BREAK and heard.size > 1 and bool(np.diff(heard).max() <= _BREAK)
 
@@ -418,30 +416,25 @@ def _first_step_is_afresh(first: int, answers: RecordedAnswers | None) -> bool:
 # The session.
 
 
-def recorded_session(recording: Recording, notes: Notes) -> dict[str, Any]:
+def _session_of(recording: Recording, notes: Notes) -> dict[str, Any]:
     """Return the content of the last session message; {} with a note where there is none."""
-    if has(recording, topics.SESSION):
-        try:
-            content = yaml.safe_load(recording.latched(topics.SESSION.name).data)
-        except yaml.YAMLError as error:
-            notes.append(
-                f'session is no YAML ({str(error).splitlines()[0]}): all parameters are the defaults'
-            )
-            return {}
-        if isinstance(content, dict):
-            return content
-    notes.append('the recording holds no session: all parameters are the defaults')
-    return {}
+    try:
+        content = session_content(recorded_session(recording))
+    except SessionError as error:
+        notes.append(f'{error}: all parameters are the defaults')
+        return {}
+    if not content:
+        notes.append('the recording holds no session: all parameters are the defaults')
+    return content
 
 
 def _parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str, Any]]:
     """Return the recorded parameters of the nodes that replay, those that the nodes still know."""
     known = defaults_of_nodes()
-    recorded = session.get('parameters')
+    recorded = session_parameters(session)
     found: dict[str, dict[str, Any]] = {}
     for node in ('mount_control', 'mount_init'):
-        values = recorded.get(node) if isinstance(recorded, dict) else None
-        values = values if isinstance(values, dict) else {}
+        values = recorded.get(node, {})
         found[node] = {name: value for name, value in values.items() if name in known[node]}
         new = [name for name in known[node] if name not in found[node]]
         if new and found[node] and len(new) < len(known[node]) // 2:
@@ -451,7 +444,7 @@ def _parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str,
 
 def recorded_parameters(recording: Recording, notes: Notes) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: value}} of the nodes that replay, as recorded and still known."""
-    return _parameters_of(recorded_session(recording, notes), notes)
+    return _parameters_of(_session_of(recording, notes), notes)
 
 
 def has(recording: Recording, topic: Topic) -> bool:

@@ -20,7 +20,7 @@ def recorded_changes(recording: Recording) -> list[ParametersChanged]:
 
 
 def without(changes: Sequence[ParametersChanged], names: Collection[str]) -> list[ParametersChanged]:
-    """Return the changes of all parameters but `names`, which somebody wants otherwise."""
+    """Return the changes of all parameters but `names`, which are to be other than recorded."""
     kept = [
         change._replace(values={name: value for name, value in change.values.items() if name not in names})
         for change in changes

@@ -1,4 +1,4 @@
-"""Plays a recording by the wall clock, to look at: topics out, keys in, a line that tells the position."""
+"""Plays a recording by the wall clock: topics are published, keys control it, a line tells the position."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -10,16 +10,15 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from rclpy.node import Node
-from rich.console import Console
 
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Payloads, registered_topic
 from mount_bags.run.place import open_run
+from mount_bags.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
 from mount_bringup.keyboard import Keyboard
-from mount_bringup.terminal import note
 from mount_replay.given.input import Notes, ReplayError, has, recorded_parameters
 from mount_replay.given.ramps import MeasuredGap, measured_gaps
 from mount_replay.live.live_control import LiveControl
@@ -43,7 +42,7 @@ _KEYS = 'space: pause, left/right: 1 s (paused: right is one sample), up/down: 1
 
 @dataclass(frozen=True)
 class LiveOrder:
-    """What the user wants to look at; `begin` in s."""
+    """What is to be played; `begin` in s."""
 
     recording: Path
     rate: float = 1.0
@@ -67,7 +66,7 @@ class _Film:
     samples: NDArray[np.float64]
 
 
-def play_live(order: LiveOrder, console: Console) -> None:
+def play_live(order: LiveOrder, screen: Screen) -> None:
     """Play to the end, to `q` or to Ctrl-C; raises `ReplayError` with the reason where it cannot."""
     recording = open_run(order.recording)
     if not 0.01 <= order.rate <= 100.0:
@@ -78,7 +77,7 @@ def play_live(order: LiveOrder, console: Console) -> None:
     gaps = measured_gaps(recording)
     parameters = _parameters(recording, order, gaps)
     for warning in recording.warnings:
-        note(console, warning)
+        screen.note(warning)
     with domain_lock(order.domain, order.namespace), ros_context(order.domain) as context:
         owner = Node('mount_replay', namespace=order.namespace, context=context, enable_rosout=False)
         path = DataPath(owner)
@@ -88,7 +87,7 @@ def play_live(order: LiveOrder, console: Console) -> None:
             senders = [path.sender(topic) for topic in film.topics]
             if parameters is not None:
                 control = LiveControl(context, order.namespace, parameters, path)
-            _Show(film, senders, control, gaps, order, console).run()
+            _Show(film, senders, control, gaps, order, screen).run()
         finally:
             if control is not None:
                 control.close()
@@ -106,10 +105,10 @@ class _Show:
         control: LiveControl | None,
         gaps: list[MeasuredGap],
         order: LiveOrder,
-        console: Console,
+        screen: Screen,
     ):
         self._film, self._senders, self._control, self._gaps = film, senders, control, gaps
-        self._rate, self._console = order.rate, console
+        self._rate, self._screen = order.rate, screen
         self._playback = Playback(film.times, film.samples, order.rate, order.begin)
         self._displacement = film.topics.index(topics.DISPLACEMENT)
         self._waiting_gap: MeasuredGap | None = None
@@ -117,9 +116,9 @@ class _Show:
     def run(self) -> None:
         """Play until the end or `q`."""
         playback, shown = self._playback, 0.0
-        with Keyboard() as keyboard:
+        with Keyboard() as keyboard, self._screen.line('') as show:
             if keyboard.present:
-                self._console.print(_KEYS, soft_wrap=True)
+                self._screen.say(_KEYS)
             self._arrive()
             playback.play(time.monotonic())
             try:
@@ -129,7 +128,7 @@ class _Show:
                         self._publish(number)
                     if keyboard.present and now - shown > _LINE_PERIOD:
                         shown = now
-                        self._show_line(now)
+                        show(self._line(now))
                     wait = min(playback.until_next(time.monotonic()), _LONGEST_WAIT)
                     for key in keyboard.wait(wait):
                         if key == 'q':
@@ -138,8 +137,7 @@ class _Show:
             except KeyboardInterrupt:
                 raise typer.Exit(130) from None
             finally:
-                self._show_line(time.monotonic())
-                self._console.file.write('\n')
+                self._screen.say(self._line(time.monotonic()))
 
     def _obey(self, key: str, now: float) -> None:
         playback = self._playback
@@ -195,11 +193,9 @@ class _Show:
         place = int(self._film.place_of[number])
         return self._gaps[min(place, len(self._gaps) - 1)] if self._gaps else None
 
-    def _show_line(self, now: float) -> None:
-        state = 'paused ' if self._playback.paused else f'x {self._rate:g}'
-        line = f'\r{self._playback.position(now):10.3f} s of {self._playback.length:.3f} s  {state}   '
-        self._console.file.write(line)
-        self._console.file.flush()
+    def _line(self, now: float) -> str:
+        state = 'paused' if self._playback.paused else f'x {self._rate:g}'
+        return f'{self._playback.position(now):10.3f} s of {self._playback.length:.3f} s  {state}'
 
 
 def _chosen(recording: Recording, order: LiveOrder) -> dict[str, Topic]:

@@ -31,7 +31,7 @@ class CoreChain:
 
     @property
     def displacement_range(self) -> float:
-        """Displacements (m) up to here are believed."""
+        """Displacements (m) up to here are plausible."""
         return self._control.parameters.displacement_range
 
     @property

@@ -4,13 +4,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from std_msgs.msg import String
-
 from mount_bags.bag.split import WHOLE, SplitRule
 from mount_bags.bag.writer import BagWriter
+from mount_bags.run.session import session_message
 from mount_bringup.chosen import Parameters
 from mount_replay.loop.run import CoreOutcome, run_core
-from mount_ros.messages.cdr import serialised
 from mount_ros.topics import SESSION, TOPICS, Delivery, Topic
 from mount_sim.excitation.excitation import Excitation
 
@@ -37,7 +35,7 @@ def record_core(
         writer.add_topic(names[topic.name], topic.type, latched=topic.delivery is Delivery.LATCHED)
     begin = time.time_ns()
     try:
-        writer.write(names[SESSION.name], serialised(String(data=session)), begin)
+        writer.write(names[SESSION.name], session_message(session), begin)
         return run_core(
             parameters,
             lambda topic, raw, stamp: writer.write(names[topic.name], raw, begin + stamp),

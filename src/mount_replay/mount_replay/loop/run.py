@@ -11,6 +11,7 @@ from mount_bringup.chosen import Parameters
 from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
@@ -18,9 +19,8 @@ from mount_sim.electronics.electronics import STATUS_EVERY, Reading
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.simulated_mount import SAMPLE_TIME, BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
-_SAMPLE_NANOSECONDS = round(SAMPLE_TIME * 1e9)
 _BLOCK = 1000  # samples, chosen: packed and written together
 
 
@@ -90,11 +90,11 @@ def run_core_into(
         pending = _take_one(mount, chain, samples, pending)
         if chain.result is not None and not chain.controlled:
             messages.write_samples(samples)
-            messages.write_result(_stamp(mount) - _SAMPLE_NANOSECONDS, chain.result)
+            messages.write_result(_stamp(mount) - SAMPLE_TIME_NS, chain.result)
     setpoint = samples.setpoints[samples.count - 1]
     messages.write_samples(samples)
     if chain.controlled and setpoint != OFF:
-        messages.write_off(_stamp(mount) - _SAMPLE_NANOSECONDS)  # as mount_control when it is deactivated
+        messages.write_off(_stamp(mount) - SAMPLE_TIME_NS)  # as mount_control when it is deactivated
     return CoreOutcome(
         samples=mount.sample,
         excitation_start=mount.run.excitation_start * SAMPLE_TIME,
@@ -116,7 +116,7 @@ def _coil_temperature(sim: SimParameters) -> float:
 
 
 def _stamp(mount: SimulatedMount) -> int:
-    return mount.sample * _SAMPLE_NANOSECONDS
+    return mount.sample * SAMPLE_TIME_NS
 
 
 def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float | None) -> float:
@@ -140,7 +140,7 @@ def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending
 def _take_many(
     mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float
 ) -> tuple[int, float]:
-    """Take samples while nothing is doubtful; return how many, and the setpoint (A) for the next."""
+    """Take samples while all of them are plausible; return how many, and the setpoint (A) for the next."""
     controller = chain.answering.controller
     assert controller is not None
     ahead = mount.ahead(samples.room)
@@ -156,7 +156,7 @@ def _take_many(
         samples.traces[part],
     )
     if taken:
-        stamps = _stamp(mount) + _SAMPLE_NANOSECONDS * np.arange(taken)
+        stamps = _stamp(mount) + SAMPLE_TIME_NS * np.arange(taken)
         part = slice(samples.count, samples.count + taken)
         samples.stamps[part] = stamps
         samples.traced[part] = True

@@ -25,7 +25,7 @@ _GAP = 0.05  # of the height, between panels
 
 
 def plotly_script() -> str:
-    """Return the text of plotly.js, which draws the figures in the page; raises `ChartError`."""
+    """Return the text of plotly.js, which draws the charts in the page; raises `ChartError`."""
     try:
         package = importlib.resources.files('plotly')
     except ModuleNotFoundError:

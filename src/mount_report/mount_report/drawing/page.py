@@ -27,7 +27,7 @@ tr.marked td { background: #fff3cd; } noscript { color: #b03030; }
 }
 """
 
-# Draws one figure after the other, so that the page answers meanwhile. What goes wrong stands in the page.
+# Draws one chart after the other, so that the page answers meanwhile. What goes wrong stands in the page.
 _SCRIPT = """
 'use strict';
 const root = document.documentElement;
@@ -66,7 +66,7 @@ def page(
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{html.escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n'
         f'<h1>{html.escape(title)}</h1>\n<nav>{links}</nav>\n'
-        '<noscript><p>The figures are drawn by a script, which this browser does not run.</p></noscript>\n'
+        '<noscript><p>The charts are drawn by a script, which this browser does not run.</p></noscript>\n'
         f'{"".join(body)}\n{scripts}<script>{_SCRIPT}</script>\n</body>\n</html>\n'
     )
 

@@ -1,6 +1,5 @@
 """What a drive says at its end: the figures of `--json`, and the same for people."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,9 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from mount_bags.audit.audit import TopicAudit
 from mount_bags.audit.losses import Losses
@@ -18,13 +14,12 @@ from mount_bags.audit.peak_current import peak_current
 from mount_bags.bag.recording import Recording
 from mount_bags.events.switching_changes import switching_times
 from mount_bags.recorder.parameters import RecorderParameters
+from mount_bags.run.screen import Screen, Table
 from mount_bringup.chosen import Parameters, chosen_damper, switched_viscous_parameters
 from mount_bringup.mount_choice import seat_of
-from mount_report.drive.evaluation import Drive, excitation_stamp, tracking_error
+from mount_report.drive.evaluation import tracking_error
+from mount_report.drive.signals import DriveSignals, excitation_stamp
 from mount_sim.plant.mounts import without_friction
-
-SUMMARISED = {'sim/truth': ('rest_gap', 'contact_gap')}
-"""Columns that `summarise` asks for beside those of `load_drive`, by topic."""
 
 _UM, _MM, _US = 1e6, 1e3, 1e6
 
@@ -33,7 +28,7 @@ def summarise(
     recording: Recording,
     audits: Mapping[str, TopicAudit],
     found: Losses,
-    drive: Drive,
+    drive: DriveSignals,
     parameters: Parameters,
     run: dict[str, Any],
 ) -> dict[str, Any]:
@@ -53,7 +48,7 @@ def summarise(
         'mode': run['mode'],
         'mount': seat_of(parameters),
         'excitation_start_s': start,
-        'duration_s': float(drive.time[-1] - max(drive.time[0], start)),
+        'duration_s': float(drive.seen.time[-1] - max(drive.seen.time[0], start)),
         'samples': found.samples,
         'lost_samples': found.lost_samples,
         'lost_messages': found.lost_messages,
@@ -71,7 +66,7 @@ def summarise(
         'offset_current_a': float(gap['offset_current'][-1]),
         'switch_on_s': friction.switch_on,
         'switch_off_s': friction.switch_off,
-        'peak_displacement_m': float(np.nanmax(np.abs(drive.displacement))),
+        'peak_displacement_m': float(np.nanmax(np.abs(drive.seen.displacement))),
         'peak_current_a': friction.peak_current,
         'tracking_error_rms': friction.tracking_error,
         'latency_median_s': _known(run['latency_median_s']),
@@ -90,7 +85,7 @@ class _FrictionFigures:
 
 
 def _friction_figures(
-    recording: Recording, audits: Mapping[str, TopicAudit], drive: Drive, parameters: Parameters
+    recording: Recording, audits: Mapping[str, TopicAudit], drive: DriveSignals, parameters: Parameters
 ) -> _FrictionFigures:
     if without_friction(seat_of(parameters)):
         return _FrictionFigures()
@@ -126,29 +121,24 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
     )
 
 
-def write_json(figures: dict[str, Any], file: Path) -> None:
-    """Write the figures as JSON."""
-    file.write_text(json.dumps(figures, indent=2, allow_nan=False) + '\n')
-
-
-def print_summary(figures: dict[str, Any], found: Losses, console: Console) -> None:
+def print_summary(figures: dict[str, Any], found: Losses, screen: Screen) -> None:
     """Print the figures as a table; times are s from the first displacement sample."""
-    table = Table(title=f'{figures["scenario"]}, {figures["mode"]}', show_header=False, title_justify='left')
-    table.add_column(style='bold')
-    table.add_column()
-    for name in ('rest', 'contact'):
-        measured, std = _UM * figures[f'{name}_gap_m'], _UM * figures[f'{name}_gap_std_m']
-        true = _UM * figures[f'true_{name}_gap_m']
-        table.add_row(f'{name} gap', f'{measured:.1f} ± {std:.1f} um measured, {true:.1f} um true')
-    table.add_row('excitation', f'from {figures["excitation_start_s"]:.2f} s on')
-    table.add_row('peak displacement', f'{_MM * figures["peak_displacement_m"]:.2f} mm')
-    for row in _friction_rows(figures):
-        table.add_row(*row)
-    for name, text in found.rows():
-        table.add_row(name, Text(text))
-    table.add_row('latency', _latency_text(figures))
-    table.add_row('speed', f'{figures["real_time_factor"]:.2f} x real time')
-    console.print(table)
+    rows = [
+        *(_gap_row(figures, name) for name in ('rest', 'contact')),
+        ('excitation', f'from {figures["excitation_start_s"]:.2f} s on'),
+        ('peak displacement', f'{_MM * figures["peak_displacement_m"]:.2f} mm'),
+        *_friction_rows(figures),
+        *found.rows(),
+        ('latency', _latency_text(figures)),
+        ('speed', f'{figures["real_time_factor"]:.2f} x real time'),
+    ]
+    screen.table(Table(f'{figures["scenario"]}, {figures["mode"]}', 'll', rows))
+
+
+def _gap_row(figures: dict[str, Any], name: str) -> tuple[str, str]:
+    measured, std = _UM * figures[f'{name}_gap_m'], _UM * figures[f'{name}_gap_std_m']
+    true = _UM * figures[f'true_{name}_gap_m']
+    return f'{name} gap', f'{measured:.1f} ± {std:.1f} um measured, {true:.1f} um true'
 
 
 def _switching_text(figures: dict[str, Any]) -> str:

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
 from mount_bags.audit.report import as_table, sentences
@@ -14,16 +12,17 @@ from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.recorder.snapshot import saved_snapshots
 from mount_bags.run.folder import RunFolder
+from mount_bags.run.screen import Screen
 from mount_bringup.chosen import Parameters, switched_viscous_parameters
-from mount_report.drive.evaluation import Drive, load_drive, samples_at_the_ends
+from mount_report.drive.evaluation import samples_at_the_ends
+from mount_report.drive.signals import DriveSignals, load_drive
 from mount_report.drive.summary import (
-    SUMMARISED,
     print_summary,
     snapshots_sentence,
     summarise,
     summarise_snapshots,
-    write_json,
 )
+from mount_report.json_file import write_json
 
 
 @dataclass
@@ -36,7 +35,7 @@ class Told:
 
 
 def tell_drive(
-    folder: RunFolder, parameters: Parameters, run: dict[str, Any], console: Console, *, report: bool
+    folder: RunFolder, parameters: Parameters, run: dict[str, Any], screen: Screen, *, report: bool
 ) -> Told:
     """Print and write the figures of a drive, with `report` also its picture and its page.
 
@@ -44,23 +43,23 @@ def tell_drive(
     is a complaint.
     """
     recording = open_recording(folder.recording)
-    drive_data = load_drive(recording, others=SUMMARISED)
+    drive = load_drive(recording)
     audits = audit(recording)
     found = losses(recording, audits)
     complaints = [*recording.warnings, *found.complaints()]
     complaints += samples_at_the_ends(recording, audits, run['samples'])
-    figures = summarise(recording, audits, found, drive_data, parameters, run)
+    figures = summarise(recording, audits, found, drive, parameters, run)
     write_json(figures, folder.summary)
-    print_summary(figures, found, console)
-    console.print(as_table(audits))
+    print_summary(figures, found, screen)
+    screen.table(as_table(audits))
     if report:
-        complaints += _complaint(folder.figure, lambda: _draw(folder, parameters, drive_data, figures))
-        complaints += _complaint(folder.report, lambda: _write_report(folder, recording, console))
+        complaints += _complaint(folder.figure, lambda: _draw(folder, parameters, drive, figures))
+        complaints += _complaint(folder.report, lambda: _write_report(folder, recording, screen))
     return Told(figures, [folder.recording], complaints)
 
 
 def tell_snapshots(
-    folder: RunFolder, recorder: RecorderParameters, run: dict[str, Any], console: Console
+    folder: RunFolder, recorder: RecorderParameters, run: dict[str, Any], screen: Screen
 ) -> Told:
     """Say what a run has that recorded only events: its figures would need all of the drive."""
     saved = saved_snapshots(folder.recording)
@@ -69,33 +68,33 @@ def tell_snapshots(
         recording = open_recording(place)
         audits = audit(recording)
         found = losses(recording, audits)
-        console.print(f'{place.name}: {sentences(audits, found)[-1]}', soft_wrap=True)
+        screen.say(f'{place.name}: {sentences(audits, found)[-1]}')
         complaints += [*recording.warnings, *(f'{place.name}: {words}' for words in found.complaints())]
-    console.print(snapshots_sentence(len(saved), recorder), soft_wrap=True)
+    screen.say(snapshots_sentence(len(saved), recorder))
     figures = summarise_snapshots(saved, run)
     write_json(figures, folder.summary)
     return Told(figures, saved, complaints)
 
 
-def _draw(folder: RunFolder, parameters: Parameters, drive_data: Drive, figures: dict[str, Any]) -> None:
-    from mount_report.drive.figure import draw_drive  # after the drive: what draws takes a second to load
+def _draw(folder: RunFolder, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:
+    from mount_report.drive.picture import draw_drive  # after the drive: what draws takes a second to load
 
     control = switched_viscous_parameters(parameters)
     title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
     begin = figures['excitation_start_s']
-    draw_drive(drive_data, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)
+    draw_drive(drive.seen, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)
 
 
-def _write_report(folder: RunFolder, recording: Recording, console: Console) -> None:
+def _write_report(folder: RunFolder, recording: Recording, screen: Screen) -> None:
     from mount_report.pages import write_report  # after the drive, as above
 
-    write_report([recording], None, folder.report, None, console)
+    write_report([recording], None, folder.report, None, screen)
 
 
 def _complaint(file: Path, make: Callable[[], None]) -> list[str]:
     """Make the picture or page of a drive; what prevents it is a complaint, for the recording is there."""
     try:
         make()
-    except Exception as error:  # whatever it stumbles over
+    except Exception as error:  # of any kind: the recording is there
         return [f'{file.name} could not be made: {str(error) or type(error).__name__}']
     return []

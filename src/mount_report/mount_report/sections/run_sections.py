@@ -5,18 +5,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mount_bags.audit.audit import TopicAudit
-from mount_bags.audit.losses import Losses
 from mount_bags.audit.peak_current import peak_current
 from mount_bags.audit.report import sentences as audit_sentences
-from mount_bags.compare.compare import Comparison
 from mount_bags.compare.quantity_text import quantity_text, time_text
 from mount_bags.compare.words import by_importance
 from mount_bags.compare.words import sentences as comparison_sentences
-from mount_bags.run.session_differences import session_values
-from mount_report.sections import figures
+from mount_bags.run.session import session_values
+from mount_report.sections import charts
+from mount_report.sections.charts import Named
 from mount_report.sections.coil_load import CoilLoad, coil_load
-from mount_report.sections.figures import Named
 from mount_report.sections.section import Section, Table
 from mount_report.sections.subject import Subject
 from mount_report.sections.wording import Sentences
@@ -28,12 +25,9 @@ _ROWS = 25  # of the table of differences
 _HEAD_OF_SESSION = ('scenario', 'mode', 'started')
 
 
-Audits = Sequence[dict[str, TopicAudit]]
-
-
-def overview(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses]) -> Section:
+def overview(subjects: Sequence[Subject]) -> Section:
     """Return the figures that one wants to see first, and what the recordings lack, in words."""
-    columns = [_figures(*each) for each in zip(subjects, audits, found, strict=True)]
+    columns = [_figures(subject) for subject in subjects]
     rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
     words, said = [], Sentences(subjects)
     for subject in subjects:
@@ -92,19 +86,20 @@ def tracking(subjects: Sequence[Subject]) -> Section:
         )
         said.say(subject, error)
         said.say(subject, subject.facts.tracking_remark)
-    chart = figures.tracking(wanted, actual, damping, _around(damping)) if wanted and damping else None
+    chart = charts.tracking(wanted, actual, damping, _around(damping)) if wanted and damping else None
     return Section('tracking', 'Tracking error against the truth', said.told(), chart)
 
 
-def losses(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses]) -> Section:
+def losses(subjects: Sequence[Subject]) -> Section:
     """Return what is missing of each topic, and the faults."""
     words, tables = [], []
-    for subject, topics, figure in zip(subjects, audits, found, strict=True):
+    for subject in subjects:
+        topics, lost = subject.audits, subject.losses
         prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
-        told = audit_sentences(topics, figure)
+        told = audit_sentences(topics, lost)
         words.append(f'{prefix}{told[-1]}')
-        if figure.faults:
-            faults = [(time_text(fault.time), fault.node, fault.sentence) for fault in figure.faults]
+        if lost.faults:
+            faults = [(time_text(fault.time), fault.node, fault.sentence) for fault in lost.faults]
             tables.append(Table(('time', 'node', 'fault'), faults, f'{prefix}faults'))
         rows = [
             (
@@ -124,8 +119,11 @@ def losses(subjects: Sequence[Subject], audits: Audits, found: Sequence[Losses])
     return Section('losses', 'Losses and faults', words, None, tables)
 
 
-def differences(comparison: Comparison) -> Section:
-    """Return in words and figures how B differs from A."""
+def differences(subjects: Sequence[Subject]) -> Section | None:
+    """Return in words and figures how the last recording differs from the first, where it was compared."""
+    comparison = subjects[-1].comparison
+    if comparison is None:
+        return None
     words = [
         f'A is {comparison.name_a}, B is {comparison.name_b}; {comparison.alignments.sentence}.',
         *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
@@ -193,7 +191,7 @@ def _value(values: dict, name: str) -> str:
     )
 
 
-def _figures(subject: Subject, topics: dict[str, TopicAudit], found: Losses) -> dict[str, str]:
+def _figures(subject: Subject) -> dict[str, str]:
     recording, session = subject.signals.recording, session_values(subject.signals.session)
     moved = subject.displacement()
     return {
@@ -202,17 +200,17 @@ def _figures(subject: Subject, topics: dict[str, TopicAudit], found: Losses) -> 
         'messages': str(recording.message_count),
         'length': 'not known' if moved is None else quantity_text(float(np.ptp(moved.time)), 's', 5),
         'peak displacement': _highest(moved, 'm'),
-        **_friction_figures(subject, topics),
-        **dict(found.rows()),
+        **_friction_figures(subject),
+        **dict(subject.losses.rows()),
     }
 
 
-def _friction_figures(subject: Subject, topics: dict[str, TopicAudit]) -> dict[str, str]:
+def _friction_figures(subject: Subject) -> dict[str, str]:
     if subject.facts.without_friction:
         names = ('peak current', 'damping switched on', 'friction force error')
         return dict.fromkeys(names, f'not applicable: {subject.facts.without_friction}')
     spans = subject.signals.damping()
-    peak = peak_current(subject.signals.recording, topics)
+    peak = peak_current(subject.signals.recording, subject.audits)
     error = subject.facts.tracking.error if subject.facts.tracking else math.nan
     return {
         'peak current': 'not recorded' if math.isnan(peak) else quantity_text(peak, 'A'),

@@ -8,9 +8,9 @@ import numpy as np
 
 from mount_bags.compare.quantity_text import quantity_text
 from mount_report.drawing.chart import Array
-from mount_report.sections import figures
-from mount_report.sections.figures import Levels, Named
-from mount_report.sections.periodic import Sine, cycle_work, distortion, harmonics, whole_periods
+from mount_report.sections import charts, periodic
+from mount_report.sections.charts import Levels, Named
+from mount_report.sections.periodic import Sine, cycle_work, distortion, whole_periods
 from mount_report.sections.section import Section, Table
 from mount_report.sections.spectrum import amplitude_density, evenly
 from mount_report.sections.subject import Subject
@@ -29,6 +29,7 @@ OfSubject = Callable[[Subject], Signal | None]
 _LOOPS = 4  # periods drawn
 _PERIODS = 32  # evaluated
 _WITHOUT_PERIOD = 0.5  # s, chosen: stretch of a loop where nothing is periodic
+_FOREIGN = 6  # signals drawn of a recording that is not of this project
 _TOLD = 200  # switchings listed
 _LABEL = 24  # letters
 _LEAST_SAMPLES = 1000  # chosen: of a spectrum
@@ -54,7 +55,7 @@ def traces(subjects: Sequence[Subject]) -> Section:
     if moved or currents:
         first = min(float(series.x[0]) for series in (*moved, *currents))
         last = max(float(series.x[-1]) for series in (*moved, *currents))
-        chart = figures.time_traces(moved, currents, levels, damping, limits=(first, last))
+        chart = charts.time_traces(moved, currents, levels, damping, limits=(first, last))
     return Section('traces', 'Displacement and current', words, chart)
 
 
@@ -94,11 +95,11 @@ def loops(subjects: Sequence[Subject]) -> Section:
                 group.append(Named(_name(subjects, subject), x, y))
                 found = True
         said.say(subject, how if found else 'no force was recorded')
-    chart = figures.hysteresis_loops(mount, friction) if mount or friction else None
+    chart = charts.hysteresis_loops(mount, friction) if mount or friction else None
     return Section('hysteresis', 'Loss hysteresis', said.told(), chart)
 
 
-def harmonic_content(subjects: Sequence[Subject]) -> Section:
+def harmonics(subjects: Sequence[Subject]) -> Section:
     """Return harmonics 1 to 8 of the mount force, its distortion and the work per cycle."""
     said = Sentences(subjects)
     bars, rows = [], []
@@ -120,7 +121,7 @@ def harmonic_content(subjects: Sequence[Subject]) -> Section:
         *(f'h{number} (N)' for number in range(1, 9)),
     )  # fmt: skip
     tables = [Table(head, rows)] if rows else []
-    chart = figures.harmonics_bars(bars) if bars else None
+    chart = charts.harmonics_bars(bars) if bars else None
     return Section('harmonics', 'Harmonics of the mount force', said.told(), chart, tables)
 
 
@@ -142,7 +143,7 @@ def _harmonics_of(
     if len(time) < 2 or (time[-1] - time[0]) * sine.frequency < 3.0:
         return None
     inside, periods = whole_periods(time, sine.frequency, _PERIODS)
-    amplitudes = harmonics(time[inside], y[inside], sine.frequency)
+    amplitudes = periodic.harmonics(time[inside], y[inside], sine.frequency)
     cells = (
         f'{sine.frequency:.3f}',
         f'{1e3 * sine.amplitude:.3f}',
@@ -180,27 +181,27 @@ def spectra(subjects: Sequence[Subject]) -> Section:
     words += _absent(
         subjects, (Subject.mount_force, 'no mount force'), (_acceleration, 'no chassis acceleration')
     )
-    chart = figures.spectra(groups) if groups else None
+    chart = charts.spectra(groups) if groups else None
     return Section('spectra', 'Spectra', words, chart)
 
 
-def sweep_view(subjects: Sequence[Subject]) -> Section | None:
+def sweep(subjects: Sequence[Subject]) -> Section | None:
     """Return peak displacement and chassis acceleration by frequency; None where nothing was swept."""
     said = Sentences(subjects)
     peaks, accelerations = [], []
     for subject in subjects:
-        sweep, moved, acceleration = subject.sweep(), subject.displacement(), _acceleration(subject)
-        if sweep is None or moved is None:
+        swept, moved, acceleration = subject.sweep(), subject.displacement(), _acceleration(subject)
+        if swept is None or moved is None:
             said.say(subject, 'the excitation is no sweep')
             continue
-        peaks.append(Named(_name(subjects, subject), *peak_per_band(sweep.at(moved.time), moved.values)))
+        peaks.append(Named(_name(subjects, subject), *peak_per_band(swept.at(moved.time), moved.values)))
         if acceleration is not None:
-            bands = rms_per_band(sweep.at(acceleration.time), acceleration.values)
+            bands = rms_per_band(swept.at(acceleration.time), acceleration.values)
             accelerations.append(Named(_name(subjects, subject), *bands))
     if not peaks:
         return None
     level = subjects[0].facts.levels.switch_on
-    chart = figures.sweep_bands(peaks, accelerations, level)
+    chart = charts.sweep_bands(peaks, accelerations, level)
     rows = [
         (f'{edge:g} .. {edge + 1:g}', *(_band_cell(series, edge) for series in peaks))
         for edge in sorted(set(chain.from_iterable(series.x.tolist() for series in peaks)))
@@ -210,19 +211,19 @@ def sweep_view(subjects: Sequence[Subject]) -> Section | None:
     return Section('sweep', 'Sweep', words, chart, [Table(head, rows, folded=True)])
 
 
-def plain(subjects: Sequence[Subject], most: int = 6) -> Section | None:
+def signals(subjects: Sequence[Subject]) -> Section | None:
     """Return a few signals of recordings that are not of this project; None where all topics are."""
     groups: dict[str, list[Named]] = {}
     for subject in subjects:
         if subject.displacement() is not None:
             continue
         for label, series in _foreign(subject):
-            if label in groups or len(groups) < most:
+            if label in groups or len(groups) < _FOREIGN:
                 groups.setdefault(label, []).append(Named(_name(subjects, subject), *series))
     if not groups:
         return None
     words = [f'The first {len(groups)} numbers that change; their units are not known here.']
-    return Section('signals', 'Recorded signals', words, figures.plain_traces(list(groups.items())))
+    return Section('signals', 'Recorded signals', words, charts.plain_traces(list(groups.items())))
 
 
 def _foreign(subject: Subject) -> list[tuple[str, tuple[Array, Array]]]:

@@ -41,9 +41,3 @@ def evenly(time: Array, values: Array, rate: float) -> tuple[Array, Array, int]:
     count = math.floor((time[-1] - time[0]) * rate + 0.5) + 1
     grid = time[0] + np.arange(count) / rate
     return grid, np.interp(grid, time, values), max(0, count - len(time))
-
-
-def band_rms(frequency: Array, density: Array, low: float, high: float) -> float:
-    """Return the rms of a signal within `low` to `high` (Hz) from its amplitude density."""
-    inside = (frequency >= low) & (frequency < high)
-    return float(np.sqrt(np.sum(density[inside] ** 2) * (frequency[1] - frequency[0])))

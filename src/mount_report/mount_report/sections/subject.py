@@ -6,8 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mount_bags.audit.audit import TopicAudit, audit
+from mount_bags.audit.losses import Losses, losses
+from mount_bags.compare.compare import Comparison
 from mount_report.drawing.chart import Array
-from mount_report.sections.figures import Levels
+from mount_report.sections.charts import Levels
 from mount_report.sections.periodic import Sine, dominant_sine
 from mount_report.sections.sweep import Sweep, find_sweep
 from mount_report.signals import Signal, Signals
@@ -47,6 +50,17 @@ class Subject:
 
     signals: Signals
     facts: RunFacts = field(default_factory=RunFacts)
+    comparison: Comparison | None = None  # of the first recording with this one, where it is asked for
+
+    @functools.cached_property
+    def audits(self) -> dict[str, TopicAudit]:
+        """The audit of each topic."""
+        return audit(self.signals.recording)
+
+    @functools.cached_property
+    def losses(self) -> Losses:
+        """What was lost, unanswered or wrong."""
+        return losses(self.signals.recording, self.audits)
 
     @property
     def name(self) -> str:

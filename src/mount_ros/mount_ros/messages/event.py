@@ -32,10 +32,10 @@ def mark_text(mark: Mark) -> str:
 
 
 def read_mark(text: str, received: int) -> Mark:
-    """Return the mark that a message holds; what is not told is `received` (ns), `mark` and no text.
+    """Return the mark that a message holds; what is missing is `received` (ns), `mark` and no text.
 
-    Anybody may publish a plain sentence on `event`: what is more than these three, or no plain value of
-    them, is kept as the whole text. Only a change of parameters may tell more.
+    A plain sentence on `event` is allowed: a text with other fields than these three, or without plain values
+    of them, is kept whole. Only a change of parameters may have more fields.
     """
     # Every word stays the text that it is: `12:30` is no number, and `2026-02-30` no date.
     content = _content(text, yaml.BaseLoader)
@@ -61,7 +61,7 @@ def dated(time: int, text: str) -> str:
 
 
 def read_change(text: str) -> ParametersChanged | None:
-    """Return the change of parameters that a message tells of, or None."""
+    """Return the change of parameters that a message describes, or None."""
     content = _content(text, yaml.SafeLoader)
     time, node, values = content.get('time'), content.get('node'), content.get('values')
     if content.get('kind') != PARAMETER or not isinstance(values, dict) or not isinstance(node, str):

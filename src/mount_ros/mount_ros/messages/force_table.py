@@ -5,17 +5,17 @@ Row-major, shape (2, N). Dimension 0: label `rows: current (A), normal_force (N)
 """
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from rclpy.serialization import deserialize_message
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+if TYPE_CHECKING:  # loading messages and middleware takes a fifth of a second, which readers do without
+    from std_msgs.msg import Float64MultiArray
+
+from mount_models.sampling import HIGHEST_CURRENT
 
 FloatArray = npt.NDArray[np.float64]
-
-CURRENT_HIGH = 3.0
-"""Largest coil current (A) that may pass anywhere in the graph."""
 
 _ROWS_LABEL = 'rows: current (A), normal_force (N)'
 _ACTIVATION_LABEL = 'activation '
@@ -33,12 +33,14 @@ class ForceTable(NamedTuple):
     normal_force: FloatArray
 
 
-def to_message(stamp: int, table: npt.ArrayLike) -> Float64MultiArray:
+def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
     """Return the message of a table of shape (2, N), rows current (A) and normal force (N).
 
     `stamp` (ns) is that of the `air_gap` message. Raises `ForceTableMessageError` for a table
     that `from_message` would refuse.
     """
+    from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
     rows = np.asarray(table, float)
     if rows.ndim != 2:
         raise _refusal(f'must have 2 rows of N columns; instead received an array of shape {rows.shape}')
@@ -51,7 +53,7 @@ def to_message(stamp: int, table: npt.ArrayLike) -> Float64MultiArray:
     return Float64MultiArray(layout=MultiArrayLayout(dim=dimensions), data=rows.ravel().tolist())
 
 
-def from_message(message: Float64MultiArray) -> ForceTable:
+def from_message(message: 'Float64MultiArray') -> ForceTable:
     """Return activation stamp and table of `message`, or raise `ForceTableMessageError`."""
     dimensions = list(message.layout.dim)
     if len(dimensions) != 2 or dimensions[0].size != 2:
@@ -73,6 +75,9 @@ def from_message(message: Float64MultiArray) -> ForceTable:
 
 def from_bytes(raw: bytes) -> ForceTable:
     """Like `from_message`, from the serialised message that a data path hands over."""
+    from rclpy.serialization import deserialize_message
+    from std_msgs.msg import Float64MultiArray
+
     return from_message(deserialize_message(raw, Float64MultiArray))
 
 
@@ -99,9 +104,9 @@ def _check(rows: FloatArray) -> None:
                     f'{one:g} and {following:g} {unit}'
                 )
     low, high = float(rows[0, 0]), float(rows[0, -1])
-    if low < 0.0 or high > CURRENT_HIGH:
+    if low < 0.0 or high > HIGHEST_CURRENT:
         raise _refusal(
-            f'must keep the current within 0 .. {CURRENT_HIGH:g} A; it spans {low:g} .. {high:g} A'
+            f'must keep the current within 0 .. {HIGHEST_CURRENT:g} A; it spans {low:g} .. {high:g} A'
         )
 
 

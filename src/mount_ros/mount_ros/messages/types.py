@@ -1,9 +1,6 @@
 """Message classes by their full name."""
 
 import importlib
-from typing import Any
-
-from rclpy.serialization import deserialize_message
 
 
 def message_class(name: str) -> type:
@@ -13,8 +10,3 @@ def message_class(name: str) -> type:
         return getattr(importlib.import_module(f'{package}.msg'), kind)
     except (ImportError, AttributeError, TypeError, ValueError):
         raise ValueError(f'message type {name!r} is not installed; is its package missing?') from None
-
-
-def decoded(raw: bytes, name: str) -> Any:
-    """Return the message of the type `name` that the CDR bytes `raw` hold; raises `ValueError` if unknown."""
-    return deserialize_message(raw, message_class(name))

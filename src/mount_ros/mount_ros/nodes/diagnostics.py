@@ -1,6 +1,6 @@
-"""What a node says of itself on `/diagnostics`: a level and a sentence, at 1 Hz and on each change.
+"""The verdict of a node on `/diagnostics`: a level and a sentence, at 1 Hz and on each change.
 
-A thread of its own looks ten times a second. By a timer of the node's executor each look would cost two
+A thread of its own judges ten times a second. By a timer of the node's executor each time would cost two
 milliseconds of Python (measured), which the executor takes to find out what is ready.
 """
 
@@ -40,7 +40,7 @@ class Verdict:
 class Diagnostics:
     """Publishes the verdict of `judge` once a second, and at once when its level or sentence changes.
 
-    From `start` to `stop`, but not while somebody holds `pause`: what is judged is being changed then.
+    From `start` to `stop`, but not while `pause` is held: what is judged is being changed then.
     """
 
     def __init__(self, node: Node, judge: Callable[[], Verdict]):
@@ -86,7 +86,7 @@ class Diagnostics:
                 try:
                     self._beat()
                 except Exception as error:
-                    # The border of the thread; without a context there is nobody to tell.
+                    # The border of the thread; without a context nothing can be logged.
                     if not self._node.context.ok():
                         return
                     text = f'no diagnostics: {type(error).__name__}: {error}'

@@ -4,12 +4,14 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from mount_ros.data_path import DataPath, DataThread
+from mount_ros.data_path import DataPath
+from mount_ros.data_thread import DataThread
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
 from mount_ros.nodes.scheduling import calm_resending
+from mount_ros.private_rclpy import OpenLifecycleNode
 
 
 class ServedPath(Protocol):
@@ -23,13 +25,13 @@ class ServedPath(Protocol):
         """Why its thread has ended by itself; empty while it serves."""
 
     def unmatched(self) -> list[str]:
-        """Return the names of the topics that nobody on the other side has been found for yet."""
+        """Return the names of the topics whose other side has not been found yet."""
 
     def stop(self) -> None:
         """End serving; safe to call twice."""
 
 
-class SafeLifecycleNode(LifecycleNode):
+class SafeLifecycleNode(OpenLifecycleNode):
     """Base of all nodes of the graph.
 
     A node overrides `configure`, `activate`, `deactivate`, `cleanup` and `judge`; it raises an
@@ -117,10 +119,8 @@ class SafeLifecycleNode(LifecycleNode):
             self._release()
 
     def destroy_node(self) -> None:
-        """Destroy the node at once; rclpy leaves it in the graph until nothing refers to its services."""
         self._diagnostics.stop()
         super().destroy_node()
-        self._state_machine.destroy_when_not_in_use()
 
     # Transitions.
 
@@ -154,12 +154,12 @@ class SafeLifecycleNode(LifecycleNode):
         self.close()
         return TransitionCallbackReturn.SUCCESS
 
-    def _LifecycleNodeMixin__change_state(self, transition_id):  # noqa: N802
+    def change_state(self, transition_id: int) -> TransitionCallbackReturn:
         # rclpy lets a transition that is not valid in the present state end the process with an
         # exception; a node that drives a coil answers "no" and goes on.
         try:
             with self._diagnostics.pause:
-                return super()._LifecycleNodeMixin__change_state(transition_id)  # type: ignore[misc]
+                return super().change_state(transition_id)
         except Exception as error:
             self.get_logger().warning(f'transition {transition_id} refused: {error}')
             return TransitionCallbackReturn.FAILURE

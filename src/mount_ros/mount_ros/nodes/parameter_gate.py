@@ -34,14 +34,14 @@ class ParameterGate:
         self._run_time = run_time
         self._check = check
         self._take = take
-        self._foreign = frozenset(node._parameters)  # of rclpy itself, such as use_sim_time
+        self._foreign = frozenset(node.get_parameters_by_prefix(''))  # of rclpy itself, such as use_sim_time
         self._present: dict[str, Any] | None = None  # all values while the gate is closed
         node.add_on_set_parameters_callback(self._judge)
         node.add_post_set_parameters_callback(self._pass_on)
 
     def close(self) -> None:
         """From now on the node works with what its parameters are."""
-        own = [name for name in self._node._parameters if name not in self._foreign]
+        own = [name for name in self._node.get_parameters_by_prefix('') if name not in self._foreign]
         self._present = {name: self._node.get_parameter(name).value for name in own}
 
     def open(self) -> None:

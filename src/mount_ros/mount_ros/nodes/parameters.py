@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity, flattened, quantities, with_flattened
+from mount_ros.private_rclpy import given_at_start
 
 P = TypeVar('P', bound=NamedTuple)
 
@@ -35,7 +36,7 @@ def read(node: Node, defaults: P, prefix: str = '') -> P:
 
 
 class SpecimenValues:
-    """Gives parameters the values of a file, except those that somebody has set otherwise.
+    """Gives parameters the values of a file, except those that were set otherwise.
 
     Set otherwise is what came with the start of the node, even if it equals the default, and what was changed
     since to another value. After `give` the parameters of the node are those in use.
@@ -44,11 +45,10 @@ class SpecimenValues:
     def __init__(self, node: Node):
         self._node = node
         self._given: dict[str, Any] = {}
-        # The only trace that rclpy keeps of values given at the start; without it they look like defaults.
-        self._at_start = set(node._parameter_overrides)
+        self._at_start = given_at_start(node)
 
     def give(self, defaults: NamedTuple, prefix: str, values: Mapping[str, Any]) -> None:
-        """Set the declared parameters of the set `defaults` to `values` where nobody has set them.
+        """Set the declared parameters of the set `defaults` to `values` unless they were set otherwise.
 
         What an earlier file gave goes back to its default if this one does not name it. Raises
         `ParameterError` for a value that the parameter refuses.

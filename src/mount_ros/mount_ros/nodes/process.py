@@ -13,7 +13,7 @@ import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from mount_ros.data_path import DataThread
+from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
@@ -31,7 +31,7 @@ def run_node(create: Create, args: list[str] | None = None) -> None:
 def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's rest.
 
-    At the end they are closed in reverse order, so that who sends setpoints ends before who carries them.
+    At the end they are closed in reverse order, so that the sender of setpoints ends before the driver.
     An exception in one of them or in a thread of its data ends all in the same way, with exit code 1.
     """
     prepare_environment()
@@ -63,7 +63,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
 def _freeze() -> None:
     """Collect garbage now, and never look again at what stands: a full collection takes tens of milliseconds.
 
-    Done when something large has been set up and nobody waits for an answer yet.
+    Done when something large has been set up and no answer is due yet.
     """
     gc.collect()
     gc.freeze()
@@ -141,7 +141,7 @@ class _Service:
             while rclpy.ok() and not self._node.ending.is_set():
                 self._executor.spin_once(_SPIN_PERIOD)
         except Exception as error:
-            # The border of the process: nobody would close the nodes, and the others would live on alone.
+            # The border of the process: without it the nodes would not be closed.
             traceback.print_exc()
             self._node.tell_failure(f'{type(error).__name__}: {error}')
         finally:

@@ -11,6 +11,7 @@ from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.random_numbers import RandomNumbers
 from mount_models.coil.ripple import current_rate, flux_rate
 from mount_models.quantity import Quantity
+from mount_models.sampling import SETPOINT_TIMEOUT
 
 STATUS_EVERY = 100
 """Samples from one status to the next: 10 Hz; the first sample has one."""
@@ -24,7 +25,7 @@ class ElectronicsParameters(NamedTuple):
     ] = 400.0
     setpoint_timeout: Annotated[
         float, Quantity('s', 'without a setpoint for so long the electronics go to 0 A', 0.001, 1.0, 'chosen')
-    ] = 0.020
+    ] = SETPOINT_TIMEOUT
     displacement_noise: Annotated[
         float, Quantity('m', 'noise of the displacement sensor', 0.0, 1e-3, 'chosen')
     ] = 2e-6
@@ -103,7 +104,7 @@ def read_sensors(electronics, coil, actuator, displacement, current, gap, noise)
 def advance_current(electronics, coil, actuator, current, gap, wanted, dt):
     """Return the coil current (A) after `dt` s of the current loop, within what the link voltage allows.
 
-    The loop asks for the voltage that would close the error with its bandwidth; slow changes of flux
+    The loop sets the voltage that would close the error with its bandwidth; slow changes of flux
     reach the whole core, so the inductance is the mean incremental one. Motion adds no voltage here. The
     mean rate over the step makes the decay exact: by its first value the loop would be 7 % too fast.
     """

@@ -1,17 +1,20 @@
-"""What shakes the mount: a series of numbers at the plant's step, and what they stand for."""
+"""What shakes the mount: series of numbers at the plant's step, and what they stand for."""
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mount_models.arithmetic.elementary import cosines, sines
+from mount_models.arithmetic.series import Series, series_over_time
+from mount_models.quantity import checked
 from mount_models.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
 
 
 class Seat(IntEnum):
-    """Where the mount sits, and so what the excitation means."""
+    """Where the mount is fixed, and so what the excitation means."""
 
     BENCH = 0  # displacement of the mount, m
     ACCELERATED_CHASSIS = 1  # vertical acceleration of the chassis under the engine, m/s^2
@@ -22,15 +25,15 @@ class Seat(IntEnum):
 class Excitation:
     """Numbers at the plant's step from `start` (s of simulated time) on; before it: rest.
 
-    `values` (n,) in the unit of the seat; `engine_forces` (n,) in N, upwards on the engine, None for none.
-    `notes` say what had to be done to a recording to get them.
+    `values` (n,) in the unit of the seat; `engine_forces` (n,) in N, upwards on the engine, None for none; of
+    both only the part that is asked for is made. `notes` say what had to be done to a recording to get them.
     """
 
     seat: Seat
-    values: NDArray[np.float64]
+    values: Series
     step_time: float
     start: float
-    engine_forces: NDArray[np.float64] | None = None
+    engine_forces: Series | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -43,29 +46,43 @@ def bench_sine(
     frequency: float, amplitude: float, duration: float, start: float, step_time: float
 ) -> Excitation:
     """Return a sine of the mount's displacement (Hz, m), faded in over its first period."""
-    time = np.arange(round(duration / step_time)) * step_time
-    fade = np.clip(time * frequency, 0.0, 1.0)
-    # A half cosine has no corner at either end, so the fade adds no impact of its own.
-    values = amplitude * sines(frequency * time) * 0.5 * (1.0 - cosines(0.5 * fade))
+
+    def displacement(time: NDArray[np.float64]) -> NDArray[np.float64]:
+        fade = np.clip(time * frequency, 0.0, 1.0)
+        # A half cosine has no corner at either end, so the fade adds no impact of its own.
+        return np.asarray(amplitude * sines(frequency * time) * 0.5 * (1.0 - cosines(0.5 * fade)))
+
+    values = series_over_time(round(duration / step_time), step_time, displacement)
     return Excitation(Seat.BENCH, values, step_time, start)
 
 
 def motorway(motorway: RandomRoad, gap: Gap, duration: float, start: float, step_time: float) -> Excitation:
-    """Return the height of a road with a gap in it under the wheel."""
-    time = np.arange(round(duration / step_time)) * step_time
-    height = random_road(time, motorway) if motorway.roughness > 0.0 else np.zeros_like(time)
-    return Excitation(Seat.VEHICLE, height + gap_in_road(time, gap), step_time, start)
+    """Return the height of a road with a gap in it under the wheel; raises `ParameterError`."""
+    for part in (motorway, gap):
+        checked(part)
+
+    def height(time: NDArray[np.float64]) -> NDArray[np.float64]:
+        rough = random_road(time, motorway) if motorway.roughness > 0.0 else np.zeros_like(time)
+        return rough + gap_in_road(time, gap)
+
+    values = series_over_time(round(duration / step_time), step_time, height)
+    return Excitation(Seat.VEHICLE, values, step_time, start)
 
 
 def sweep(sweep: Sweep, duration: float, start: float, step_time: float) -> Excitation:
-    """Return the height of a road that shakes the wheel with a rising frequency."""
-    time = np.arange(round(duration / step_time)) * step_time
-    return Excitation(Seat.VEHICLE, sweep_road(time, sweep), step_time, start)
+    """Return the height of a road that shakes the wheel with a rising frequency; raises `ParameterError`."""
+    road = partial(sweep_road, sweep=checked(sweep))
+    values = series_over_time(round(duration / step_time), step_time, road)
+    return Excitation(Seat.VEHICLE, values, step_time, start)
 
 
 def idle_force(
     amplitude: float, frequency: float, second_share: float, count: int, step_time: float
-) -> NDArray[np.float64]:
+) -> Series:
     """Return the force (n,) in N of an idling engine: a sine (N, Hz) and a share of twice its frequency."""
-    turns = frequency * (np.arange(count) * step_time)
-    return np.asarray(amplitude * (sines(turns) + second_share * sines(2.0 * turns)))
+
+    def force(time: NDArray[np.float64]) -> NDArray[np.float64]:
+        turns = frequency * time
+        return np.asarray(amplitude * (sines(turns) + second_share * sines(2.0 * turns)))
+
+    return series_over_time(count, step_time, force)

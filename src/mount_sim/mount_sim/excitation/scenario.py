@@ -232,6 +232,6 @@ def _recorded(scenarios: Scenarios) -> Excitation:
                 f'duration ({timeline.duration:g} s) is longer than the recording {signal.name} '
                 f'({available:.3f} s); ask for at most that'
             )
-        values = values[: round(timeline.duration / STEP_TIME)]
+        values = values.cut(round(timeline.duration / STEP_TIME))
     notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
     return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, timeline.start, notes=notes)

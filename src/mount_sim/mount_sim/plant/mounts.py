@@ -1,4 +1,4 @@
-"""Which mount sits between engine and chassis."""
+"""Which mount is between engine and chassis."""
 
 from enum import IntEnum
 from typing import NamedTuple

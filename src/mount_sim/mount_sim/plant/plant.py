@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mount_models.actuator.closing import ClosingMechanics, checked_closing, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator, gap_flux_density
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.coil.ripple import RippleCoil
 from mount_models.elastomer import branch_step, elastomer_force
 from mount_models.energy import ACCOUNT, book_step, new_account
@@ -18,6 +18,7 @@ from mount_models.friction.full import full_step
 from mount_models.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_models.quantity import checked
 from mount_models.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
+from mount_ros.topics import SIM_TRUTH
 from mount_sim.electronics.electronics import ElectronicsParameters, advance_current, read_sensors
 from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
@@ -46,7 +47,7 @@ class Plant(NamedTuple):
 
 _PLANT = record_dtype(Plant)
 
-STATE = np.dtype(
+STATE = record_type(
     [
         ('vehicle', VEHICLE_STATE),
         ('engine', ENGINE_STATE),
@@ -75,30 +76,8 @@ STATE = np.dtype(
 )
 """What the plant remembers from step to step, SI."""
 
-TRUTH = np.dtype(
-    [
-        (name, 'f8')
-        for name in (
-            'displacement',
-            'velocity',
-            'coil_current',
-            'current_setpoint',
-            'gap',
-            'flux_density',
-            'normal_force',
-            'friction_force',
-            'mount_force',
-            'road_height',
-            'engine_displacement',
-            'chassis_displacement',
-            'chassis_acceleration',
-            'rest_gap',
-            'contact_gap',
-            'setpoint_latency',
-        )
-    ]
-)
-"""What no sensor sees, SI; the fields of the topic `sim/truth` in its order."""
+TRUTH = record_type([(name, 'f8') for name in SIM_TRUTH.names])
+"""What no sensor sees, SI: the scalars of the topic `sim/truth` in its order."""
 
 
 class Memory(NamedTuple):

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics.electronics import Noise, Reading
-from mount_sim.excitation.excitation import Excitation, Seat
+from mount_sim.excitation.excitation import Excitation
+from mount_sim.excitation.shaking import Shaking
 from mount_sim.plant.check import checked_plant
 from mount_sim.plant.plant import Memory, Plant, PlantSimulation
 
@@ -70,18 +71,11 @@ class SimulatedMount:
         self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
         checked_plant(plant, excitation.seat, excitation.step_time)
         self._noise = Noise(seed)
-        self._steps = round(SAMPLE_TIME / excitation.step_time)
         self.patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
         """Samples without a setpoint after which the current goes to 0 A."""
-        start = round(excitation.start / SAMPLE_TIME)
-        self._values = _per_sample(excitation.values, start, self._steps)
-        self._engine_forces = None
-        if excitation.engine_forces is not None:
-            self._engine_forces = _per_sample(excitation.engine_forces, start, self._steps)
-        self._no_force = np.zeros(self._steps)
-        self._afterwards = np.full(self._steps, _afterwards(excitation))
+        self._shaking = Shaking(excitation)
         self._driver_opens = plant.mount.driver_opens
-        self.run = Run(len(self._values), start)
+        self.run = Run(self._shaking.samples, self._shaking.start)
         self.sample = 0
         self.beyond_range = BeyondRange()
         self._silent = 0
@@ -130,24 +124,20 @@ class SimulatedMount:
         else:
             self._silent, self._current = late, setpoint
         current = self._current if self.enabled and not self._driver_open else 0.0
-        values, forces = self._afterwards, self._no_force
-        if not self.finished:
-            values = self._values[self.sample]
-            forces = forces if self._engine_forces is None else self._engine_forces[self.sample]
+        values, forces = self._shaking.at(self.sample)
         self._plant.advance(values, forces, current)
         self.sample += 1
 
     def ahead(self, count: int) -> Ahead:
-        """Return what the next samples, at most `count`, need in a compiled loop; none of them is taken yet.
+        """Return what the next samples of the run need in a compiled loop; none of them is taken yet.
 
+        They are at least one and at most `count`.
         The loop does for each what `measure` and `advance` with a setpoint do; `skip` notes how far it came.
         """
         until_open = self.run.excitation_start - self.sample
         if self._driver_opens and until_open > 0:
             count = min(count, until_open)
-        part = slice(self.sample, self.sample + count)
-        values = self._values[part]
-        forces = np.zeros(values.shape) if self._engine_forces is None else self._engine_forces[part]
+        values, forces = self._shaking.ahead(self.sample, min(count, self.run.samples - self.sample))
         return Ahead(self._plant.memory, values, forces, self._driver_open, self._noise.ahead(len(values)))
 
     def skip(self, count: int, setpoint: float) -> None:
@@ -167,16 +157,3 @@ class SimulatedMount:
     @property
     def _driver_open(self) -> bool:
         return self._driver_opens and self.sample >= self.run.excitation_start
-
-
-def _afterwards(excitation: Excitation) -> float:
-    """Return what the excitation is behind its end: rack and road stay where they are."""
-    still = excitation.seat is Seat.ACCELERATED_CHASSIS or not len(excitation.values)
-    return 0.0 if still else float(excitation.values[-1])
-
-
-def _per_sample(series: NDArray[np.float64], start: int, steps: int) -> NDArray[np.float64]:
-    """Return the excitation as one row of values for each sample, with the rest before its start."""
-    whole = len(series) // steps
-    rows = series[: whole * steps].reshape(whole, steps)
-    return np.ascontiguousarray(np.vstack([np.zeros((start, steps)), rows]))

@@ -16,6 +16,7 @@ from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate, incremental_inductance
 from mount_models.quantity import with_values
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SAMPLE_TIME
 from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 
 FloatArray = NDArray[np.float64]
@@ -26,7 +27,7 @@ GAPS = np.linspace(270e-6, 550e-6, 15)
 RIPPLE_GAPS = np.linspace(250e-6, 550e-6, 16)
 """Gaps at which the ripple is recorded, m (chosen): a worn contact, pressed, is still on the curves."""
 
-FORCE_CURRENTS = np.linspace(0.1, 3.0, 59)
+FORCE_CURRENTS = np.linspace(0.1, HIGHEST_CURRENT, 59)
 """Currents at which the force is taken at each gap, A (chosen)."""
 
 
@@ -62,7 +63,7 @@ def record_ripple(
     gap: float,
     temperature: float = 20.0,
     rest_current: float = 0.2,
-    peak_current: float = 3.0,
+    peak_current: float = HIGHEST_CURRENT,
     duration: float = 3.0,
 ) -> dict[str, FloatArray]:
     """Return the ripple at a fixed `gap` (m), 1 kHz: one third of `duration` (s) at rest, then a ramp.
@@ -71,7 +72,7 @@ def record_ripple(
     is on both slopes, so that their quotient has `rack.noise`. Raises `RackError` where the bridge gives up.
     """
     coil = coil_at(rack.coil, rack.temperature, temperature)
-    count = round(duration * 1000.0)
+    count = round(duration * SAMPLE_RATE)
     dwell = count // 3
     current = np.concatenate(
         [np.full(dwell, rest_current), np.linspace(rest_current, peak_current, count - dwell)]
@@ -86,7 +87,7 @@ def record_ripple(
     random = np.random.default_rng([rack.seed, 2, round(gap * 1e9), round((temperature + 300.0) * 10.0)])
     each = rack.noise / math.sqrt(2.0)
     return {
-        'time_s': np.arange(count) * 1e-3,
+        'time_s': np.arange(count) * SAMPLE_TIME,
         'gap_um': np.full(count, gap * 1e6),
         'coil_temperature_c': np.full(count, temperature),
         'current_a': current,

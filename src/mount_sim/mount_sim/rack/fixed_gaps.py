@@ -13,13 +13,14 @@ from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import measured_inductance
 from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
+from mount_models.sampling import HIGHEST_CURRENT
 
 FloatArray = npt.NDArray[np.float64]
 
 RIG_GAPS = np.linspace(250e-6, 550e-6, 31)
 """Gaps held on the rig, m (chosen): contact gaps of new and worn pads up to the gap at rest."""
 
-RIG_CURRENTS = np.linspace(0.0, 3.0, 151)
+RIG_CURRENTS = np.linspace(0.0, HIGHEST_CURRENT, 151)
 """Currents stepped through at each gap, A (chosen)."""
 
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_response
+from mount_models.sampling import SAMPLE_RATE
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -67,7 +68,7 @@ def move(
     normal_force: float,
     *,
     machine_stiffness: float = np.inf,
-    rate: float = 1000.0,
+    rate: float = SAMPLE_RATE,
     substeps: int = SUBSTEPS,
 ) -> RackRecording:
     """Return what is there to measure while the desired displacement (m) goes straight from corner to corner.
@@ -123,7 +124,7 @@ def ramp_and_hold(
     ramp_time: float = 0.2,
     duration: float = 6.0,
     machine_stiffness: float = MACHINE_STIFFNESS,
-    rate: float = 1000.0,
+    rate: float = SAMPLE_RATE,
 ) -> RackRecording:
     """Return a ramp of the desired displacement to `height` (m), held; nothing slides at this height."""
     contact = contact or FrictionContact()
@@ -156,7 +157,7 @@ def sawtooth(
     normal_force: float = 100.0,
     speeds: tuple[float, ...] = SAWTOOTH_SPEEDS,
     stroke: float = STROKE,
-    rate: float = 1000.0,
+    rate: float = SAMPLE_RATE,
 ) -> RackRecording:
     """Return strokes between -+ `stroke` (m), two at each of `speeds` (m/s), after a first half stroke."""
     contact = contact or FrictionContact()

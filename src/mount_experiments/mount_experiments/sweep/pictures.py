@@ -11,7 +11,7 @@ from mount_experiments.harness.drawing import BLUE, GREEN, GREY, RED, finish, ne
 from mount_experiments.sweep.evaluation import ALWAYS, FRICTION, HYDRO, OFF, SweepRun
 
 if TYPE_CHECKING:
-    from mount_experiments.harness.closed_loop import FloatArray
+    from mount_report.drive.signals import FloatArray
 
 _OUTLINE_STEP = 0.25  # Hz
 
@@ -26,9 +26,9 @@ def draw_sweep(friction: SweepRun, hydro: SweepRun, title: str, file: Path) -> P
     )
     for axes, (label, scale, name) in zip(panels, quantities, strict=True):
         # samples in pairs of lowest and highest: a picture of this width shows no more
-        x, low, high = _envelope(friction.frequency, scale * getattr(friction.ride, name), 0.02)
+        x, low, high = _envelope(friction.frequency, scale * getattr(friction.drive.truth, name), 0.02)
         axes.fill_between(x, low, high, color=BLUE, linewidth=0.4, label='friction mount')
-        x, low, high = _envelope(hydro.frequency, scale * getattr(hydro.ride, name), _OUTLINE_STEP)
+        x, low, high = _envelope(hydro.frequency, scale * getattr(hydro.drive.truth, name), _OUTLINE_STEP)
         axes.plot(x, high, color=RED, linewidth=1.4, label='hydromount (outline)')
         axes.plot(x, low, color=RED, linewidth=1.4)
         axes.set_ylabel(label)
@@ -48,7 +48,7 @@ def draw_peaks(runs: dict[str, SweepRun], file: Path) -> Path:
         (HYDRO, RED, '--'),
     ):
         passed = runs[name]
-        x, low, high = _envelope(passed.frequency, 1e3 * passed.ride.displacement, 0.5)
+        x, low, high = _envelope(passed.frequency, 1e3 * passed.drive.truth.displacement, 0.5)
         shown = x <= 20.0
         axes.plot(x[shown], np.maximum(high, -low)[shown], color=colour, linestyle=dash, label=name)
     axes.set_xlabel('frequency of the road (Hz)')

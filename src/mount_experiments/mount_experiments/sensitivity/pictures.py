@@ -14,8 +14,8 @@ from mount_experiments.sensitivity.maps import lower
 from mount_experiments.sweep.evaluation import ISOLATION_BANDS
 
 if TYPE_CHECKING:
-    from mount_experiments.harness.closed_loop import FloatArray
     from mount_experiments.sensitivity.maps import Maps
+    from mount_report.drive.signals import FloatArray
 
 _COLOURS = 'RdBu_r'  # red: the friction mount has more
 

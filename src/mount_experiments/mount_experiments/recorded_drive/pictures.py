@@ -18,7 +18,7 @@ from mount_experiments.recorded_drive.evaluation import (
 
 if TYPE_CHECKING:
     from mount_control.policy import switched_viscous
-    from mount_experiments.harness.closed_loop import Ride
+    from mount_report.drive.signals import DriveSignals
 
 _LOWEST, _HIGHEST = 0.7, 45.0  # Hz, chosen: what the bands lie in, and no more than a car's sensor has
 _BEFORE, _AFTER = 1.0, 4.0  # s round the largest displacement
@@ -51,17 +51,16 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
     return finish(figure, file)
 
 
-def draw_traces(rides: dict[str, Ride], control: switched_viscous.Parameters, file: Path) -> Path:
+def draw_traces(drives: dict[str, DriveSignals], control: switched_viscous.Parameters, file: Path) -> Path:
     """Draw the whole drive above, the seconds round its largest displacement below."""
-    friction = rides[FRICTION]
-    seen = friction.seen
-    middle = float(friction.time[np.argmax(np.abs(friction.displacement))])
+    seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
+    middle = float(truth.time[np.argmax(np.abs(truth.displacement))])
     figure = new_figure('A recorded drive: displacement of the mount over time', 7.5)
     upper, lower = figure.subplots(2, 1)
-    upper.plot(friction.time, 1e3 * friction.displacement, color=BLUE, linewidth=0.6, label=FRICTION)
+    upper.plot(truth.time, 1e3 * truth.displacement, color=BLUE, linewidth=0.6, label=FRICTION)
     begin, end = max(0.0, middle - _BEFORE), middle + _AFTER
     for (name, colour, dash), width in zip(_styles(), (1.4, 1.2, 1.8), strict=True):
-        each = rides[name]
+        each = drives[name].truth
         shown = (each.time >= begin) & (each.time <= end)
         lower.plot(
             each.time[shown], 1e3 * each.displacement[shown], color=colour, linestyle=dash,
@@ -82,8 +81,8 @@ def draw_traces(rides: dict[str, Ride], control: switched_viscous.Parameters, fi
         axes.set_xlabel('time from the start of the drive (s)')
         axes.legend(loc='upper right', ncols=3, fontsize='small')
     # room for the legend
-    upper.set_ylim(top=1.4e3 * float(np.max(np.abs(friction.displacement))))
-    upper.set_xlim(0.0, float(friction.time[-1]))
+    upper.set_ylim(top=1.4e3 * float(np.max(np.abs(truth.displacement))))
+    upper.set_xlim(0.0, float(truth.time[-1]))
     lower.set_xlim(begin, end)
     return finish(figure, file)
 

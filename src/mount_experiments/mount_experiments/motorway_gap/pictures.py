@@ -20,17 +20,16 @@ def draw_gap(crossing: Crossing, depth: float, control: switched_viscous.Paramet
     """Draw displacement with both switching levels above, the coil's current below, Fig. 15."""
     figure = new_figure(f'Over a gap of {1e3 * depth:g} mm in the motorway (Fig. 15)', 6.5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    friction = crossing.rides[FRICTION]
-    middle = float(friction.time[-1]) / 2.0 if crossing.exceeded is None else crossing.exceeded
+    seen, truth = crossing.drives[FRICTION].seen, crossing.drives[FRICTION].truth
+    middle = float(truth.time[-1]) / 2.0 if crossing.exceeded is None else crossing.exceeded
     begin, end = middle - _BEFORE, middle + _AFTER
     for name, colour, dash, width in ((OFF, GREY, ':', 1.0), (HYDRO, GREEN, '--', 1.0)):
-        other = crossing.rides[name]
+        other = crossing.drives[name].truth
         shown = (other.time >= begin) & (other.time <= end)
         upper.plot(
             other.time[shown], 1e3 * other.displacement[shown], color=colour, linestyle=dash,
             linewidth=width, label=name,
         )  # fmt: skip
-    seen = friction.seen
     shown = (seen.time >= begin) & (seen.time <= end)
     upper.plot(seen.time[shown], 1e3 * seen.displacement[shown], color=BLUE, linewidth=1.8, label=FRICTION)
     for level, dash, name in (
@@ -42,8 +41,8 @@ def draw_gap(crossing: Crossing, depth: float, control: switched_viscous.Paramet
                 1e3 * sign * level, color=RED, linestyle=dash, linewidth=0.8,
                 label=name if sign > 0.0 else None,
             )  # fmt: skip
-    current = (friction.time >= begin) & (friction.time <= end)
-    lower.plot(friction.time[current], friction.coil_current[current], color=BLUE)
+    current = (truth.time >= begin) & (truth.time <= end)
+    lower.plot(truth.time[current], truth.coil_current[current], color=BLUE)
     for axes in (upper, lower):
         axes.fill_between(
             seen.time[shown], 0.0, 1.0, where=seen.damping_active[shown], color=BLUE, alpha=0.10,
@@ -52,6 +51,6 @@ def draw_gap(crossing: Crossing, depth: float, control: switched_viscous.Paramet
     upper.set_ylabel('displacement (mm)')
     lower.set_ylabel('coil current (A)')
     lower.set_xlabel('time from the start of the drive (s)')
-    lower.set_ylim(0.0, max(0.1, 1.1 * float(np.max(friction.coil_current[current]))))
+    lower.set_ylim(0.0, max(0.1, 1.1 * float(np.max(truth.coil_current[current]))))
     upper.legend(loc='upper right', ncols=2, fontsize='small')
     return finish(figure, file)

@@ -55,18 +55,18 @@ def draw_comparison(comparison: Comparison, a: Recording, b: Recording, file: Pa
 def _chosen(comparison: Comparison) -> list[SignalDifference]:
     drawable = [signal for signal in by_importance(comparison.signals) if signal.samples >= _LEAST_SAMPLES]
     if drawable:
-        return _without_twins(drawable)[:_SIGNALS]
+        return _distinct(drawable)[:_SIGNALS]
     known = [signal for signal in comparison.signals if signal.samples >= _LEAST_SAMPLES]
     return [signal for signal in known if signal.quantity in _ALWAYS] or known[:1]
 
 
-def _without_twins(signals: list[SignalDifference]) -> list[SignalDifference]:
+def _distinct(signals: list[SignalDifference]) -> list[SignalDifference]:
     """Leave out what is the same quantity a second time, such as the setpoint in the control trace."""
     seen, chosen = set(), []
     for signal in signals:
-        twin = (signal.mount, signal.unit, signal.largest)
-        if twin not in seen:
-            seen.add(twin)
+        key = (signal.mount, signal.unit, signal.largest)
+        if key not in seen:
+            seen.add(key)
             chosen.append(signal)
     return chosen
 

@@ -1,4 +1,4 @@
-"""How text gets to the terminal: as it stands. A bracket in a path or in the name of a column is one."""
+"""How text gets to the terminal: as it stands, for a bracket in a path is no markup."""
 
 from typing import Any
 

@@ -1,6 +1,6 @@
 """The charts of a report, each from plain arrays in SI units; several series of one kind share a chart.
 
-Whoever measures something may draw it with these: no recording is needed.
+They take arrays, so no recording is needed.
 """
 
 from collections.abc import Sequence

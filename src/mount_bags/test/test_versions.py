@@ -4,8 +4,13 @@ import subprocess
 
 import pytest
 
-from mount_bags.run.versions import _project_version, processor, versions
-from mount_replay.recorded_versions import version_differences, versions_sentence
+from mount_bags.run.versions import (
+    _project_version,
+    processor,
+    version_differences,
+    versions,
+    versions_sentence,
+)
 
 X86 = """processor\t: 0
 vendor_id\t: AuthenticAMD

@@ -1,0 +1,98 @@
+"""The session of a recording, what it is, as YAML on the topic `session`: made, written and read.
+
+Its keys are `scenario`, `mode`, `started`, `parameters` (by node) and `versions`; of a replay also `replay`.
+"""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+import yaml
+
+from mount_bags.bag.recording import Recording
+from mount_bags.messages.series import registered_topic
+from mount_bags.run.versions import versions
+from mount_ros.topics import SESSION
+
+
+class SessionError(ValueError):
+    """A session message is not understood; the text says why."""
+
+
+def new_session(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the session of a run that starts now: `content` with the time and the versions."""
+    return {**content, 'started': time_text(), 'versions': versions()}
+
+
+def time_text() -> str:
+    """Return the present time with its zone, ISO 8601."""
+    return datetime.now().astimezone().isoformat(timespec='seconds')
+
+
+def session_text(content: Mapping[str, Any]) -> str:
+    """Return the text of the session message."""
+    return yaml.safe_dump(dict(content), sort_keys=False)
+
+
+def session_message(text: str) -> bytes:
+    """Return the serialised message of a session text."""
+    from std_msgs.msg import String  # only here: these load the middleware, which readers do without
+
+    from mount_ros.messages.cdr import serialised
+
+    return serialised(String(data=text))
+
+
+def session_content(text: str) -> dict[str, Any]:
+    """Return the content of a session text, {} of an empty one; raises `SessionError`."""
+    try:
+        content = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise SessionError(f'session is no YAML ({str(error).splitlines()[0]})') from None
+    if content is None:
+        return {}
+    if not isinstance(content, dict):
+        raise SessionError(f'session is a {type(content).__name__} instead of keys with values')
+    return content
+
+
+def session_parameters(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of a session, {} where it tells none."""
+    found = content.get('parameters')
+    nodes = found.items() if isinstance(found, dict) else ()
+    return {str(node): values for node, values in nodes if isinstance(values, dict)}
+
+
+def session_values(text: str) -> dict[str, Any]:
+    """Return {name: value} of a session text; parameters are named as `--set` names them."""
+    try:
+        return _flat(yaml.safe_load(text))
+    except yaml.YAMLError:
+        return {'text': text}
+
+
+def recorded_sessions(recording: Recording) -> dict[str, str]:
+    """Return the last session text by topic, for each mount has its own."""
+    return {
+        name: recording.latched(name).data
+        for name, topic in recording.topics.items()
+        if registered_topic(name, topic.type) is SESSION and len(recording[name])
+    }
+
+
+def recorded_session(recording: Recording) -> str:
+    """Return the last session text of a recording, empty where it has none or those of several mounts."""
+    found = recorded_sessions(recording)
+    only = next(iter(found.values())) if len(found) == 1 else ''
+    return found.get(f'/{SESSION.name}', only)
+
+
+def _flat(content: Any, prefix: str = '') -> dict[str, Any]:
+    """Return {path: value}; the common root of all parameters is left out."""
+    if not isinstance(content, Mapping):
+        return {prefix or 'text': content} if content is not None else {}
+    flat: dict[str, Any] = {}
+    for key, value in content.items():
+        root = '' if not prefix and key == 'parameters' else f'{prefix}.{key}' if prefix else str(key)
+        flat.update(_flat(value, root) if isinstance(value, Mapping) else {root: value})
+    return flat

@@ -1,0 +1,107 @@
+"""The signals of a simulated drive, from its recording: what sensor and control saw, and the truth."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_bags.bag.recording import Recording
+from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
+
+FloatArray = NDArray[np.float64]
+
+_SECOND = 1e9  # ns
+_TRACED = ('damping_active', 'current', 'band_displacement')
+_AT_THE_END = ('rest_gap', 'contact_gap')  # what the summary of a drive asks for, read in the same pass
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What sensor and control saw at each displacement sample; SI, arrays (n,).
+
+    Where control made no step, damping is off, the current 0 A and the band displacement NaN.
+    """
+
+    time: FloatArray
+    displacement: FloatArray
+    damping_active: NDArray[np.bool_]
+    current: FloatArray
+    band_displacement: FloatArray
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Scalars of the topic `sim/truth` by their names; SI, arrays (m,)."""
+
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    coil_current: FloatArray
+    friction_force: FloatArray
+    mount_force: FloatArray
+    chassis_acceleration: FloatArray
+
+    def since(self, begin: float) -> 'Truth':
+        """Return the samples from the time `begin` (s) on."""
+        kept = self.time >= begin
+        return Truth(**{field.name: getattr(self, field.name)[kept] for field in fields(self)})
+
+
+@dataclass(frozen=True)
+class DriveSignals:
+    """The signals of one drive; times are in s from the stamp `zero` (ns) on."""
+
+    recording: Path
+    zero: int
+    seen: Seen
+    truth: Truth
+
+
+def load_drive(recording: Recording, excitation_start: float | None = None) -> DriveSignals:
+    """Read the signals of a drive, with time from the zero of its time axis on.
+
+    With `excitation_start` (s from the plant's first sample) time begins there. Raises `ReadingError` where
+    a topic is missing.
+    """
+    scalars = [field.name for field in fields(Truth) if field.name != 'time']
+    recording.load_columns(
+        {
+            DISPLACEMENT.name: DISPLACEMENT.names,
+            CONTROL_TRACE.name: _TRACED,
+            SIM_TRUTH.name: (*scalars, *_AT_THE_END),
+        }
+    )
+    zero = recording.time_axis.zero
+    if excitation_start is not None:
+        zero = excitation_stamp(recording, excitation_start)
+    truth = recording[SIM_TRUTH.name]
+    order = np.argsort(truth.stamps)
+    return DriveSignals(
+        recording=recording.path,
+        zero=zero,
+        seen=_seen(recording, zero),
+        truth=Truth((truth.stamps[order] - zero) * 1e-9, *(truth[name][order] for name in scalars)),
+    )
+
+
+def excitation_stamp(recording: Recording, start: float) -> int:
+    """Return the stamp (ns) at which the excitation began, `start` s after the plant's first sample."""
+    return int(recording[SIM_TRUTH.name].stamps.min()) + round(start * _SECOND)
+
+
+def _seen(recording: Recording, zero: int) -> Seen:
+    displacement, trace = recording[DISPLACEMENT.name], recording[CONTROL_TRACE.name]
+    order = np.argsort(displacement.stamps)
+    stamps = displacement.stamps[order]
+    _, places, of_trace = np.intersect1d(stamps, trace.stamps, return_indices=True)
+    traced = {name: np.full(len(stamps), np.nan) for name in _TRACED}
+    for name, values in traced.items():
+        values[places] = trace[name][of_trace]
+    return Seen(
+        time=(stamps - zero) / _SECOND,
+        displacement=displacement['mount'][order],
+        damping_active=traced['damping_active'] > 0.5,
+        current=np.nan_to_num(traced['current']),
+        band_displacement=traced['band_displacement'],
+    )

@@ -1,0 +1,96 @@
+"""What shakes the plant is made in blocks: the same in any of them, and never more of it at a time."""
+
+import hashlib
+import tracemalloc
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.shaking import LONG_BLOCK, SHORT_BLOCK, Shaking
+
+SECONDS = 1.5
+CHOSEN = {
+    'motorway': {'seed': 7, 'idle__amplitude': 80.0},
+    'bench': {'bench__frequency': 3.7},
+    'sweep': {'idle__amplitude': 5.0, 'idle__second_share': 0.0},
+    'recorded': {'recorded__scale': -3.3, 'idle__amplitude': 5.0},
+}
+DIGESTS = {
+    'motorway': 'e3b083d722cec044',
+    'bench': 'd2a337b24c15b5c7',
+    'sweep': 'f37fb2248dccbe4d',
+    'recorded': '91cb55888c826adc',
+}
+"""Of values and engine forces as a whole: whoever changes them changes all drives."""
+
+
+@pytest.fixture(scope='module')
+def chosen(parameters, tmp_path_factory):
+    """Return a function that gives the parameters of a scenario with a start between two blocks."""
+    file = tmp_path_factory.mktemp('recording') / 'z_value.npy'
+    random = np.random.Generator(np.random.PCG64(5))
+    np.save(file, random.integers(-1000, 1000, 200) * 2.0**-8)
+    np.save(file.with_name('z_t.npy'), np.arange(200) / 100.0)
+
+    def choose(scenario, **changes):
+        given = {'timeline__start': 0.13, 'timeline__duration': SECONDS, 'recorded__file': str(file)}
+        return parameters(scenario=scenario, **given | CHOSEN[scenario] | changes)
+
+    return choose
+
+
+@pytest.mark.parametrize('scenario', CHOSEN)
+def test_a_drive_is_shaken_to_the_bit_as_ever(chosen, scenario):
+    excitation = build_excitation(chosen(scenario))
+    digest = hashlib.sha256(excitation.values[:].tobytes())
+    if excitation.engine_forces is not None:
+        digest.update(excitation.engine_forces[:].tobytes())
+    assert digest.hexdigest()[:16] == DIGESTS[scenario]
+
+
+@pytest.mark.parametrize('scenario', CHOSEN)
+@given(cuts=st.sets(st.integers(1, round(SECONDS / 5e-5) - 1), max_size=12))
+@settings(max_examples=15, deadline=None)
+def test_parts_of_any_size_are_the_whole(chosen, scenario, cuts):
+    excitation = build_excitation(chosen(scenario))
+    for series in (excitation.values, excitation.engine_forces):
+        if series is not None:
+            parts = [series[first:behind] for first, behind in pairwise([0, *sorted(cuts), len(series)])]
+            np.testing.assert_array_equal(np.concatenate(parts), series[:])
+
+
+@pytest.mark.parametrize('scenario', CHOSEN)
+def test_rest_excitation_and_end_follow_each_other_however_they_are_asked_for(chosen, scenario):
+    excitation = build_excitation(chosen(scenario, timeline__duration=1.40037))
+    shaking, ahead = Shaking(excitation), Shaking(excitation)
+    assert (shaking.start, shaking.samples) == (130, 1530)
+    still = 0.0 if scenario == 'recorded' else excitation.values[-1:][0]
+    for series, place, end in ((excitation.values, 0, still), (excitation.engine_forces, 1, 0.0)):
+        driven = np.zeros(28_000) if series is None else series[:28_000]
+        expected = np.concatenate([np.zeros(2600), driven, np.full(20 * 300, end)]).reshape(-1, 20)
+        np.testing.assert_array_equal([shaking.at(sample)[place] for sample in range(1830)], expected)
+        sample = 0
+        while sample < 1830:
+            rows = ahead.ahead(sample, min(77, 1830 - sample))[place]
+            assert 1 <= len(rows) <= 77
+            np.testing.assert_array_equal(rows, expected[sample : sample + len(rows)])
+            sample += len(rows)
+
+
+@pytest.mark.parametrize('scenario', ['motorway', 'bench'])
+def test_two_hours_take_no_more_memory_than_some_blocks(make_mount, scenario):
+    make_mount(scenario=scenario)  # loads what is compiled
+    tracemalloc.start()
+    mount = make_mount(scenario=scenario, timeline__duration=7200.0)
+    for _ in range(SHORT_BLOCK):
+        mount.measure()
+        mount.advance(0.0)
+    mount.ahead(LONG_BLOCK)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert mount.run.samples == 7_200_000
+    assert peak < 16e6  # the table of the road's waves is 3 MB

@@ -1,0 +1,31 @@
+"""Commands of pages that their test does not run as they stand, and what runs them instead."""
+
+_INSTALLATION = 'on a ROS 2 installation; test/architecture/test_car.py holds what it installs and loads'
+_LAUNCH = 'on a ROS 2 installation; test/graph/test_drive.py drives the same nodes'
+_RECORD = 'beside a running graph in test/graph/test_recording.py'
+_SET = 'on a running node in test/replay/test_parameter_changes.py'
+
+ELSEWHERE = {
+    'make drive': 'in real time by test/graph/test_drive.py',
+    'make test': 'it is what runs this',
+    'make setup-dev': 'it made the environment that this runs in',
+    'make lint': 'by .ci/run',
+    '. .venv/bin/activate': 'the commands are run in that environment',
+    'export PIP_BREAK_SYSTEM_PACKAGES': _INSTALLATION,
+    'rosdep install': _INSTALLATION,
+    'python3 -m pip install': _INSTALLATION,
+    'colcon build': _INSTALLATION,
+    'ip link set': _INSTALLATION,
+    'ros2 launch mount_bringup vehicle.launch.py': _LAUNCH,
+    'ros2 service call /mount_right/mount_recorder/mark': _RECORD,
+    'ros2 topic pub --once /mount_right/event': _RECORD,
+    'ros2 param set /mount_right/mount_control': _SET,
+    'engine-mount record --': _RECORD,
+    'engine-mount identify friction': 'it takes long; src/mount_cli/test/test_identify_friction.py',
+}
+"""{beginning of the commands: where they are run}."""
+
+STAND_INS = {
+    "make drive DRIVE_OPTIONS='--out bags/first'": 'engine-mount drive --core --out bags/first',
+}
+"""{command: what the test of the page runs in its place}."""

@@ -1,0 +1,82 @@
+"""Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
+
+`python test/docs/parameters_page.py` renews the page; `test_parameters.py` holds it against the code.
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mount_bags.recorder.parameters import RecorderParameters
+from mount_bringup.settings import defaults_of_nodes
+from mount_control.settings import parameter_sets
+from mount_driver.parameters import DriverParameters
+from mount_init.parameters import InitParameters
+from mount_models.quantity import Quantity, quantities
+from mount_sim.parameters import SimParameters
+
+PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'parameters.md'
+README = {'mount_recorder': 'mount_bags'}
+SETS: dict[str, list[tuple[str, NamedTuple]]] = {
+    'mount_driver': [('', DriverParameters())],
+    'mount_sim': [('', SimParameters())],
+    'mount_init': [('', InitParameters())],
+    'mount_control': parameter_sets(),
+    'mount_recorder': [('', RecorderParameters())],
+}
+"""The parameter sets of each node, behind their prefix."""
+
+HEAD = """# Parameters
+
+Every parameter of every node, as `--set NODE.NAME=VALUE` of `engine-mount drive`, `ros2 param` and the files
+in `src/mount_bringup/config` take it. `python test/docs/parameters_page.py` writes this page from the
+declarations, and a test holds it against them. *Source* says where a default is from: the paper, a
+derivation, or a choice of this project. Every node has `lockstep` too (true: time stands in the stamps
+alone). The meaning of texts stands in the README of the package.
+"""
+
+
+def page() -> str:
+    """Return the text of the page."""
+    parts = [HEAD]
+    for node, defaults in defaults_of_nodes().items():
+        package = README.get(node, node)
+        notes = {name: note for prefix, given in SETS[node] for name, note in notes_of(given, prefix)}
+        parts += [
+            f'## {node}',
+            f'README: [{package}](../../src/{package}/README.md#parameters).',
+            '\n'.join(
+                [
+                    '| parameter | default | unit | range | meaning | source |',
+                    '|---|---|---|---|---|---|',
+                    *(row(name, default, notes.get(name)) for name, default in defaults.items()),
+                ]
+            ),
+        ]
+    return '\n\n'.join(part.rstrip() for part in parts) + '\n'
+
+
+def notes_of(parameters: NamedTuple, prefix: str) -> Iterator[tuple[str, Quantity]]:
+    """Return (full name, note) of every number of a set and of the sets in it."""
+    before = f'{prefix}.' if prefix else ''
+    yield from ((f'{before}{name}', note) for name, note in quantities(parameters).items())
+    for name, value in parameters._asdict().items():
+        if hasattr(value, '_asdict'):
+            yield from notes_of(value, f'{before}{name}')
+
+
+def row(name: str, default: Any, note: Quantity | None) -> str:
+    """Return the row of one parameter."""
+    if isinstance(default, (int, float)):
+        value = 'unknown' if math.isnan(default) else f'{default:g}'
+    else:
+        value = f'`{default}`' if default else 'empty'
+    if note is None:
+        return f'| `{name}` | {value} | | | | |'
+    limits = f'{note.low:g} .. {note.high:g}' if note.low > -math.inf else ''
+    return f'| `{name}` | {value} | {note.unit} | {limits} | {note.meaning} | {note.source} |'
+
+
+if __name__ == '__main__':
+    PAGE.write_text(page(), encoding='utf-8')

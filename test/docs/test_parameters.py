@@ -1,0 +1,21 @@
+"""The list of parameters is that of the nodes."""
+
+import re
+
+from pages import REPOSITORY
+from parameters_page import PAGE, README, page
+
+from mount_bringup.settings import defaults_of_nodes
+
+
+def test_the_page_of_parameters_is_what_the_code_declares():
+    assert PAGE.read_text(encoding='utf-8') == page(), 'python test/docs/parameters_page.py renews it'
+
+
+def test_every_parameter_stands_in_the_readme_of_its_package_or_in_one_of_a_set():
+    for node, parameters in defaults_of_nodes().items():
+        text = (REPOSITORY / 'src' / README.get(node, node) / 'README.md').read_text(encoding='utf-8')
+        section = text.split('\n## Parameters\n')[1].split('\n## ')[0]
+        named = set(re.findall(r'`([\w.]+(?:\.\*)?)`', section))
+        groups = tuple(name.removesuffix('*') for name in named if name.endswith('.*'))
+        assert [name for name in parameters if name not in named and not name.startswith(groups)] == [], node
