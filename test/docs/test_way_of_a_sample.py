@@ -17,15 +17,16 @@ def test_every_function_on_the_way_of_a_sample_is_where_the_page_says():
     ]
     assert len(passed) >= len(rows) > 5
     for package, file, names in passed:
-        defined = methods_in(REPOSITORY / 'src' / package / package / file)
+        defined = functions_in(REPOSITORY / 'src' / package / package / file)
         assert set(re.findall(r'[\w.]+', names)) <= defined, file
 
 
-def methods_in(file: Path) -> set[str]:
-    """Return the methods of a file as `Class.method`."""
-    return {
+def functions_in(file: Path) -> set[str]:
+    """Return the functions of a file, and its methods as `Class.method`."""
+    body = ast.parse(file.read_text(encoding='utf-8')).body
+    return {function.name for function in body if isinstance(function, ast.FunctionDef)} | {
         f'{kind.name}.{part.name}'
-        for kind in ast.parse(file.read_text(encoding='utf-8')).body
+        for kind in body
         if isinstance(kind, ast.ClassDef)
         for part in kind.body
         if isinstance(part, ast.FunctionDef)

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.messages.series import Series
-from mount_bringup.chosen import chosen_damper, control_parameters
+from mount_bringup.chosen import chosen_damper, switched_viscous_parameters
 from mount_bringup.mount_choice import with_control_of_mount
-from mount_control.controller import _STATE
 from mount_models.arithmetic.series import series_of
 from mount_models.specimen import default_specimen
 from mount_replay.loop import chain as core_chain
@@ -56,7 +55,9 @@ class Recorded:
     @property
     def tracking(self) -> float:
         """Rms error of the friction force as a share of the wanted peak."""
-        return tracking_error(self.drive, control_parameters(self.settings), chosen_damper(self.settings))
+        return tracking_error(
+            self.drive, switched_viscous_parameters(self.settings), chosen_damper(self.settings)
+        )
 
 
 @pytest.fixture(scope='module')
@@ -275,7 +276,8 @@ def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(run
 
     def take_many_and_poison(mount, chain, samples, pending):
         if mount.time > 5.0 and not poisoned:
-            chain.answering.controller.memory.state.view(_STATE)['band']['z1'] = np.nan
+            controller = chain.answering.controller
+            controller.memory.state.view(controller.compiled.state)['policy']['band']['z1'] = np.nan
             poisoned.append(mount.sample)
         return take_many(mount, chain, samples, pending)
 

@@ -17,7 +17,7 @@ import pytest
 from scipy.optimize import brentq
 
 from mount_bags.bag.recording import open_recording
-from mount_bringup.chosen import chosen_control, chosen_damper, control_parameters
+from mount_bringup.chosen import chosen_control, chosen_damper, switched_viscous_parameters
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
@@ -89,7 +89,7 @@ def tracking(seed, file):
     outcome = record_core(folder, settings, '')
     drive = load_drive(open_recording(folder), outcome.excitation_start)
     assert drive.seen.damping_active.mean() > 0.3
-    return tracking_error(drive, control_parameters(settings), chosen_damper(settings))
+    return tracking_error(drive, switched_viscous_parameters(settings), chosen_damper(settings))
 
 
 def step_errors(seed, file):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_control.controller import TRACE, ControlLaw, Controller
+from mount_control.controller import ControlLaw, Controller
 from mount_control.force_to_current import CurrentTable
 from mount_control.sample_watch import INTERRUPTED, Judgement, SampleWatch
 from mount_control.settings import ControlSettings
@@ -20,7 +20,7 @@ OFF = 0.0
 
 
 class Answer(NamedTuple):
-    """What is made of one sample: current (A) and trace (bytes of a `TRACE`), None where there is none.
+    """What is made of one sample: current (A) and trace (bytes of its record), None where there is none.
 
     `told` belongs to the changes that hold from this sample on.
     """
@@ -32,7 +32,7 @@ class Answer(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """The answers to n samples: currents (A, NaN where there is none), traces (`TRACE`) where `traced`."""
+    """The answers to n samples: currents (A, NaN where there is none), records `traces` where `traced`."""
 
     currents: NDArray[np.float64]
     traced: NDArray[np.bool_]
@@ -61,6 +61,12 @@ class Answering:
         self._faults = 0
         self._table: CurrentTable | None = None
         self._changes: deque[tuple[ControlLaw, str]] = deque()
+
+    @property
+    def trace_type(self) -> np.dtype:
+        """The record type of the traces since `begin`."""
+        assert self.controller is not None
+        return self.controller.compiled.trace
 
     @property
     def refusal(self) -> str:
@@ -126,10 +132,10 @@ class Answering:
         """Return the answers to n samples, ns and m, to the bit those of n calls of `answer`.
 
         Samples that follow each other without a doubt pass the compiled controller at once. `changes` are
-        made known before the samples at their places.
+        made known before the samples at their places. Only between `begin` and `end`.
         """
         count, changes = len(stamps), changes or {}
-        answers = Answers(np.full(count, np.nan), np.zeros(count, bool), np.zeros(count, TRACE))
+        answers = Answers(np.full(count, np.nan), np.zeros(count, bool), np.zeros(count, self.trace_type))
         follows = self.watch.following(stamps, displacements)
         begins = sorted({*np.flatnonzero(~follows).tolist(), *changes})
         for begin, end in zip(begins, [*begins[1:], count], strict=True):
@@ -155,7 +161,7 @@ class Answering:
                 answers.currents[place] = answer.current
             if answer.trace is not None:
                 answers.traced[place] = True
-                answers.traces[place] = np.frombuffer(answer.trace, TRACE)[0]
+                answers.traces[place] = np.frombuffer(answer.trace, self.trace_type)[0]
                 return place + 1
         return end
 

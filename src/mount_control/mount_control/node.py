@@ -11,11 +11,11 @@ from std_msgs.msg import String
 
 from mount_control.activation import Activation, AirGap
 from mount_control.answering import OFF, Answering
-from mount_control.controller import TRACE, load_compiled_law
+from mount_control.controller import load_compiled_law
 from mount_control.diagnosis import ControlFigures, verdict
-from mount_control.parameters import RUN_TIME, ControlParameters
+from mount_control.policy.contract import trace_fields
 from mount_control.sample_watch import Judgement
-from mount_control.settings import FRICTION, TEXTS, control_settings
+from mount_control.settings import FILES, FRICTION, control_settings, parameter_sets, run_time_parameters
 from mount_models.damper import DamperError, damper_text
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
@@ -34,14 +34,13 @@ from mount_ros.timing import LatencyHistogram
 class MountControl(SafeLifecycleNode):
     """Answers each displacement sample with a current setpoint, while active."""
 
-    run_time_parameters = RUN_TIME
+    run_time_parameters = run_time_parameters()
 
     def __init__(self, **arguments):
         super().__init__('mount_control', **arguments)
-        declare(self, ControlParameters())
-        for prefix, parameters in FRICTION.items():
+        for prefix, parameters in parameter_sets():
             declare(self, parameters, prefix)
-        for name, text in TEXTS.items():
+        for name, text in FILES.items():
             self.declare_parameter(name, text)
         self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)
@@ -61,10 +60,9 @@ class MountControl(SafeLifecycleNode):
         self._parameter_changes = 0
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
-        self._trace = ScalarsLayout(topics.CONTROL_TRACE)
+        self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
+        self._trace = ScalarsLayout(self.trace_topic)
         self._gap_layout = ScalarsLayout(topics.AIR_GAP)
-        if self._trace.names != TRACE.names:
-            raise ValueError('control_trace in the topic registry differs from what the controller traces')
         load_compiled_law(self._settings)
         path = self.open_data_path()
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
@@ -120,6 +118,7 @@ class MountControl(SafeLifecycleNode):
                 last_stamp=answering.watch.last,
                 faults=answering.faults,
                 last_fault=answering.last_fault,
+                policy=self._settings.parameters.policy,
                 damper=self.get_parameter('damper').value,
                 parameter_changes=self._parameter_changes,
             )

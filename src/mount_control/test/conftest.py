@@ -1,14 +1,18 @@
 """What the tests share: a force table as an initialisation makes it, controllers."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from mount_control.controller import ControlLaw, Controller
-from mount_control.parameters import ControlParameters
-from mount_control.settings import ControlSettings
-from mount_models.damper import damper_curve
+from mount_control.settings import ControlSettings, control_settings
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.specimen import default_specimen
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 # Currents (A) and normal forces (N) of a closing actuator, rounded; the first is the touch of the pads.
 CURRENTS = np.array([0.4725, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])
@@ -27,9 +31,8 @@ def make_settings():
     """Return a function that builds the settings of a controller with some parameters changed."""
 
     def make(damper: str = 'viscous_2000', **changes) -> ControlSettings:
-        parameters = ControlParameters(**changes)
-        friction, contact = FrictionCoefficients(), FrictionContact()
-        return ControlSettings(parameters, damper_curve(damper), friction, contact)
+        settings = control_settings({'damper': damper, **changes}, default_specimen())
+        return settings._replace(friction=FrictionCoefficients(), contact=FrictionContact())
 
     return make
 

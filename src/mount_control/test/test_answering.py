@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_control.answering import OFF, Answer, Answering
-from mount_control.controller import TRACE, ControlLaw, Controller
+from mount_control.controller import ControlLaw, Controller
 from mount_control.sample_watch import Judgement
 
 MS, START = 1_000_000, 5_000_000_000  # ns
@@ -55,7 +55,7 @@ def test_many_answers_are_single_answers_to_the_bit(make_answering, make_setting
         expected = math.nan if answer.current is None else answer.current
         np.testing.assert_equal(answers.currents[place], expected)
         assert answers.traced[place] == (answer.trace is not None)
-        assert answers.traces[place].tobytes() == (answer.trace or bytes(TRACE.itemsize))
+        assert answers.traces[place].tobytes() == (answer.trace or bytes(many.trace_type.itemsize))
     assert many.watch.counts == single.watch.counts
     assert (many.watch.first, many.watch.last) == (single.watch.first, single.watch.last)
     assert (many.refusal, many.faults) == (single.refusal, single.faults)

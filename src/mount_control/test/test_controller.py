@@ -9,19 +9,19 @@ from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
 
 from mount_control.controller import (
-    _STATE,
-    FADE_SAMPLES,
     FARTHEST_DISPLACEMENT,
-    TRACE,
     ControlLaw,
     Controller,
+    compiled_with,
 )
-from mount_control.parameters import ControlParameters
+from mount_control.force_maker import FADE_SAMPLES
+from mount_control.policy import switched_viscous
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.simplified import faded_coefficient
 from mount_ros import topics
 
+PAPER = compiled_with(switched_viscous)
 SHAKING = st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=12)
 
 
@@ -35,8 +35,9 @@ def _equal(one, other):
 
 
 def test_trace_has_the_names_of_its_topic():
-    assert TRACE.names == topics.CONTROL_TRACE.names
-    assert {TRACE[name] for name in TRACE.names} == {np.dtype('f8')}
+    known = {scalar.name for scalar in (*topics.CONTROL_TRACE.scalars, *topics.CONTROL_TRACE.optional)}
+    assert set(PAPER.trace.names) == known
+    assert {PAPER.trace[name] for name in PAPER.trace.names} == {np.dtype('f8')}
 
 
 def test_trace_bytes_are_its_numbers(make_controller, sine):
@@ -44,7 +45,7 @@ def test_trace_bytes_are_its_numbers(make_controller, sine):
     for x in sine(8.0, 1e-3, 0.4):
         controller.step(x)
     numbers = np.frombuffer(controller.trace_bytes, '<f8')
-    np.testing.assert_array_equal(numbers, [controller.trace[name] for name in TRACE.names])
+    np.testing.assert_array_equal(numbers, [controller.trace[name] for name in PAPER.trace.names])
 
 
 def test_single_steps_equal_a_run_to_the_bit(make_controller, sine):
@@ -159,7 +160,7 @@ def test_missing_samples_are_replaced_by_a_straight_line(make_controller, sine):
     assert current == pytest.approx(complete.step(displacement[304]), abs=1e-12)
     assert bridged.trace['bridged_samples'] == 4.0
     assert complete.trace['bridged_samples'] == 0.0
-    for name in TRACE.names[:-1]:
+    for name in PAPER.trace.names[:-1]:
         assert bridged.trace[name] == pytest.approx(complete.trace[name], rel=1e-9, abs=1e-12), name
 
 
@@ -210,23 +211,23 @@ def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, 
     traces = make_controller(eigenfrequency=10.0).run(sine(10.0, 1e-3, 1.0))
     exceeded = int((traces['magnitude'] > 0.0008).argmax())
     assert int(traces['damping_active'].argmax()) == exceeded + 99
-    assert ControlParameters(eigenfrequency=10.0).period_samples == 100
+    assert switched_viscous.Parameters(eigenfrequency=10.0).period_samples == 100
     assert damper_curve('viscous_2000').force(0.104) == pytest.approx(200.0)
 
 
 # What is no finite number inside the controller, however it came there.
 
 POISON = [
-    'band.z1',
-    'band.z2',
-    'band.displacement',
-    'band.earlier',
-    'switching.magnitude',
+    'policy.band.z1',
+    'policy.band.z2',
+    'policy.band.displacement',
+    'policy.band.earlier',
+    'policy.switching.magnitude',
     'displacement',
-    'deflection',
-    'normal_force',
-    'current',
-    'distance',
+    'maker.deflection',
+    'maker.normal_force',
+    'maker.current',
+    'maker.distance',
 ]
 
 
@@ -236,7 +237,7 @@ def _poisoned(controller, name, value):
     if name == 'window':
         memory.window[:] = value
         return
-    numbers = memory.state.view(_STATE)
+    numbers = memory.state.view(PAPER.state)
     for part in name.split('.'):
         record, numbers = numbers, numbers[part]
     record[part] = value
@@ -248,13 +249,13 @@ def test_every_number_of_the_memory_is_among_those_that_are_poisoned():
             yield from names(kind[name], f'{prefix}{name}.') if kind[name].names else [prefix + name]
 
     def kind_of(path):
-        kind = _STATE
+        kind = PAPER.state
         for part in path.split('.'):
             kind = kind[part]
         return kind
 
-    counts = {name for name in names(_STATE) if kind_of(name) == np.int64}
-    assert set(names(_STATE)) - counts == set(POISON)
+    counts = {name for name in names(PAPER.state) if kind_of(name) == np.int64}
+    assert set(names(PAPER.state)) - counts == set(POISON)
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
@@ -285,8 +286,8 @@ def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(
 def test_what_leaves_the_window_is_noticed_where_it_is_no_number(make_controller, sine):
     controller = make_controller()
     controller.run(sine(8.0, 1e-3, 0.5))
-    state = controller.memory.state.view(_STATE)
-    controller.memory.window[state['switching']['place'][0]] = math.nan
+    state = controller.memory.state.view(PAPER.state)
+    controller.memory.window[state['policy']['switching']['place'][0]] = math.nan
     assert controller.step(0.0) == 0.0
     assert controller.faults == 1
 
@@ -378,7 +379,7 @@ def test_the_magnitude_stays_the_highest_of_the_last_period_over_a_change_of_it(
     controller.change(make_law(eigenfrequency=eigenfrequency))
     after = controller.run(displacement[333:])
     distances = np.abs(np.r_[before['band_displacement'], after['band_displacement']])
-    period = ControlParameters(eigenfrequency=eigenfrequency).period_samples
+    period = switched_viscous.Parameters(eigenfrequency=eigenfrequency).period_samples
     seen_from = max(0, 333 - 125)  # what the window of the old period held
     for number in range(333, 600):
         begin = max(number + 1 - period, seen_from)

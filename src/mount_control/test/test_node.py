@@ -12,9 +12,10 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from mount_control.controller import _STATE, ControlLaw, Controller
-from mount_control.identified import identified
+from mount_control.controller import ControlLaw, Controller
 from mount_control.node import MountControl
+from mount_control.policy import switched_viscous
+from mount_control.policy.contract import trace_fields
 from mount_control.settings import control_settings
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
@@ -48,9 +49,9 @@ class Surroundings:
                 topics.DISPLACEMENT,
                 topics.AIR_GAP,
                 topics.CURRENT_SETPOINT,
-                topics.CONTROL_TRACE,
             )
         }
+        self._trace_layout = ScalarsLayout(topics.control_trace(trace_fields(switched_viscous)))
         self.setpoints, self.traces, self.events = [], [], []
         self._displacement = self.path.publisher(topics.DISPLACEMENT)
         self._air_gap = self.path.publisher(topics.AIR_GAP)
@@ -90,9 +91,8 @@ class Surroundings:
         return (stamp - ACTIVATION) / MS, current
 
     def _trace(self, raw):
-        stamp, numbers, _ = self._layouts[topics.CONTROL_TRACE].unpack(raw)
-        names = self._layouts[topics.CONTROL_TRACE].names
-        return (stamp - ACTIVATION) / MS, dict(zip(names, numbers, strict=True))
+        stamp, numbers, _ = self._trace_layout.unpack(raw)
+        return (stamp - ACTIVATION) / MS, dict(zip(self._trace_layout.names, numbers, strict=True))
 
     def close(self):
         self.path.stop()
@@ -402,9 +402,8 @@ def test_the_friction_of_a_specimen_is_in_the_parameters_that_the_session_will_t
     assert control.trigger_cleanup() == SUCCESS
     control.set_parameters([Parameter('parameters_file', value='')])
     assert control.trigger_configure() == SUCCESS
-    assert control._settings.friction == identified(
-        default_specimen(), FrictionCoefficients(), settings, 'friction'
-    )
+    expected = control_settings(settings, default_specimen())
+    assert control._settings.friction == expected.friction
 
 
 def test_silence_is_told_in_real_time(active, around):
@@ -427,11 +426,12 @@ def test_missing_samples_are_bridged_and_counted(active, around, sine):
 def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(active, around, sine, name):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
-    state = control.answering.controller.memory.state.view(_STATE)
+    controller = control.answering.controller
+    state = controller.memory.state.view(controller.compiled.state)
     if name == 'band':
-        state['band']['z1'] = math.nan
+        state['policy']['band']['z1'] = math.nan
     else:
-        state[name] = math.nan
+        state['maker'][name] = math.nan
     around.send(401, 0.0)
     assert _answers(around, 401)[-1] == (401.0, 0.0)
     wait_until(lambda: len(around.traces) == 401, 'the trace')
@@ -527,6 +527,7 @@ def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(
         ('friction.scale', 1.1, 'friction.scale can be set before configure: deactivate and clean up first'),
         ('parameters_file', 'x.yaml', 'parameters_file can be set before configure'),
         ('lockstep', False, 'lockstep can be set before configure'),
+        ('policy', 'viscous_example', 'policy can be set before configure: deactivate and clean up first'),
     ],
 )
 def test_what_cannot_be_set_is_refused_with_the_reason_and_changes_nothing(
@@ -570,7 +571,7 @@ def test_a_damper_file_is_in_the_parameters_with_its_points(make_control, tmp_pa
     assert control.trigger_configure() == SUCCESS
     kept = control.get_parameter('damper').value
     assert kept == '{velocity: [0.0, 0.004, 0.1], force: [0.0, 0.0, 200.0]}'
-    np.testing.assert_array_equal(control._settings.damper.table, damper_curve(str(file)).table)
+    np.testing.assert_array_equal(control._settings.design.table, damper_curve(str(file)).table)
     # at run time too, and the file is not asked for again
     assert _set(control, damper='viscous_1000') == []
     file.write_text('velocity,force\n0,0\n0.1,100\n')
@@ -578,4 +579,6 @@ def test_a_damper_file_is_in_the_parameters_with_its_points(make_control, tmp_pa
     assert control.get_parameter('damper').value == '{velocity: [0.0, 0.1], force: [0.0, 100.0]}'
     file.unlink()
     assert _set(control, quality=0.8) == []
-    assert control._settings.damper.force(0.1) == pytest.approx(100.0)
+    np.testing.assert_array_equal(
+        control._settings.design.table, damper_curve('{velocity: [0, 0.1], force: [0, 100]}').table
+    )

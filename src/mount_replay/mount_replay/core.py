@@ -33,7 +33,7 @@ class ControlAnswers:
     stamps: Times
     setpoints: Column
     traced: NDArray[np.bool_]
-    traces: NDArray[np.void]  # `TRACE`, one for each sample; only where `traced`
+    traces: NDArray[np.void]  # the policy's records, one for each sample; only where `traced`
     counts: SampleCounts
     refusal: str = ''  # why the table did not hold until the end, or empty
 

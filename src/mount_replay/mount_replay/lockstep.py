@@ -20,7 +20,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_bringup.chosen import Parameters
-from mount_control.controller import TRACE
 from mount_control.node import MountControl
 from mount_init.node import MountInit
 from mount_replay.core import OFF, ControlAnswers, Progress, RampAnswers, Replayed, activation_before
@@ -253,11 +252,11 @@ def _control_answers(run: ControlRun, dialogue: _Dialogue, node: MountControl) -
         run.stamps,
         dialogue.setpoints(),
         np.zeros(len(run.stamps), bool),
-        np.zeros(len(run.stamps), TRACE),
+        np.zeros(len(run.stamps), node.answering.trace_type),
         counts,
         verdict.sentence if verdict.level is Level.ERROR else '',
     )
-    unpack = ScalarsLayout(topics.CONTROL_TRACE).unpack
+    unpack = ScalarsLayout(node.trace_topic).unpack
     for raw in dialogue.traces:
         stamp, numbers, _ = unpack(raw)
         place = int(np.searchsorted(run.stamps, stamp))

@@ -13,10 +13,9 @@ from mount_bags.run.session import session_parameters, time_text
 from mount_bags.run.versions import versions
 from mount_bringup.chosen import (
     Parameters,
+    check_policy,
     chosen_control,
-    chosen_damper,
     chosen_specimen,
-    control_parameters,
 )
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
@@ -130,8 +129,7 @@ def _told(given: ReplayInput, mode: str) -> list[str]:
 def check_parameters(parameters: Parameters) -> None:
     """Refuse what a node would refuse, before one is started; raises a `ValueError`."""
     control = parameters.get('mount_control', {})
-    control_parameters(parameters)
-    chosen_damper(parameters)
+    check_policy(parameters)
     with_flattened(FrictionCoefficients(), control, 'friction')
     with_flattened(FrictionContact(), control, 'contact')
     with_flattened(InitParameters(), parameters.get('mount_init', {}))

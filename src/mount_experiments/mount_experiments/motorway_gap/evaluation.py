@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_control.parameters import ControlParameters
+from mount_control.policy import switched_viscous
 from mount_report.drive.evaluation import switching
 from mount_report.drive.signals import DriveSignals, FloatArray
 
@@ -21,7 +21,7 @@ class Crossing:
     exceeded: float | None
 
 
-def figures_of(crossing: Crossing, control: ControlParameters) -> dict[str, Any]:
+def figures_of(crossing: Crossing, control: switched_viscous.Parameters) -> dict[str, Any]:
     """Return delays and durations of damping (s), rms and peaks (m); None if the level was not exceeded."""
     found: dict[str, Any] = {'exceeded_s': crossing.exceeded}
     if crossing.exceeded is None:

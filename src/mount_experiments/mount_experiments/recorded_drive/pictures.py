@@ -17,7 +17,7 @@ from mount_experiments.recorded_drive.evaluation import (
 )
 
 if TYPE_CHECKING:
-    from mount_control.parameters import ControlParameters
+    from mount_control.policy import switched_viscous
     from mount_report.drive.signals import DriveSignals
 
 _LOWEST, _HIGHEST = 0.7, 45.0  # Hz, chosen: what the bands lie in, and no more than a car's sensor has
@@ -51,7 +51,7 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
     return finish(figure, file)
 
 
-def draw_traces(drives: dict[str, DriveSignals], control: ControlParameters, file: Path) -> Path:
+def draw_traces(drives: dict[str, DriveSignals], control: switched_viscous.Parameters, file: Path) -> Path:
     """Draw the whole drive above, the seconds round its largest displacement below."""
     seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
     middle = float(truth.time[np.argmax(np.abs(truth.displacement))])

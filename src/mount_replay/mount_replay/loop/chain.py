@@ -6,6 +6,7 @@ controller from the next sample on.
 
 from mount_bringup.chosen import Parameters, chosen_control, chosen_specimen
 from mount_control.answering import Answer, Answering
+from mount_control.policy.contract import Policy
 from mount_control.sample_watch import Judgement
 from mount_init.coil_temperature import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
@@ -32,6 +33,11 @@ class CoreChain:
     def displacement_range(self) -> float:
         """Displacements (m) up to here are plausible."""
         return self._control.parameters.displacement_range
+
+    @property
+    def policy(self) -> Policy:
+        """The policy of the controller."""
+        return self._control.policy
 
     def take_temperature(self, stamp: int, celsius: float) -> None:
         """Take a coil temperature (degC) of time `stamp` (ns) as it came over the bus."""

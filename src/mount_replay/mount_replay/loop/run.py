@@ -74,7 +74,7 @@ def run_core_into(
     mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
     chain = CoreChain(parameters)
     celsius = _coil_temperature(sim)
-    samples = Samples(_BLOCK)
+    samples = Samples(_BLOCK, chain.policy)
     pending: float | None = None
     begin = time.monotonic()
     while not mount.finished:
@@ -145,7 +145,7 @@ def _take_many(
     assert controller is not None
     ahead = mount.ahead(samples.room)
     part = slice(samples.count, samples.count + len(ahead.values))
-    taken, arrived, last = loop.run(
+    taken, arrived, last = loop.run_with(chain.policy)(
         ahead,
         controller.memory,
         chain.displacement_range,

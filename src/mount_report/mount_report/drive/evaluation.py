@@ -10,7 +10,7 @@ from mount_bags.audit.audit import TopicAudit
 from mount_bags.bag.recording import Recording
 from mount_bags.events.switching_changes import Switching
 from mount_control import band_pass
-from mount_control.parameters import ControlParameters
+from mount_control.policy import switched_viscous
 from mount_models.damper import DamperCurve
 from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.signals import DriveSignals, Seen
@@ -40,7 +40,9 @@ def switching(seen: Seen) -> Switching:
     return Switching(tuple(seen.time[change > 0].tolist()), tuple(seen.time[change < 0].tolist()))
 
 
-def tracking_error(drive: DriveSignals, parameters: ControlParameters, damper: DamperCurve) -> float:
+def tracking_error(
+    drive: DriveSignals, parameters: switched_viscous.Parameters, damper: DamperCurve
+) -> float:
     """Return the rms error of the friction force while damping is on, as a share of the peak wanted force.
 
     NaN if damping was never on.
@@ -54,7 +56,7 @@ def tracking_error(drive: DriveSignals, parameters: ControlParameters, damper: D
 
 
 def wanted_force(
-    drive: DriveSignals, parameters: ControlParameters, damper: DamperCurve
+    drive: DriveSignals, parameters: switched_viscous.Parameters, damper: DamperCurve
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the wanted friction force (N) at the true times, and which of them belongs to each sample.
 
