@@ -10,25 +10,19 @@ from typing import Any, NamedTuple
 
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.settings import defaults_of_nodes
-from mount_control.parameters import ControlParameters
+from mount_control.settings import parameter_sets
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import Quantity, quantities
 from mount_sim.parameters import SimParameters
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'parameters.md'
 README = {'mount_recorder': 'mount_bags'}
-SETS: dict[str, list[tuple[str, NamedTuple]]] = {
+SETS: dict[str, list[tuple[str, Any]]] = {
     'mount_driver': [('', DriverParameters())],
     'mount_sim': [('', SimParameters())],
     'mount_init': [('', InitParameters())],
-    'mount_control': [
-        ('', ControlParameters()),
-        ('friction', FrictionCoefficients()),
-        ('contact', FrictionContact()),
-    ],
+    'mount_control': parameter_sets(),
     'mount_recorder': [('', RecorderParameters())],
 }
 """The parameter sets of each node, behind their prefix."""
