@@ -18,7 +18,7 @@ from mount_sim.parameters import SimParameters
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'parameters.md'
 README = {'mount_recorder': 'mount_bags'}
-SETS: dict[str, list[tuple[str, NamedTuple]]] = {
+SETS: dict[str, list[tuple[str, Any]]] = {
     'mount_driver': [('', DriverParameters())],
     'mount_sim': [('', SimParameters())],
     'mount_init': [('', InitParameters())],
