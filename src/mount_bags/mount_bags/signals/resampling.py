@@ -24,7 +24,7 @@ from mount_bags.signals.plausibility import OVERSHOOT, check_range
 from mount_bags.signals.signal import FloatArray
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import sine_and_cosine
-from mount_models.arithmetic.series import Series, series_of
+from mount_models.arithmetic.series import StreamedSeries, series_of
 
 HALF_LENGTH = 26  # samples of the slower rate
 CUTOFF = 0.45  # of the slower rate, chosen: what is left at its half is as small as the window allows
@@ -35,7 +35,9 @@ _WITHOUT_DOUBT = 0.9  # of what is allowed, chosen: 8 % for what lies between th
 _SAME = 0.1  # samples, chosen: grids that run apart by no more over the whole signal are one
 
 
-def resampled(even: EvenSignal, step_time: float, first: float = 0.0, count: int | None = None) -> Series:
+def resampled(
+    even: EvenSignal, step_time: float, first: float = 0.0, count: int | None = None
+) -> StreamedSeries:
     """Return `count` values `step_time` (s) apart, from `first` (s after the first sample) on.
 
     Without `count` up to before the last sample. A signal that has that step already is not touched. Raises
@@ -47,7 +49,7 @@ def resampled(even: EvenSignal, step_time: float, first: float = 0.0, count: int
         count = max(1, math.ceil(even.length / step_time - 1e-6))
     grid, kernel = _Grid(even.period, first, step_time), _kernel()
     _check(even, grid, count, kernel)
-    return Series(count, lambda begin, behind: _filtered(even.values, grid, begin, behind, kernel))
+    return StreamedSeries(count, lambda begin, behind: _filtered(even.values, grid, begin, behind, kernel))
 
 
 class _Grid(NamedTuple):

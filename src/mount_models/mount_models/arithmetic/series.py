@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Series:
+class StreamedSeries:
     """Numbers (n,) made when a part of them is asked for: `series[first:behind]` is an array.
 
     `make` gives the numbers `first` .. `behind` - 1; each has to be the same to the bit in whatever part.
@@ -23,18 +23,20 @@ class Series:
         first, behind, _ = part.indices(self._count)
         return self._make(first, behind) if first < behind else np.empty(0)
 
-    def cut(self, count: int) -> 'Series':
+    def cut(self, count: int) -> 'StreamedSeries':
         """Return its first numbers, at most `count`."""
-        return Series(min(count, self._count), self._make)
+        return StreamedSeries(min(count, self._count), self._make)
 
 
-def series_of(values: NDArray[np.float64]) -> Series:
+def series_of(values: NDArray[np.float64]) -> StreamedSeries:
     """Return `values` (n,), which are in memory, as a series."""
-    return Series(len(values), lambda first, behind: values[first:behind])
+    return StreamedSeries(len(values), lambda first, behind: values[first:behind])
 
 
 def series_over_time(
     count: int, step_time: float, at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> Series:
+) -> StreamedSeries:
     """Return the series of what `at` gives for the times 0, `step_time`, .. in s."""
-    return Series(count, lambda first, behind: at(step_time * np.arange(first, behind, dtype=np.float64)))
+    return StreamedSeries(
+        count, lambda first, behind: at(step_time * np.arange(first, behind, dtype=np.float64))
+    )

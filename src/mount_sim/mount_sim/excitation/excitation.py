@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_models.arithmetic.elementary import cosines, sines
-from mount_models.arithmetic.series import Series, series_over_time
+from mount_models.arithmetic.series import StreamedSeries, series_over_time
 from mount_models.quantity import checked
 from mount_models.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
 
@@ -30,10 +30,10 @@ class Excitation:
     """
 
     seat: Seat
-    values: Series
+    values: StreamedSeries
     step_time: float
     start: float
-    engine_forces: Series | None = None
+    engine_forces: StreamedSeries | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -78,7 +78,7 @@ def sweep(sweep: Sweep, duration: float, start: float, step_time: float) -> Exci
 
 def idle_force(
     amplitude: float, frequency: float, second_share: float, count: int, step_time: float
-) -> Series:
+) -> StreamedSeries:
     """Return the force (n,) in N of an idling engine: a sine (N, Hz) and a share of twice its frequency."""
 
     def force(time: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from mount_bags.signals.loading import load_signal
 from mount_bags.signals.plausibility import check_size
 from mount_bags.signals.resampling import resampled
 from mount_models.arithmetic.averages import mean
-from mount_models.arithmetic.series import Series
+from mount_models.arithmetic.series import StreamedSeries
 
 LOWEST_RATE = 50.0  # Hz, chosen: 2.5 times the 20 Hz below which the engine moves on its mounts
 LONGEST_GAP = 0.125  # s: one period of the eigenfrequency cannot be interpolated
@@ -24,7 +24,7 @@ def recorded_acceleration(
     return evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
 
 
-def acceleration_at(even: EvenSignal, scale: float, step_time: float) -> Series:
+def acceleration_at(even: EvenSignal, scale: float, step_time: float) -> StreamedSeries:
     """Return the acceleration (n,) in m/s^2 at steps of `step_time` (s), without its mean.
 
     Raises `SignalError`, with the sample, beyond `LARGEST_ACCELERATION`.
@@ -36,4 +36,4 @@ def acceleration_at(even: EvenSignal, scale: float, step_time: float) -> Series:
         'acceleration, or this sample a fault to cut or repair?',
     )  # fmt: skip
     plain = resampled(replace(even, values=values), step_time)
-    return Series(len(plain), lambda first, behind: scale * plain[first:behind])
+    return StreamedSeries(len(plain), lambda first, behind: scale * plain[first:behind])

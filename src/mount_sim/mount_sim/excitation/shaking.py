@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_models.arithmetic.series import Series
+from mount_models.arithmetic.series import StreamedSeries
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.excitation.excitation import Excitation, Seat
 
@@ -48,7 +48,7 @@ class Shaking:
         self._values = self._rows(self._excitation.values, self._afterwards, block)
         self._forces = self._rows(self._excitation.engine_forces, 0.0, block)
 
-    def _rows(self, series: Series | None, afterwards: float, block: int) -> Rows:
+    def _rows(self, series: StreamedSeries | None, afterwards: float, block: int) -> Rows:
         rows = np.zeros((block, self._steps))
         begin, end = (min(max(at - self._first, 0), block) for at in (self.start, self.samples))
         if series is not None and begin < end:
