@@ -6,6 +6,7 @@ from mount_experiments.force_characteristic import experiment as force_character
 from mount_experiments.harness.contract import Experiment, ExperimentError
 from mount_experiments.inductance_map import experiment as inductance_map
 from mount_experiments.motorway_gap import experiment as motorway_gap
+from mount_experiments.policy import experiment as policy
 from mount_experiments.ramp_and_hold import experiment as ramp_and_hold
 from mount_experiments.recorded_drive import experiment as recorded_drive
 from mount_experiments.sawtooth import experiment as sawtooth
@@ -26,6 +27,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         sweep.EXPERIMENT,
         motorway_gap.EXPERIMENT,
         sensitivity.EXPERIMENT,
+        policy.EXPERIMENT,
         recorded_drive.EXPERIMENT,
     )
 }
