@@ -5,6 +5,8 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
+from mount_control.policy.contract import trace_fields
+from mount_control.policy.registry import DEFAULT, POLICIES
 from mount_ros.topics import JOINT_STATE, TOPICS
 
 LAYOUTS = Path(__file__).resolve().parents[2] / 'src' / 'mount_bringup' / 'layouts'
@@ -13,7 +15,12 @@ OTHERS = {'sim/chassis_acceleration': 'linear_acceleration.z', 'sim/mount_force'
 
 def signals() -> set[tuple[str, str]]:
     """Return (topic, name of the scalar or path of the number)."""
-    scalars = {(topic.name, name) for topic in TOPICS if topic.type == JOINT_STATE for name in topic.names}
+    scalars = {
+        (topic.name, scalar.name)
+        for topic in TOPICS
+        if topic.type == JOINT_STATE
+        for scalar in (*topic.scalars, *topic.optional)
+    }
     return scalars | set(OTHERS.items())
 
 
@@ -32,6 +39,7 @@ def test_plotjuggler_s_curves_are_signals_of_a_drive():
 def test_lichtblick_s_paths_are_the_signals_that_their_labels_name():
     layout = json.loads((LAYOUTS / 'lichtblick.json').read_text())
     order = {topic.name: topic.names for topic in TOPICS}
+    order['control_trace'] = tuple(trace_fields(POLICIES[DEFAULT]))
     drawn = 0
     for panel in layout['configById'].values():
         for path in panel['paths']:

@@ -13,7 +13,8 @@ from cantools.database.can import Database
 
 from mount_bringup.graph.nodes import SIMULATED
 from mount_cli.command import app
-from mount_control.controller import TRACE
+from mount_control.policy.contract import trace_fields
+from mount_control.policy.registry import POLICIES
 from mount_driver.codec import DATABASE_FILE
 from mount_models.actuator.closing import ClosingMechanics
 from mount_models.actuator.law import ForceLaw
@@ -73,7 +74,7 @@ def test_interface_lists_every_scalar_with_its_units_and_no_other():
     assert listed == [
         (topic.name, scalar.name, scalar.unit, scalar.derivative_unit)
         for topic in TOPICS
-        for scalar in topic.scalars
+        for scalar in (*topic.scalars, *topic.optional)
     ]
 
 
@@ -104,8 +105,18 @@ def test_only_experiments_use_the_topics_of_the_rack():
     assert using == {'mount_experiments'}
 
 
-def test_control_traces_what_the_registry_declares():
-    assert TRACE.names == CONTROL_TRACE.names
+@pytest.mark.parametrize('policy', POLICIES)
+def test_every_policy_traces_what_the_registry_declares_and_its_own_between(policy):
+    fields = trace_fields(POLICIES[policy])
+    own = POLICIES[policy].TRACE
+    shared = {name: unit for name, unit in fields.items() if name not in own}
+    assert shared == {scalar.name: scalar.unit for scalar in CONTROL_TRACE.scalars}
+    assert list(fields)[2 : 2 + len(own)] == list(own)
+
+
+def test_the_units_of_what_policies_trace_are_known_to_readers():
+    units = {scalar.name: scalar.unit for scalar in CONTROL_TRACE.optional}
+    assert units == {name: unit for policy in POLICIES.values() for name, unit in policy.TRACE.items()}
 
 
 def test_the_plant_gives_what_the_registry_declares():

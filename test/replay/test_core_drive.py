@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mount_bringup.chosen import chosen_damper, control_parameters
+from mount_bringup.chosen import chosen_damper, switched_viscous_parameters
 from mount_bringup.mount_choice import with_control_of_mount
-from mount_control.controller import _STATE
+from mount_control.policy import switched_viscous
+from mount_control.policy.contract import trace_fields
 from mount_models.specimen import default_specimen
 from mount_replay.loop import chain as core_chain
 from mount_replay.loop import run as core_run
@@ -73,7 +74,9 @@ class Recorded:
     @property
     def tracking(self) -> float:
         """Rms error of the friction force as a share of the wanted peak."""
-        return tracking_error(self.drive, control_parameters(self.settings), chosen_damper(self.settings))
+        return tracking_error(
+            self.drive, switched_viscous_parameters(self.settings), chosen_damper(self.settings)
+        )
 
 
 def _run(sim: dict[str, Any], control: dict[str, Any] | None = None) -> Recorded:
@@ -81,6 +84,7 @@ def _run(sim: dict[str, Any], control: dict[str, Any] | None = None) -> Recorded
     wanted = (topics.DISPLACEMENT, topics.CONTROL_TRACE, topics.SIM_TRUTH, topics.CURRENT_SETPOINT)
     rows: dict[str, list[tuple[int, tuple[float, ...]]]] = {topic.name: [] for topic in wanted}
     layouts = {topic.name: ScalarsLayout(topic) for topic in wanted}
+    layouts['control_trace'] = ScalarsLayout(topics.control_trace(trace_fields(switched_viscous)))
 
     def write(topic: Topic, raw: bytes, stamp: int) -> None:
         if topic.name in rows:
@@ -299,11 +303,12 @@ def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
 def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(monkeypatch):
     take_many, poisoned = core_run._take_many, []
 
-    def take_many_and_poison(mount, chain, controller, samples, pending):
+    def take_many_and_poison(mount, chain, samples, pending):
         if mount.time > 5.0 and not poisoned:
-            controller.memory.state.view(_STATE)['band']['z1'] = np.nan
+            controller = chain.answering.controller
+            controller.memory.state.view(controller.compiled.state)['policy']['band']['z1'] = np.nan
             poisoned.append(mount.sample)
-        return take_many(mount, chain, controller, samples, pending)
+        return take_many(mount, chain, samples, pending)
 
     monkeypatch.setattr(core_run, '_take_many', take_many_and_poison)
     recorded = _run(BENCH)

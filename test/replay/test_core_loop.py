@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_replay.loop.chain import CoreChain
+from mount_control.answering import Answering
 from mount_replay.loop.run import run_core
 from mount_ros import topics
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
@@ -31,7 +31,7 @@ def messages_of(case):
 @pytest.mark.parametrize('case', CASES)
 def test_many_samples_at_once_are_those_taken_one_by_one(case, monkeypatch):
     _, at_once = messages_of(case)
-    monkeypatch.setattr(CoreChain, 'expects', lambda self, stamp: False)
+    monkeypatch.setattr(Answering, 'expects', lambda self, stamp: False)
     _, one_by_one = messages_of(case)
     assert at_once == one_by_one
 

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from std_msgs.msg import String
 
+from mount_bringup.chosen import chosen_control
 from mount_bringup.graph.supervisor import session_text
 from mount_control.controller import ControlLaw
-from mount_control.force_to_current import resample
-from mount_control.parameters import ControlParameters
-from mount_models.damper import damper_curve
 from mount_replay.loop import recording as core_recording
 from mount_replay.loop import run as core_run
 from mount_replay.loop.chain import CoreChain
@@ -32,14 +30,14 @@ def changed_drive(tmp_path_factory):
     take_many, run_core = core_run._take_many, core_recording.run_core
     values = {'damper': 'viscous_2000'}
 
-    def take_many_and_change(mount, chain, controller, samples, pending):
+    def take_many_and_change(mount, chain, samples, pending):
         stamp = mount.sample * 1_000_000
         if len(told) < len(CHANGES) and stamp >= CHANGES[len(told)][0] * 1e9:
             _, _, changes = CHANGES[len(told)]
             values.update({name: new for name, (_, new) in changes.items()})
-            controller.change(_law(chain, values))
+            chain.answering.controller.change(_law(chain, values))
             told.append((stamp, dated(stamp, change_text('mount_control', changes))))
-        return take_many(mount, chain, controller, samples, pending)
+        return take_many(mount, chain, samples, pending)
 
     def run_core_and_tell(parameters, write, *arguments):
         outcome = run_core(parameters, write, *arguments)
@@ -56,10 +54,8 @@ def changed_drive(tmp_path_factory):
 
 
 def _law(chain: CoreChain, values):
-    numbers = {name: value for name, value in values.items() if name != 'damper'}
-    table = resample(*chain.result.table, chain.result.offset_current, 3.0)
-    settings, damper = ControlParameters(**numbers), damper_curve(values['damper'])
-    return ControlLaw(settings, damper, chain._friction, chain._contact, table)
+    settings = chosen_control({'mount_control': values})
+    return ControlLaw(settings, settings.table(*chain.result.table, chain.result.offset_current))
 
 
 def test_the_replay_changes_them_at_the_same_samples_to_the_bit(changed_drive):

@@ -71,7 +71,7 @@ def test_both_mounts_are_compared_under_their_own_names(car):
 
 def test_a_recording_of_two_mounts_equals_itself(car):
     assert sentences(compare(car('a'), car('b'))) == [
-        'everything is equal to the bit (40 signals of 8 topics)'
+        'everything is equal to the bit (32 signals of 8 topics)'
     ]
 
 

@@ -1,5 +1,7 @@
 """Marks: their text, and those that the recorder sets by itself."""
 
+import math
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hypothesis import given, settings
@@ -105,6 +107,13 @@ def test_switching_on_is_marked_each_time_and_switching_off_is_not(marks, sent):
     for stamp, active in enumerate((0.0, 1.0, 1.0, 0.0, 1.0)):
         watch.add(stamp, active, 4.2e-4)
     assert sent == [Mark(time, 'switch_on', 'damping on at 0.42 mm in the band') for time in (1, 4)]
+
+
+def test_damping_that_goes_on_step_by_step_is_marked_once_and_needs_no_magnitude(marks, sent):
+    watch = SwitchOnWatch(marks)
+    for stamp, active in enumerate((0.0, 0.1, 0.7, 1.0, 0.4)):
+        watch.add(stamp, active, math.nan)
+    assert sent == [Mark(1, 'switch_on', 'damping on')]
 
 
 def status(name, level, message=''):

@@ -3,13 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from mount_control.identified import check_fits, identified
-from mount_control.parameters import DEFAULT_DAMPER, ControlParameters, checked_parameters
+from mount_control.parameters import ControlParameters
+from mount_control.policy import switched_viscous
+from mount_control.settings import ControlSettings, control_settings, policy_parameters
 from mount_models.damper import DamperCurve, damper_curve
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.coefficient_check import check_friction
-from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import Specimen
 from mount_models.specimen import chosen_specimen as specimen_of
 
@@ -18,13 +17,24 @@ Parameters = Mapping[str, Mapping[str, Any]]
 
 
 def control_parameters(parameters: Parameters) -> ControlParameters:
-    """Return the controller's parameters of a run."""
-    return checked_parameters(with_flattened(ControlParameters(), parameters.get('mount_control', {})))
+    """Return the controller's parameters of a run that every policy has."""
+    return with_flattened(ControlParameters(), parameters.get('mount_control', {}))
+
+
+def check_policy(parameters: Parameters) -> None:
+    """Refuse what the chosen policy cannot work with; raises a `ValueError`."""
+    policy, own = policy_parameters(parameters.get('mount_control', {}))
+    policy.design(own, SAMPLE_TIME)
+
+
+def switched_viscous_parameters(parameters: Parameters) -> switched_viscous.Parameters:
+    """Return the parameters of the paper's policy in a run, whether it is chosen or not."""
+    return with_flattened(switched_viscous.Parameters(), parameters.get('mount_control', {}))
 
 
 def chosen_damper(parameters: Parameters) -> DamperCurve:
-    """Return the damper characteristic of a run."""
-    return damper_curve(parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER))
+    """Return the damper characteristic of the paper's policy in a run."""
+    return damper_curve(switched_viscous_parameters(parameters).damper)
 
 
 def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specimen:
@@ -33,11 +43,6 @@ def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specime
     return specimen_of(values.get('parameters_file', ''), values.get('specimen', ''))
 
 
-def friction_model(parameters: Parameters) -> tuple[FrictionCoefficients, FrictionContact]:
-    """Return what the controller of a run assumes of the friction; a `ValueError` says what cannot be."""
-    specimen, control = chosen_specimen(parameters, 'mount_control'), parameters.get('mount_control', {})
-    check_fits(control_parameters(parameters), specimen)
-    friction = identified(specimen, FrictionCoefficients(), control, 'friction')
-    contact = identified(specimen, FrictionContact(), control, 'contact')
-    check_friction(friction, contact)
-    return friction, contact
+def chosen_control(parameters: Parameters) -> ControlSettings:
+    """Return what the controller of a run is set up with; a `ValueError` says what cannot be."""
+    return control_settings(parameters.get('mount_control', {}), chosen_specimen(parameters, 'mount_control'))

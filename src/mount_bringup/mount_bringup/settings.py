@@ -8,12 +8,10 @@ from typing import Any
 import yaml
 
 from mount_bags.recorder.parameters import RecorderParameters
-from mount_control.parameters import DEFAULT_DAMPER, ControlParameters
+from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, flattened
 from mount_sim.parameters import SimParameters
 
@@ -28,14 +26,7 @@ def defaults_of_nodes() -> dict[str, dict[str, Any]]:
         'mount_driver': flattened(DriverParameters()),
         'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0},
         'mount_init': {**flattened(InitParameters()), 'parameters_file': '', 'specimen': ''},
-        'mount_control': {
-            **flattened(ControlParameters()),
-            **flattened(FrictionCoefficients(), 'friction'),
-            **flattened(FrictionContact(), 'contact'),
-            'damper': DEFAULT_DAMPER,
-            'parameters_file': '',
-            'specimen': '',
-        },
+        'mount_control': control.defaults(),
         'mount_recorder': flattened(RecorderParameters()),
     }
 

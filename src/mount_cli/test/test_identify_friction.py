@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mount_bags.run.place import recording_hash
-from mount_bringup.chosen import friction_model
+from mount_bringup.chosen import chosen_control
 from mount_cli.command import main
 from mount_cli.commands.identify_arguments import with_repeated_options
 from mount_experiments.harness.rack_recording import record_friction_rack
@@ -97,9 +97,9 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
     for names, matrix in told['covariance'].items():
         assert np.shape(matrix) == (len(names.split(', ')),) * 2
         assert (np.diag(matrix) >= 0.0).all()
-    drive = friction_model({'mount_control': {'parameters_file': str(tmp_path / 'f.yaml')}})
-    assert drive[0]._asdict() == pytest.approx(result['coefficients'])
-    assert drive[1]._asdict() == pytest.approx(result['contact'])
+    drive = chosen_control({'mount_control': {'parameters_file': str(tmp_path / 'f.yaml')}})
+    assert drive.friction._asdict() == pytest.approx(result['coefficients'])
+    assert drive.contact._asdict() == pytest.approx(result['contact'])
     assert (tmp_path / 'f.png').stat().st_size > 10_000
 
 

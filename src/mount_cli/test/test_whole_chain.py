@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mount_bringup.chosen import chosen_damper, control_parameters, friction_model
+from mount_bringup.chosen import chosen_control, chosen_damper, switched_viscous_parameters
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
@@ -115,7 +115,7 @@ def tracking(seed, file):
         zero=zero,
     )
     assert active.mean() > 0.3
-    return tracking_error(drive, control_parameters(settings), chosen_damper(settings))
+    return tracking_error(drive, switched_viscous_parameters(settings), chosen_damper(settings))
 
 
 def step_errors(seed, file):
@@ -183,9 +183,9 @@ def test_a_drawn_actuator_with_drawn_pads_is_controlled_by_its_identified_files_
 
 
 def test_the_controller_takes_contact_and_coefficients_from_the_file(file):
-    taken = friction_model({'mount_control': {'parameters_file': str(file), 'specimen': 'drawn'}})
+    taken = chosen_control({'mount_control': {'parameters_file': str(file), 'specimen': 'drawn'}})
     told = load_specimen(file).friction
-    assert {**taken[0]._asdict(), **taken[1]._asdict()} == told
+    assert {**taken.friction._asdict(), **taken.contact._asdict()} == told
     for name, usual in FrictionContact()._asdict().items():
         assert told[name] != pytest.approx(usual, rel=0.04)  # a default that stood in would be seen
 

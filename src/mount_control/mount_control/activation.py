@@ -1,58 +1,57 @@
-"""Whether a current-force table belongs to this activation of the mount."""
+"""What mount_init left of an activation, as its two messages bring it one after the other."""
 
-from dataclasses import dataclass
+import threading
+import time
+from typing import Any, NamedTuple, Protocol
 
 from mount_control.force_to_current import ForceTableError
+from mount_control.sample_watch import SampleWatch
 
-_STREAM_BREAK = 1_000_000_000  # ns, chosen: a longer silence may have been a loss of power
-
-
-@dataclass
-class MeasurementStream:
-    """Knows since when the displacement has come without a break, by its stamps."""
-
-    start: int | None = None
-    last: int | None = None
-
-    def note(self, stamp: int) -> None:
-        """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
-        if self.last is None or abs(stamp - self.last) > _STREAM_BREAK:
-            self.start = self.last = stamp
-        elif stamp > self.last:
-            self.last = stamp
-
-    def holds(self, stamp: int) -> bool:
-        """Whether the samples have come without a break from `stamp` (ns) until now."""
-        return self.start is not None and self.last is not None and self.start <= stamp <= self.last
+_PATIENCE = 1.0  # s, chosen: latched messages may still be under way when control is activated
+_LOOK_PERIOD = 0.01  # s
 
 
-def check_belongs(table_stamp: int | None, air_gap_stamp: int | None, stream: MeasurementStream) -> None:
-    """Raise `ForceTableError` unless the table was measured on the present uninterrupted measurement stream.
+class Table(Protocol):
+    """`stamp` (ns) of its air_gap, `current` (A) over `normal_force` (N), both (n,)."""
 
-    Pads wear and the car is assembled anew, so a table from before a loss of power is not valid.
-    """
-    remedy = 'activate mount_init (again)'
-    if table_stamp is None or air_gap_stamp is None:
-        missing = 'current_force_table' if table_stamp is None else 'air_gap'
-        raise ForceTableError(f'no {missing} was received; {remedy}')
-    if table_stamp != air_gap_stamp:
-        raise ForceTableError(
-            f'current_force_table (activation {_seconds(table_stamp)}) and air_gap '
-            f'(activation {_seconds(air_gap_stamp)}) are of different activations; {remedy}'
-        )
-    if stream.start is None or stream.last is None:
-        raise ForceTableError('no displacement was received; activate mount_driver first')
-    if table_stamp < stream.start:
-        raise ForceTableError(
-            f'current_force_table is of {_seconds(table_stamp)}, but the measurements restarted at '
-            f'{_seconds(stream.start)}; {remedy}'
-        )
-    if table_stamp > stream.last:
-        raise ForceTableError(
-            f'current_force_table is of {_seconds(table_stamp)}, but the newest displacement is of '
-            f'{_seconds(stream.last)}: the time of the measurements went back, or they stand still; {remedy}'
-        )
+    @property
+    def stamp(self) -> int: ...
+
+    @property
+    def current(self) -> Any: ...
+
+    @property
+    def normal_force(self) -> Any: ...
 
 
-def _seconds(stamp: int) -> str:
-    return f'{stamp / 1e9:.3f} s'
+class AirGap(NamedTuple):
+    """What the controller needs of an air_gap: its stamp in ns and the offset current in A."""
+
+    stamp: int
+    offset_current: float
+
+
+class Activation:
+    """The newest table and air_gap; None where none has come."""
+
+    def __init__(self) -> None:
+        self.table: Table | None = None
+        self.air_gap: AirGap | None = None
+
+    def wait(self, watch: SampleWatch, ending: threading.Event) -> tuple[Table, AirGap]:
+        """Return both as soon as they belong to the measurements that `watch` sees.
+
+        Raises `ForceTableError` when they do not within a second, or when `ending` is set.
+        """
+        limit = time.monotonic() + _PATIENCE
+        while True:
+            table, air_gap = self.table, self.air_gap
+            try:
+                watch.check_belongs(table.stamp if table else None, air_gap.stamp if air_gap else None)
+            except ForceTableError:
+                if time.monotonic() > limit or ending.wait(_LOOK_PERIOD):
+                    raise
+                continue
+            assert table is not None
+            assert air_gap is not None
+            return table, air_gap

@@ -1,87 +1,49 @@
-"""From a displacement sample to a coil current: the control of Fig. 12 in reading order."""
+"""From a displacement sample to a coil current: a policy says which force, the force maker makes it.
 
+The step in reading order is `_advance`; around it is what no policy need care for. It is compiled once for
+each policy, with the policy's own functions and records in it.
+"""
+
+import functools
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_control import band_pass, force_to_current, switching
-from mount_control.parameters import ControlParameters, checked_parameters
-from mount_models.arithmetic.compiled import compiled
+from mount_control import force_maker, force_to_current
+from mount_control.policy.contract import Policy, trace_dtype, trace_fields
+from mount_control.settings import ControlSettings
+from mount_models.arithmetic.compiled import compiled, specialised
 from mount_models.arithmetic.record import record_bytes, record_dtype
-from mount_models.damper import DamperCurve, damper_force
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.coefficient_check import check_friction
-from mount_models.friction.contact import FrictionContact
-from mount_models.friction.simplified import normal_force_for, simplified_step
 from mount_models.sampling import SAMPLE_TIME
 
-FADE_SAMPLES = 50
-"""Samples (chosen, 50 ms) in which the current goes over to a new law: first it stands for a sample, and its
-distance from what the new law asks for then falls evenly to zero."""
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
-
-TRACE = np.dtype(
-    [
-        (name, 'f8')
-        for name in (
-            'displacement',
-            'velocity',
-            'band_displacement',
-            'band_velocity',
-            'predicted_velocity',
-            'magnitude',
-            'damping_active',
-            'desired_force',
-            'friction_deflection',
-            'friction_coefficient',
-            'normal_force',
-            'current',
-            'bridged_samples',
-        )
-    ]
-)
-"""Every intermediate of one control step, SI; the fields of the topic `control_trace` in its order."""
-
-_STATE = np.dtype(
-    [
-        ('band', band_pass.STATE),
-        ('switching', switching.STATE),
-        ('displacement', 'f8'),
-        ('deflection', 'f8'),
-        ('normal_force', 'f8'),
-        ('current', 'f8'),
-        ('distance', 'f8'),
-        ('fading', 'i8'),
-        ('faults', 'i8'),
-    ]
-)
+_EXPONENT = 0x7FF0000000000000  # bits that are all set where a float64 is no finite number
 
 
-class Law(NamedTuple):
-    """The numbers that a control step needs and does not change."""
+class Compiled(NamedTuple):
+    """The controller with one policy: types of its records, and its compiled functions."""
 
-    band: band_pass.BandPass
-    switching: switching.Switching
-    damper_step: float
-    friction: FrictionCoefficients
-    contact: FrictionContact
-    limits: force_to_current.CurrentLimits
-
-
-_LAW = record_dtype(Law)
+    law: type[NamedTuple]
+    state: np.dtype
+    trace: np.dtype
+    start: Callable[..., None]
+    transfer: Callable[..., None]
+    step: Callable[..., float]
+    run: Callable[..., None]
 
 
 class Tables(NamedTuple):
-    """The tables that a control step looks up: damper force (N) over velocity, current (A) over force."""
+    """The tables that a control step looks up: that of the policy, and current (A) over normal force."""
 
-    damper: NDArray[np.float64]
+    policy: NDArray[np.float64]
     current: NDArray[np.float64]
 
 
 class Memory(NamedTuple):
-    """The first arguments of the compiled `step`: bytes of law and state, tables, window of the magnitude."""
+    """The first arguments of the compiled `step`: bytes of law and state, tables, window of the policy."""
 
     law: NDArray[np.uint8]
     tables: Tables
@@ -90,50 +52,26 @@ class Memory(NamedTuple):
 
 
 class ControlLaw:
-    """All that a control step needs and does not change, checked: made beforehand, taken between steps."""
+    """All that a control step needs and does not change: made beforehand, taken by one controller."""
 
-    def __init__(
-        self,
-        parameters: ControlParameters,
-        damper: DamperCurve,
-        friction: FrictionCoefficients,
-        contact: FrictionContact,
-        table: force_to_current.CurrentTable,
-    ):
-        parameters = checked_parameters(parameters)
-        check_friction(friction, contact)
-        law = Law(
-            band_pass.design(
-                parameters.eigenfrequency, parameters.quality, parameters.lead_time, SAMPLE_TIME
-            ),
-            switching.chosen_switching(parameters),
-            damper.velocity_step,
-            friction,
-            contact,
-            table.limits,
-        )
-        self.record = record_bytes(law)
-        self.tables = Tables(damper.table, table.currents)
-        self.window = np.zeros(parameters.period_samples)
+    def __init__(self, settings: ControlSettings, table: force_to_current.CurrentTable):
+        self.compiled = compiled_with(settings.policy)
+        maker = force_maker.Law(settings.friction, settings.contact, table.limits, SAMPLE_TIME)
+        self.record = record_bytes(self.compiled.law(settings.design.law, maker))
+        self.tables = Tables(settings.design.table, table.currents)
+        self.window = np.zeros(settings.design.window)
 
 
 class Controller:
     """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
 
-    def __init__(
-        self,
-        parameters: ControlParameters,
-        damper: DamperCurve,
-        friction: FrictionCoefficients,
-        contact: FrictionContact,
-        table: force_to_current.CurrentTable,
-    ):
-        law = ControlLaw(parameters, damper, friction, contact, table)
+    def __init__(self, law: ControlLaw):
+        self.compiled = law.compiled
         self._law, self._tables, self._window = law.record, law.tables, law.window
-        self._state = np.zeros(1, _STATE).view(np.uint8)
-        self._state_record = self._state.view(_STATE)[0]
-        self._trace = np.zeros(1, TRACE).view(np.uint8)
-        self._trace_record = self._trace.view(TRACE)[0]
+        self._state = np.zeros(1, self.compiled.state).view(np.uint8)
+        self._state_record = self._state.view(self.compiled.state)[0]
+        self._trace = np.zeros(1, self.compiled.trace).view(np.uint8)
+        self._trace_record = self._trace.view(self.compiled.trace)[0]
         self.restart(0.0)
 
     @property
@@ -158,15 +96,15 @@ class Controller:
 
     def restart(self, displacement: float) -> None:
         """Forget the past: a mount at rest at `displacement` (m), damping off."""
-        start(self._law, self._state, self._window, displacement)
+        self.compiled.start(self._law, self._state, self._window, displacement)
 
     def change(self, law: ControlLaw) -> None:
-        """Go on with another law, from the next sample on and without a jump; a law is taken once.
+        """Go on with another law of the same policy, from the next sample on and without a jump.
 
-        The band-pass goes on from the same last samples, magnitude and switching keep their past, and where
-        damping is on the current goes over to what the new law asks for within `FADE_SAMPLES`.
+        The policy carries its memory over, and where damping is on the current goes over to what the new law
+        asks for within `force_maker.FADE_SAMPLES`.
         """
-        transfer(self._law, law.record, self._state, self._window, law.window)
+        self.compiled.transfer(self._law, law.record, self._state, self._window, law.window)
         self._law, self._tables, self._window = law.record, law.tables, law.window
 
     def step(self, displacement: float, bridged_samples: int = 0) -> float:
@@ -177,7 +115,7 @@ class Controller:
         memory itself holds what is no finite number, the answer is 0 A, it is cleared as by `restart`, and
         that is counted in `faults`.
         """
-        return step(
+        return self.compiled.step(
             self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
         )
 
@@ -186,184 +124,146 @@ class Controller:
     ) -> NDArray[np.void]:
         """Take n displacement samples in m and return n traces; bit-identical to n calls of `step`.
 
-        They are written into `traces`, n records `TRACE` in a row, where it is given.
+        They are written into `traces`, n records `compiled.trace` in a row, where it is given.
         """
         if traces is None:
-            traces = np.zeros(len(displacement), TRACE)
+            traces = np.zeros(len(displacement), self.compiled.trace)
         samples = np.ascontiguousarray(displacement, dtype=float)
-        run(self._law, self._tables, self._state, self._window, traces.view(np.uint8), samples)
+        self.compiled.run(self._law, self._tables, self._state, self._window, traces.view(np.uint8), samples)
         return traces
 
 
-def load_compiled_law(
-    parameters: ControlParameters,
-    damper: DamperCurve,
-    friction: FrictionCoefficients,
-    contact: FrictionContact,
-) -> None:
+def load_compiled_law(settings: ControlSettings) -> None:
     """Run the compiled law once, so that the first sample need not wait for the compiler."""
     table = force_to_current.resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
-    controller = Controller(parameters, damper, friction, contact, table)
+    controller = Controller(ControlLaw(settings, table))
     controller.step(0.0)
-    controller.change(ControlLaw(parameters, damper, friction, contact, table))
+    controller.run(np.zeros(1))
+    controller.change(ControlLaw(settings, table))
 
 
-@compiled
-def transfer(law, new_law, state, window, new_window):
+@functools.cache
+def compiled_with(policy: Policy) -> Compiled:
+    """Return the controller compiled with a policy; compiled on the first call of each function."""
+    law = NamedTuple('law', [('policy', policy.Law), ('maker', force_maker.Law)])  # noqa: UP014
+    state = np.dtype(
+        [('policy', policy.STATE), ('maker', force_maker.STATE), ('displacement', 'f8'), ('faults', 'i8')]
+    )
+    trace = trace_dtype(policy)
+    bound: dict[str, Any] = {'policy': policy, 'LAW': record_dtype(law), 'STATE': state, 'TRACE': trace}
+    bound['FIELDS'] = len(trace_fields(policy))
+    for function in (_rest, _refuse, _clear, _advance, _step, _start, _transfer, _single, _run):
+        bound[function.__name__] = specialised(function, policy.__name__, bound)
+    functions = (bound[name] for name in ('_start', '_transfer', '_single', '_run'))
+    return Compiled(law, state, trace, *functions)
+
+
+# What follows is compiled for each policy, with these names as `compiled_with` binds them.
+
+policy: Any = None
+LAW = STATE = TRACE = np.dtype([])
+FIELDS = 0  # of a trace
+
+
+def _start(law, state, window, displacement):
+    """Set the memory to a mount at rest at `displacement` (m), damping off; arguments as for `_single`."""
+    _rest(law.view(LAW)[0], state.view(STATE)[0], window, displacement)
+
+
+def _transfer(law, new_law, state, window, new_window):
     """Make the memory of one law that of a new one; arguments are the bytes of records and two windows."""
-    memory = state.view(_STATE)[0]
-    band_pass.transfer(law.view(_LAW)[0].band, new_law.view(_LAW)[0].band, memory.band)
-    switching.transfer(memory.switching, window, new_window)
-    memory.fading = FADE_SAMPLES if memory.switching.active == 1 else 0
+    memory = state.view(STATE)[0]
+    policy.transfer(law.view(LAW)[0].policy, new_law.view(LAW)[0].policy, memory.policy, window, new_window)
+    force_maker.begin_fade(memory.maker)
 
 
-@compiled
-def start(law, state, window, displacement):
-    """Set the memory to a mount at rest at `displacement` (m), damping off; arguments as for `step`."""
-    _rest(law.view(_LAW)[0], state.view(_STATE)[0], window, displacement)
-
-
-@compiled
-def _rest(law, state, window, displacement):
-    band_pass.settle(law.band, state.band, displacement)
-    switching.rest(state.switching, window)
-    state.displacement = displacement
-    state.deflection = 0.0
-    state.normal_force = 0.0
-    state.current = 0.0
-    state.fading = 0
-    state.distance = 0.0
-
-
-@compiled
-def step(law, tables, state, window, trace, displacement, bridged_samples):
+def _single(law, tables, state, window, trace, displacement, bridged_samples):
     """Take one displacement sample (m), fill `trace`, return the current setpoint in A.
 
     `law`, `state` and `trace` are the bytes of their records.
     """
-    return _step(
-        law.view(_LAW)[0],
-        tables,
-        state.view(_STATE)[0],
-        window,
-        trace.view(TRACE)[0],
-        displacement,
-        bridged_samples,
-    )
+    records = law.view(LAW)[0], state.view(STATE)[0], trace.view(TRACE)[0]
+    return _step(records, tables, state.view(np.int64), window, trace, 0, displacement, bridged_samples)
 
 
-@compiled
-def run(law, tables, state, window, traces, displacements):
-    """Fill `traces` with one step for each displacement; arguments as for `step`."""
-    law_record, state_record, trace_records = law.view(_LAW)[0], state.view(_STATE)[0], traces.view(TRACE)
+def _run(law, tables, state, window, traces, displacements):
+    """Fill `traces` with one step for each displacement; arguments as for `_single`."""
+    law_record, state_record, trace_records = law.view(LAW)[0], state.view(STATE)[0], traces.view(TRACE)
+    bits = state.view(np.int64)
     for index in range(len(displacements)):
-        _step(law_record, tables, state_record, window, trace_records[index], displacements[index], 0)
+        records = law_record, state_record, trace_records[index]
+        _step(records, tables, bits, window, traces, index, displacements[index], 0)
 
 
-@compiled
-def _step(law, tables, state, window, trace, displacement, bridged_samples):
+def _step(records, tables, bits, window, traces, index, displacement, bridged_samples):
+    """Take one sample; `bits` are those of the state, the trace stands at `index` in the bytes `traces`."""
+    law, state, trace = records
     if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
-        return _refuse(trace, displacement)
-    if not math.isfinite(_sum_of_memory(state)):
-        return _clear(law, state, window, trace, displacement)
+        return _refuse(trace, traces, index, displacement)
+    if not _all_finite(bits):
+        return _clear(records, window, traces, index, displacement)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
         _advance(law, tables, state, window, trace, state.displacement + rise)
     trace.bridged_samples = bridged_samples
-    current = _advance(law, tables, state, window, trace, displacement)
-    if not math.isfinite(_sum_of_memory(state) + trace.predicted_velocity + trace.desired_force + current):
-        return _clear(law, state, window, trace, displacement)
-    return current
+    sound = _advance(law, tables, state, window, trace, displacement)
+    if not (sound and _all_finite(bits)):
+        return _clear(records, window, traces, index, displacement)
+    return trace.current
 
 
-@compiled
-def _sum_of_memory(state):
-    """Return a sum that is a finite number only where all numbers of the memory are."""
-    band, magnitude = state.band, state.switching.magnitude
-    filters = band.z1 + band.z2 + band.displacement + band.earlier + state.displacement
-    answer = state.normal_force + state.current + state.distance
-    return filters + magnitude + state.deflection + answer
+def _advance(law, tables, state, window, trace, displacement):
+    """Take one sample; return whether what came out are finite numbers."""
+    trace.displacement = displacement
+    trace.velocity = (displacement - state.displacement) / law.maker.sample_time
+    state.displacement = displacement
+
+    force, velocity, active = policy.step(
+        law.policy, tables.policy, state.policy, window, trace, displacement
+    )
+    normal_force, coefficient, current = force_maker.make(
+        law.maker, tables.current, state.maker, force, velocity, active
+    )
+
+    trace.damping_active = active
+    trace.desired_force = force
+    trace.friction_deflection = state.maker.deflection
+    trace.friction_coefficient = coefficient
+    trace.normal_force = normal_force
+    trace.current = current
+    return 0.0 <= active <= 1.0 and math.isfinite(force + velocity + current)
 
 
-@compiled
-def _clear(law, state, window, trace, displacement):
+def _rest(law, state, window, displacement):
+    policy.start(law.policy, state.policy, window, displacement)
+    force_maker.rest(state.maker)
+    state.displacement = displacement
+
+
+def _clear(records, window, traces, index, displacement):
     """Begin afresh with a memory that was spoiled: whatever has done it, no current is made of it."""
+    law, state, trace = records
     _rest(law, state, window, displacement)
     state.faults += 1
-    return _refuse(trace, displacement)
+    return _refuse(trace, traces, index, displacement)
 
 
-@compiled
-def _refuse(trace, displacement):
+def _refuse(trace, traces, index, displacement):
+    """Trace that nothing is known of a step, and 0 A."""
+    traces.view(np.float64)[index * FIELDS : (index + 1) * FIELDS] = np.nan
     trace.displacement = displacement
-    trace.velocity = np.nan
-    trace.band_displacement = np.nan
-    trace.band_velocity = np.nan
-    trace.predicted_velocity = np.nan
-    trace.magnitude = np.nan
-    trace.damping_active = 0
+    trace.damping_active = 0.0
     trace.desired_force = 0.0
-    trace.friction_deflection = np.nan
-    trace.friction_coefficient = np.nan
     trace.normal_force = 0.0
     trace.current = 0.0
-    trace.bridged_samples = 0
+    trace.bridged_samples = 0.0
     return 0.0
 
 
 @compiled
-def _advance(law, tables, state, window, trace, displacement):
-    trace.displacement = displacement
-    trace.velocity = (displacement - state.displacement) / law.band.sample_time
-    state.displacement = displacement
-
-    banded, velocity, predicted = band_pass.step(law.band, state.band, displacement)
-    magnitude, active = switching.step(law.switching, state.switching, window, banded)
-
-    desired, coefficient, current = 0.0, np.nan, 0.0
-    if active == 1:
-        desired = damper_force(tables.damper, law.damper_step, predicted)
-        force, coefficient = _normal_force(law, tables, state, desired, predicted)
-        current = _faded(law, state, force_to_current.current_for(tables.current, law.limits, force))
-    else:
-        force = 0.0
-        state.fading = 0
-    state.current = current
-    _, state.deflection, _ = simplified_step(
-        law.contact, law.friction, state.deflection, predicted, force, law.band.sample_time
-    )
-    state.normal_force = force
-
-    trace.band_displacement = banded
-    trace.band_velocity = velocity
-    trace.predicted_velocity = predicted
-    trace.magnitude = magnitude
-    trace.damping_active = active
-    trace.desired_force = desired
-    trace.friction_deflection = state.deflection
-    trace.friction_coefficient = coefficient
-    trace.normal_force = force
-    trace.current = current
-    return current
-
-
-@compiled
-def _faded(law, state, wanted):
-    """Return the current (A) instead of the `wanted` one, beside it for a while after a change of the law."""
-    if state.fading == 0:
-        return wanted
-    if state.fading == FADE_SAMPLES:
-        state.distance = state.current - wanted
-    current = wanted + state.distance * state.fading / FADE_SAMPLES
-    state.fading -= 1
-    return min(max(current, law.limits.offset_current), law.limits.highest_current)
-
-
-@compiled
-def _normal_force(law, tables, state, desired, velocity):
-    """Return (normal force N, friction coefficient) that make the wanted force, within the table."""
-    direction = -1.0 if velocity < 0.0 else 1.0
-    force, coefficient = normal_force_for(
-        law.friction, desired, velocity, direction * state.deflection, state.normal_force
-    )
-    return min(force, force_to_current.highest_force(tables.current)), coefficient
+def _all_finite(bits):
+    """Return whether `bits` are those of finite float64, and of int64 that are not negative."""
+    spoiled = 0
+    for place in range(len(bits)):  # without a branch, so that several are looked at in one instruction
+        spoiled |= (bits[place] & _EXPONENT) == _EXPONENT
+    return spoiled == 0

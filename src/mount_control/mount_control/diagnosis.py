@@ -21,6 +21,7 @@ class ControlFigures:
     last_stamp: int | None  # ns
     faults: int = 0  # times that the controller's memory held what is no finite number
     last_fault: int = 0  # stamp of the last such sample, ns
+    policy: str = ''
     damper: str = ''
     parameter_changes: int = 0  # since the node was configured
 
@@ -40,6 +41,7 @@ def verdict(figures: ControlFigures) -> Verdict:
         'step_median_us': f'{1e6 * figures.step_median:.0f}',
         'step_p99_us': f'{1e6 * figures.step_p99:.0f}',
         'last_stamp': figures.last_stamp,
+        'policy': figures.policy,
         'damper': figures.damper,
         'parameter_changes': figures.parameter_changes,
     }

@@ -1,10 +1,23 @@
-"""Judges each displacement sample before the controller sees it: late, missing, repeated, not believable."""
+"""Judges each displacement sample by its stamp before the controller sees it; knows no clock."""
 
 import math
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_control.force_to_current import ForceTableError
+from mount_models.sampling import SAMPLE_TIME
+
 _NANOSECONDS = 1e9
+_PERIOD = round(SAMPLE_TIME * _NANOSECONDS)
+_STREAM_BREAK = 1_000_000_000  # ns, chosen: a longer silence may have been a loss of power
+
+INTERRUPTED = (
+    'the measurements were interrupted for more than 1 s since the table was made, or their time '
+    'went back; deactivate mount_control and activate mount_init again'
+)
 
 
 class Judgement(Enum):
@@ -12,8 +25,11 @@ class Judgement(Enum):
 
     USE = 'use'
     RESTART = 'restart'  # usable, but the past is too far away to be continued
-    IGNORE = 'ignore'  # repeated or out of order: already answered
     INVALID = 'invalid'  # NaN or beyond the sensor's range: answered with 0 A
+    INTERRUPTED = 'interrupted'  # the table may be of another state of the mount: answered with 0 A
+    IGNORE = 'ignore'  # repeated or out of order: already answered
+    EARLY = 'early'  # not after the activation: mount_init answers
+    INACTIVE = 'inactive'  # nobody asked for an answer
 
 
 @dataclass
@@ -28,33 +44,105 @@ class SampleCounts:
 
 
 class SampleWatch:
-    """Follows the stamps of the samples; knows no clock."""
+    """Knows since when the displacement has come without a break, and what to do with its next sample.
 
-    def __init__(self, sample_time: float, longest_bridge: float, displacement_range: float):
-        self._period = round(sample_time * _NANOSECONDS)
-        self._longest = round(longest_bridge * _NANOSECONDS)
-        self._range = displacement_range
+    `first` and `last` are the stamps (ns) between which it came so, None before the first sample.
+    """
+
+    def __init__(self) -> None:
+        self.first: int | None = None
+        self.last: int | None = None
+        self.interrupted = False  # since the activation
         self.counts = SampleCounts()
-        self.last_stamp: int | None = None
+        self._used: int | None = None  # stamp of the last sample that the controller took, ns
+        self._activation = 0  # ns
+        self._longest_bridge = 0  # ns
+        self._range = 0.0  # m
+
+    def note(self, stamp: int) -> None:
+        """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
+        if self.last is None or abs(stamp - self.last) > _STREAM_BREAK:
+            self.first = self.last = stamp
+        elif stamp > self.last:
+            self.last = stamp
+
+    def check_belongs(self, table_stamp: int | None, air_gap_stamp: int | None) -> None:
+        """Raise `ForceTableError` unless the table was measured on the present uninterrupted measurements.
+
+        Pads wear and the car is assembled anew, so a table from before a loss of power is not valid.
+        """
+        remedy = 'activate mount_init (again)'
+        if table_stamp is None or air_gap_stamp is None:
+            missing = 'current_force_table' if table_stamp is None else 'air_gap'
+            raise ForceTableError(f'no {missing} was received; {remedy}')
+        if table_stamp != air_gap_stamp:
+            raise ForceTableError(
+                f'current_force_table (activation {_seconds(table_stamp)}) and air_gap '
+                f'(activation {_seconds(air_gap_stamp)}) are of different activations; {remedy}'
+            )
+        if self.first is None or self.last is None:
+            raise ForceTableError('no displacement was received; activate mount_driver first')
+        if table_stamp < self.first:
+            raise ForceTableError(
+                f'current_force_table is of {_seconds(table_stamp)}, but the measurements restarted at '
+                f'{_seconds(self.first)}; {remedy}'
+            )
+        if table_stamp > self.last:
+            raise ForceTableError(
+                f'current_force_table is of {_seconds(table_stamp)}, but the newest displacement is of '
+                f'{_seconds(self.last)}: the time of the measurements went back, or they stand still; '
+                f'{remedy}'
+            )
+
+    def begin(self, activation: int, longest_bridge: float, displacement_range: float) -> None:
+        """Count anew: what comes after `activation` (ns) is to be answered; limits in s and m."""
+        self._activation = activation
+        self._longest_bridge = round(longest_bridge * _NANOSECONDS)
+        self._range = displacement_range
+        self._used, self.interrupted, self.counts = None, False, SampleCounts()
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
-        """Return the judgement on a sample (stamp ns, displacement m) and how many are missing before it."""
-        if self.last_stamp is not None and stamp <= self.last_stamp:
+        """Return the judgement on a noted sample (ns, m), and how many are missing before it."""
+        if self.first is None or self.last is None or not self.first <= self._activation <= self.last:
+            self.interrupted = True
+        if self.interrupted:
+            return Judgement.INTERRUPTED, 0
+        if stamp <= self._activation:
+            return Judgement.EARLY, 0
+        if self._used is not None and stamp <= self._used:
             self.counts.ignored += 1
             return Judgement.IGNORE, 0
         if not math.fabs(displacement) <= self._range:  # also NaN
             self.counts.invalid += 1
             return Judgement.INVALID, 0
-        elapsed = self._longest + 1 if self.last_stamp is None else stamp - self.last_stamp
-        self.follow(stamp, 1)
-        if elapsed > self._longest:
+        elapsed = self._longest_bridge + 1 if self._used is None else stamp - self._used
+        self._used = stamp
+        self.counts.samples += 1
+        if elapsed > self._longest_bridge:
             self.counts.restarts += 1
             return Judgement.RESTART, 0
-        missing = max(0, (elapsed + self._period // 2) // self._period - 1)
+        missing = max(0, (elapsed + _PERIOD // 2) // _PERIOD - 1)
         self.counts.bridged += missing
         return Judgement.USE, missing
 
+    def expects(self, stamp: int) -> bool:
+        """Whether a believable sample of time `stamp` (ns) just goes on where the last one used ended."""
+        return self._used == stamp - _PERIOD
+
+    def following(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which of the samples (n,) are believable and one period after the one before."""
+        valid = np.abs(displacement) <= self._range  # not so for NaN
+        follows = np.zeros(len(stamps), bool)
+        steps = np.diff(stamps)
+        follows[1:] = valid[1:] & (steps > 0) & (steps < _PERIOD + _PERIOD // 2)
+        return follows
+
     def follow(self, last_stamp: int, count: int) -> None:
         """Note `count` samples that followed each other without a doubt, the last at `last_stamp` (ns)."""
-        self.last_stamp = last_stamp
+        self.note(last_stamp)
+        self._used = last_stamp
         self.counts.samples += count
+
+
+def _seconds(stamp: int) -> str:
+    return f'{stamp / 1e9:.3f} s'

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_control.parameters import ControlParameters
 from mount_models.arithmetic.compiled import compiled
 
 
@@ -25,16 +24,6 @@ STATE = np.dtype(
         ('active', 'i8'),
     ]
 )
-
-
-_ANY_MAGNITUDE = -1.0  # m: each one lies above, none below
-
-
-def chosen_switching(parameters: ControlParameters) -> Switching:
-    """Return the levels of a controller; one that damps always takes any magnitude for a shaking engine."""
-    if parameters.switching == 'always':
-        return Switching(_ANY_MAGNITUDE, _ANY_MAGNITUDE, parameters.period_samples)
-    return Switching(parameters.switch_on_level, parameters.switch_off_level, parameters.period_samples)
 
 
 @compiled

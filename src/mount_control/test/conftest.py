@@ -1,14 +1,18 @@
 """What the tests share: a force table as an initialisation makes it, controllers."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from mount_control.controller import Controller
-from mount_control.force_to_current import resample
-from mount_control.parameters import ControlParameters
-from mount_models.damper import damper_curve
+from mount_control.controller import ControlLaw, Controller
+from mount_control.settings import ControlSettings, control_settings
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.specimen import default_specimen
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 # Currents (A) and normal forces (N) of a closing actuator, rounded; the first is the touch of the pads.
 CURRENTS = np.array([0.4725, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])
@@ -23,15 +27,31 @@ def table_rows():
 
 
 @pytest.fixture(scope='session')
-def make_controller():
-    """Return a function that builds a controller with some parameters changed."""
+def make_settings():
+    """Return a function that builds the settings of a controller with some parameters changed."""
 
-    def make(damper: str = 'viscous_2000', **changes) -> Controller:
-        parameters = ControlParameters(**changes)
-        table = resample(CURRENTS, FORCES, OFFSET_CURRENT, parameters.highest_current)
-        return Controller(parameters, damper_curve(damper), FrictionCoefficients(), FrictionContact(), table)
+    def make(damper: str = 'viscous_2000', **changes) -> ControlSettings:
+        settings = control_settings({'damper': damper, **changes}, default_specimen())
+        return settings._replace(friction=FrictionCoefficients(), contact=FrictionContact())
 
     return make
+
+
+@pytest.fixture(scope='session')
+def make_law(make_settings):
+    """Return a function that builds a law with some parameters changed."""
+
+    def make(damper: str = 'viscous_2000', **changes) -> ControlLaw:
+        settings = make_settings(damper, **changes)
+        return ControlLaw(settings, settings.table(CURRENTS, FORCES, OFFSET_CURRENT))
+
+    return make
+
+
+@pytest.fixture(scope='session')
+def make_controller(make_law):
+    """Return a function that builds a controller with some parameters changed."""
+    return lambda *arguments, **changes: Controller(make_law(*arguments, **changes))
 
 
 @pytest.fixture(scope='session')

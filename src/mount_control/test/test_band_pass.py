@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from mount_control import band_pass
-from mount_control.parameters import ControlParameters
+from mount_control.policy.switched_viscous import Parameters
 from mount_models.sampling import SAMPLE_TIME
 
 
@@ -71,7 +71,7 @@ def test_settling_forgets_what_was_before(sine):
     assert abs(band_pass.step(filtered, state[0], 0.002)[2]) < 1e-12
 
 
-@pytest.mark.parametrize('lead_time', [0.0, 0.0005, ControlParameters().lead_time, 0.005, 0.015])
+@pytest.mark.parametrize('lead_time', [0.0, 0.0005, Parameters().lead_time, 0.005, 0.015])
 @pytest.mark.parametrize('frequency', [4.0, 8.0])
 def test_predicted_velocity_is_the_true_one_a_lead_time_later(sine, lead_time, frequency):
     filtered = band_pass.design(frequency, 1.0, lead_time, SAMPLE_TIME)

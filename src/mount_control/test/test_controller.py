@@ -4,25 +4,24 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
+from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
 
 from mount_control.controller import (
-    _STATE,
-    FADE_SAMPLES,
     FARTHEST_DISPLACEMENT,
-    TRACE,
     ControlLaw,
     Controller,
+    compiled_with,
 )
-from mount_control.force_to_current import resample
-from mount_control.parameters import ControlParameters
+from mount_control.force_maker import FADE_SAMPLES
+from mount_control.policy import switched_viscous
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import faded_coefficient
 from mount_ros import topics
 
+PAPER = compiled_with(switched_viscous)
 SHAKING = st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=12)
 
 
@@ -36,8 +35,9 @@ def _equal(one, other):
 
 
 def test_trace_has_the_names_of_its_topic():
-    assert TRACE.names == topics.CONTROL_TRACE.names
-    assert {TRACE[name] for name in TRACE.names} == {np.dtype('f8')}
+    known = {scalar.name for scalar in (*topics.CONTROL_TRACE.scalars, *topics.CONTROL_TRACE.optional)}
+    assert set(PAPER.trace.names) == known
+    assert {PAPER.trace[name] for name in PAPER.trace.names} == {np.dtype('f8')}
 
 
 def test_trace_bytes_are_its_numbers(make_controller, sine):
@@ -45,7 +45,7 @@ def test_trace_bytes_are_its_numbers(make_controller, sine):
     for x in sine(8.0, 1e-3, 0.4):
         controller.step(x)
     numbers = np.frombuffer(controller.trace_bytes, '<f8')
-    np.testing.assert_array_equal(numbers, [controller.trace[name] for name in TRACE.names])
+    np.testing.assert_array_equal(numbers, [controller.trace[name] for name in PAPER.trace.names])
 
 
 def test_single_steps_equal_a_run_to_the_bit(make_controller, sine):
@@ -107,7 +107,7 @@ def test_the_coefficient_is_the_friction_law_s_at_this_velocity_and_force(make_c
         assert now['friction_coefficient'] == pytest.approx(law, rel=2e-3)
 
 
-@settings(deadline=None, max_examples=40)
+@hypothesis(deadline=None, max_examples=40)
 @given(SHAKING)
 def test_the_desired_force_is_odd(make_controller, values):
     displacement = _held(values)
@@ -116,7 +116,7 @@ def test_the_desired_force_is_odd(make_controller, values):
     np.testing.assert_array_equal(one['damping_active'], other['damping_active'])
 
 
-@settings(deadline=None, max_examples=40)
+@hypothesis(deadline=None, max_examples=40)
 @given(SHAKING, st.sampled_from([0.6, 1.5, 3.0]), st.sampled_from(['viscous_4000', 'progressive']))
 def test_current_stays_within_its_limits_for_any_bounded_input(make_controller, values, highest, damper):
     traces = make_controller(damper, highest_current=highest).run(_held(values))
@@ -160,7 +160,7 @@ def test_missing_samples_are_replaced_by_a_straight_line(make_controller, sine):
     assert current == pytest.approx(complete.step(displacement[304]), abs=1e-12)
     assert bridged.trace['bridged_samples'] == 4.0
     assert complete.trace['bridged_samples'] == 0.0
-    for name in TRACE.names[:-1]:
+    for name in PAPER.trace.names[:-1]:
         assert bridged.trace[name] == pytest.approx(complete.trace[name], rel=1e-9, abs=1e-12), name
 
 
@@ -198,41 +198,36 @@ def test_more_damping_asks_for_more_current(make_controller, sine):
     assert (np.diff(peaks) > 0.1).all()
 
 
-def test_the_force_is_limited_by_the_table(table_rows, sine):
+def test_the_force_is_limited_by_the_table(make_settings, table_rows, sine):
     currents, forces, offset = table_rows
-    weak = resample(currents[:4], forces[:4], offset, 3.0)  # up to 1 A and 75 N
-    law = damper_curve('viscous_4000'), FrictionCoefficients(), FrictionContact()
-    traces = Controller(ControlParameters(), *law, weak).run(sine(8.0, 2e-3, 1.0))
+    settings = make_settings('viscous_4000')
+    weak = settings.table(currents[:4], forces[:4], offset)  # up to 1 A and 75 N
+    traces = Controller(ControlLaw(settings, weak)).run(sine(8.0, 2e-3, 1.0))
     assert traces['normal_force'].max() == 74.5
     assert traces['current'].max() == weak.currents[-1] < 1.0
-
-
-def test_parameters_are_checked_by_the_controller_itself(make_controller):
-    with pytest.raises(ValueError, match='must lie below switch_on_level'):
-        make_controller(switch_off_level=0.0009)
 
 
 def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, sine):
     traces = make_controller(eigenfrequency=10.0).run(sine(10.0, 1e-3, 1.0))
     exceeded = int((traces['magnitude'] > 0.0008).argmax())
     assert int(traces['damping_active'].argmax()) == exceeded + 99
-    assert ControlParameters(eigenfrequency=10.0).period_samples == 100
+    assert switched_viscous.Parameters(eigenfrequency=10.0).period_samples == 100
     assert damper_curve('viscous_2000').force(0.104) == pytest.approx(200.0)
 
 
 # What is no finite number inside the controller, however it came there.
 
 POISON = [
-    'band.z1',
-    'band.z2',
-    'band.displacement',
-    'band.earlier',
-    'switching.magnitude',
+    'policy.band.z1',
+    'policy.band.z2',
+    'policy.band.displacement',
+    'policy.band.earlier',
+    'policy.switching.magnitude',
     'displacement',
-    'deflection',
-    'normal_force',
-    'current',
-    'distance',
+    'maker.deflection',
+    'maker.normal_force',
+    'maker.current',
+    'maker.distance',
 ]
 
 
@@ -242,7 +237,7 @@ def _poisoned(controller, name, value):
     if name == 'window':
         memory.window[:] = value
         return
-    numbers = memory.state.view(_STATE)
+    numbers = memory.state.view(PAPER.state)
     for part in name.split('.'):
         record, numbers = numbers, numbers[part]
     record[part] = value
@@ -254,13 +249,13 @@ def test_every_number_of_the_memory_is_among_those_that_are_poisoned():
             yield from names(kind[name], f'{prefix}{name}.') if kind[name].names else [prefix + name]
 
     def kind_of(path):
-        kind = _STATE
+        kind = PAPER.state
         for part in path.split('.'):
             kind = kind[part]
         return kind
 
-    counts = {name for name in names(_STATE) if kind_of(name) == np.int64}
-    assert set(names(_STATE)) - counts == set(POISON)
+    counts = {name for name in names(PAPER.state) if kind_of(name) == np.int64}
+    assert set(names(PAPER.state)) - counts == set(POISON)
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
@@ -291,8 +286,8 @@ def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(
 def test_what_leaves_the_window_is_noticed_where_it_is_no_number(make_controller, sine):
     controller = make_controller()
     controller.run(sine(8.0, 1e-3, 0.5))
-    state = controller.memory.state.view(_STATE)
-    controller.memory.window[state['switching']['place'][0]] = math.nan
+    state = controller.memory.state.view(PAPER.state)
+    controller.memory.window[state['policy']['switching']['place'][0]] = math.nan
     assert controller.step(0.0) == 0.0
     assert controller.faults == 1
 
@@ -324,20 +319,13 @@ CHANGES = {
 }
 
 
-def _law(table_rows, damper='viscous_2000', **changes):
-    currents, forces, offset = table_rows
-    table = resample(currents, forces, offset, 3.0)
-    pads = FrictionCoefficients(), FrictionContact()
-    return ControlLaw(ControlParameters(**changes), damper_curve(damper), *pads, table)
-
-
 @pytest.mark.parametrize('moment', range(700, 825, 11))  # everywhere in a period
 @pytest.mark.parametrize('change', CHANGES)
-def test_a_change_of_the_law_makes_no_jump(make_controller, table_rows, sine, change, moment):
+def test_a_change_of_the_law_makes_no_jump(make_controller, make_law, sine, change, moment):
     displacement = sine(8.0, 1e-3, 1.4)
     controller, stayed = make_controller(), make_controller()
     before = controller.run(displacement[:moment])
-    controller.change(_law(table_rows, **CHANGES[change]))
+    controller.change(make_law(**CHANGES[change]))
     after = controller.run(displacement[moment:])
     undisturbed = stayed.run(displacement)
     assert before['damping_active'][-1] == after['damping_active'][0] == 1.0
@@ -360,24 +348,22 @@ def test_a_change_of_the_law_makes_no_jump(make_controller, table_rows, sine, ch
     assert controller.faults == 0
 
 
-def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit(
-    make_controller, table_rows, sine
-):
+def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit(make_controller, make_law, sine):
     displacement = sine(8.0, 1e-3, 1.0)
     controller, stayed = make_controller(), make_controller()
     controller.run(displacement[:700])
-    controller.change(_law(table_rows, 'viscous_4000'))
+    controller.change(make_law('viscous_4000'))
     after, undisturbed = controller.run(displacement[700:]), stayed.run(displacement)[700:]
     for name in ('band_displacement', 'band_velocity', 'predicted_velocity', 'magnitude', 'damping_active'):
         np.testing.assert_array_equal(after[name], undisturbed[name])
     np.testing.assert_array_equal(after['desired_force'], 2.0 * undisturbed['desired_force'])
 
 
-def test_a_change_while_damping_is_off_is_there_at_once(make_controller, table_rows, sine):
+def test_a_change_while_damping_is_off_is_there_at_once(make_controller, make_law, sine):
     displacement = np.r_[sine(8.0, 0.1e-3, 0.5), sine(8.0, 1e-3, 1.0)]
     controller = make_controller()
     controller.run(displacement[:400])
-    controller.change(_law(table_rows, 'viscous_4000'))
+    controller.change(make_law('viscous_4000'))
     after = controller.run(displacement[400:])
     expected = make_controller('viscous_4000').run(displacement)[400:]
     assert _equal(after, expected)
@@ -385,15 +371,15 @@ def test_a_change_while_damping_is_off_is_there_at_once(make_controller, table_r
 
 @pytest.mark.parametrize('eigenfrequency', [5.0, 8.0, 13.0])
 def test_the_magnitude_stays_the_highest_of_the_last_period_over_a_change_of_it(
-    make_controller, table_rows, sine, eigenfrequency
+    make_controller, make_law, sine, eigenfrequency
 ):
     displacement = sine(8.0, 1e-3, 0.6) * np.linspace(0.2, 1.0, 600)
     controller = make_controller()
     before = controller.run(displacement[:333])
-    controller.change(_law(table_rows, eigenfrequency=eigenfrequency))
+    controller.change(make_law(eigenfrequency=eigenfrequency))
     after = controller.run(displacement[333:])
     distances = np.abs(np.r_[before['band_displacement'], after['band_displacement']])
-    period = ControlParameters(eigenfrequency=eigenfrequency).period_samples
+    period = switched_viscous.Parameters(eigenfrequency=eigenfrequency).period_samples
     seen_from = max(0, 333 - 125)  # what the window of the old period held
     for number in range(333, 600):
         begin = max(number + 1 - period, seen_from)

@@ -18,6 +18,7 @@ GOOD = ControlFigures(
     step_median=80e-6,
     step_p99=210e-6,
     last_stamp=123_000_000,
+    policy='switched_viscous',
     damper='viscous_2000',
 )
 
@@ -74,6 +75,7 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'step_median_us': '80',
         'step_p99_us': '210',
         'last_stamp': 123_000_000,
+        'policy': 'switched_viscous',
         'damper': 'viscous_2000',
         'parameter_changes': 0,
     }

@@ -12,11 +12,11 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from mount_control.controller import _STATE, ControlLaw, Controller
-from mount_control.force_to_current import resample
-from mount_control.identified import identified
+from mount_control.controller import ControlLaw, Controller
 from mount_control.node import MountControl
-from mount_control.parameters import ControlParameters
+from mount_control.policy import switched_viscous
+from mount_control.policy.contract import trace_fields
+from mount_control.settings import control_settings
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -49,9 +49,9 @@ class Surroundings:
                 topics.DISPLACEMENT,
                 topics.AIR_GAP,
                 topics.CURRENT_SETPOINT,
-                topics.CONTROL_TRACE,
             )
         }
+        self._trace_layout = ScalarsLayout(topics.control_trace(trace_fields(switched_viscous)))
         self.setpoints, self.traces, self.events = [], [], []
         self._displacement = self.path.publisher(topics.DISPLACEMENT)
         self._air_gap = self.path.publisher(topics.AIR_GAP)
@@ -91,9 +91,8 @@ class Surroundings:
         return (stamp - ACTIVATION) / MS, current
 
     def _trace(self, raw):
-        stamp, numbers, _ = self._layouts[topics.CONTROL_TRACE].unpack(raw)
-        names = self._layouts[topics.CONTROL_TRACE].names
-        return (stamp - ACTIVATION) / MS, dict(zip(names, numbers, strict=True))
+        stamp, numbers, _ = self._trace_layout.unpack(raw)
+        return (stamp - ACTIVATION) / MS, dict(zip(self._trace_layout.names, numbers, strict=True))
 
     def close(self):
         self.path.stop()
@@ -180,13 +179,8 @@ def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
     assert [ms for ms, _ in around.setpoints] == list(range(1, len(displacement) + 1))
     assert [ms for ms, _ in around.traces] == [ms for ms, _ in around.setpoints]
 
-    core = Controller(
-        ControlParameters(),
-        damper_curve('viscous_2000'),
-        identified(default_specimen(), FrictionCoefficients(), {}, 'friction'),
-        identified(default_specimen(), FrictionContact(), {}, 'contact'),
-        resample(*table_rows, 3.0),
-    )
+    settings = control_settings({}, default_specimen())
+    core = Controller(ControlLaw(settings, settings.table(*table_rows)))
     core.restart(displacement[0])
     expected = core.run(displacement)
     assert [current for _, current in around.setpoints] == expected['current'].tolist()
@@ -208,7 +202,7 @@ def test_in_lock_step_the_sample_that_waits_is_answered_at_activation(configured
     control = configured()
     around.initialise()
     around.send(1.0, 0.001)
-    wait_until(lambda: control._stream.last == ACTIVATION + MS, 'the sample')
+    wait_until(lambda: control.answering.watch.last == ACTIVATION + MS, 'the sample')
     assert control.trigger_activate() == SUCCESS
     assert _answers(around, 1) == [(1.0, 0.0)]
 
@@ -246,7 +240,7 @@ def test_deactivation_leaves_0_ampere_and_silence(active, around, sine):
     assert control.trigger_deactivate() == SUCCESS
     assert _answers(around, 401)[-1] == (400.0, 0.0)
     around.send(401, 0.001)
-    wait_until(lambda: control._stream.last == ACTIVATION + 401 * MS, 'the sample')
+    wait_until(lambda: control.answering.watch.last == ACTIVATION + 401 * MS, 'the sample')
     assert control.trigger_activate() == SUCCESS  # the same measurements, so the same table holds
     assert _answers(around, 402)[401:] == [(401.0, 0.0)]
 
@@ -343,7 +337,9 @@ def test_a_message_that_is_no_table_takes_the_old_one_away(configured, around):
     message = to_message(ACTIVATION, [[0.47, 3.0], [0.0, 300.0]])
     message.layout.dim[1].label = 'of yesterday'
     around.send_raw_table(serialised(message))
-    wait_until(lambda: control._air_gap is not None and control._table is None, 'the message')
+    wait_until(
+        lambda: control._activation.air_gap is not None and control._activation.table is None, 'the message'
+    )
     assert control.trigger_activate() == FAILURE
     assert 'no current_force_table was received' in control._refusal
 
@@ -360,7 +356,8 @@ def test_after_cleanup_the_old_table_is_forgotten(active, around):
     control = active()
     assert control.trigger_deactivate() == SUCCESS
     assert control.trigger_cleanup() == SUCCESS
-    assert (control._table, control._air_gap, control._stream.start) == (None, None, None)
+    assert (control._activation.table, control._activation.air_gap) == (None, None)
+    assert control.answering.watch.first is None
 
 
 def test_a_transition_that_is_not_valid_is_refused_and_the_node_goes_on(active, around):
@@ -397,15 +394,16 @@ def test_the_friction_of_a_specimen_is_in_the_parameters_that_the_session_will_t
     assert control.trigger_configure() == SUCCESS
     names = ('friction.a_p1', 'friction.a_p2', 'contact.contact_stiffness')
     assert [control.get_parameter(name).value for name in names] == [default, 0.05, 3e6]
-    assert control._friction == FrictionCoefficients(a_p2=0.05)
-    assert control._contact == FrictionContact(contact_stiffness=3e6)
+    assert control._settings.friction == FrictionCoefficients(a_p2=0.05)
+    assert control._settings.contact == FrictionContact(contact_stiffness=3e6)
     specimen = load_specimen(tmp_path / 'left.yaml')
-    assert identified(specimen, FrictionCoefficients(), settings, 'friction') == control._friction
+    assert control_settings(settings, specimen).friction == control._settings.friction
     # another file, another friction
     assert control.trigger_cleanup() == SUCCESS
     control.set_parameters([Parameter('parameters_file', value='')])
     assert control.trigger_configure() == SUCCESS
-    assert control._friction == identified(default_specimen(), FrictionCoefficients(), settings, 'friction')
+    expected = control_settings(settings, default_specimen())
+    assert control._settings.friction == expected.friction
 
 
 def test_silence_is_told_in_real_time(active, around):
@@ -428,11 +426,12 @@ def test_missing_samples_are_bridged_and_counted(active, around, sine):
 def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(active, around, sine, name):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
-    state = control._controller.memory.state.view(_STATE)
+    controller = control.answering.controller
+    state = controller.memory.state.view(controller.compiled.state)
     if name == 'band':
-        state['band']['z1'] = math.nan
+        state['policy']['band']['z1'] = math.nan
     else:
-        state[name] = math.nan
+        state['maker'][name] = math.nan
     around.send(401, 0.0)
     assert _answers(around, 401)[-1] == (401.0, 0.0)
     wait_until(lambda: len(around.traces) == 401, 'the trace')
@@ -489,18 +488,14 @@ def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(
     for number in range(401, 600):
         around.send(number, displacement[number - 1])
         _answers(around, number)
-    pads = (
-        identified(default_specimen(), FrictionCoefficients(), {}, 'friction'),
-        identified(default_specimen(), FrictionContact(), {}, 'contact'),
-    )
-    table = resample(*table_rows, 3.0)
-    core = Controller(ControlParameters(), damper_curve('viscous_2000'), *pads, table)
+    settings = control_settings({}, default_specimen())
+    table = settings.table(*table_rows)
+    core = Controller(ControlLaw(settings, table))
     core.restart(displacement[0])
     expected = core.run(displacement[:400])['current'].tolist()
-    known = {name: value for name, value in values.items() if name != 'damper'}
     for count in range(len(values)):  # each by itself, as it was set
-        settings = ControlParameters(**dict(list(known.items())[: count + 1]))
-        core.change(ControlLaw(settings, damper_curve(values.get('damper', 'viscous_2000')), *pads, table))
+        so_far = dict(list(values.items())[: count + 1])
+        core.change(ControlLaw(control_settings(so_far, default_specimen()), table))
     expected += core.run(displacement[400:599])['current'].tolist()
     assert [current for _, current in around.setpoints] == expected
     assert around.setpoints[400][1] == around.setpoints[399][1]  # no jump
@@ -532,6 +527,7 @@ def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(
         ('friction.scale', 1.1, 'friction.scale can be set before configure: deactivate and clean up first'),
         ('parameters_file', 'x.yaml', 'parameters_file can be set before configure'),
         ('lockstep', False, 'lockstep can be set before configure'),
+        ('policy', 'viscous_example', 'policy can be set before configure: deactivate and clean up first'),
     ],
 )
 def test_what_cannot_be_set_is_refused_with_the_reason_and_changes_nothing(
@@ -575,7 +571,7 @@ def test_a_damper_file_is_in_the_parameters_with_its_points(make_control, tmp_pa
     assert control.trigger_configure() == SUCCESS
     kept = control.get_parameter('damper').value
     assert kept == '{velocity: [0.0, 0.004, 0.1], force: [0.0, 0.0, 200.0]}'
-    np.testing.assert_array_equal(control._damper.table, damper_curve(str(file)).table)
+    np.testing.assert_array_equal(control._settings.design.table, damper_curve(str(file)).table)
     # at run time too, and the file is not asked for again
     assert _set(control, damper='viscous_1000') == []
     file.write_text('velocity,force\n0,0\n0.1,100\n')
@@ -583,4 +579,6 @@ def test_a_damper_file_is_in_the_parameters_with_its_points(make_control, tmp_pa
     assert control.get_parameter('damper').value == '{velocity: [0.0, 0.1], force: [0.0, 100.0]}'
     file.unlink()
     assert _set(control, quality=0.8) == []
-    assert control._damper.force(0.1) == pytest.approx(100.0)
+    np.testing.assert_array_equal(
+        control._settings.design.table, damper_curve('{velocity: [0, 0.1], force: [0, 100]}').table
+    )

@@ -2,28 +2,40 @@
 
 import pytest
 
-from mount_control.parameters import ControlParameters, checked_parameters
+from mount_control.parameters import ControlParameters
+from mount_control.policy import switched_viscous
+from mount_control.settings import policy_parameters
 from mount_models.quantity import ParameterError, quantities
+from mount_models.sampling import SAMPLE_TIME
+
+NOTES = {**quantities(ControlParameters()), **quantities(switched_viscous.Parameters())}
 
 
 def _refusal(**changes):
     with pytest.raises(ParameterError) as caught:
-        checked_parameters(ControlParameters()._replace(**changes))
+        _checked(**changes)
     return str(caught.value)
+
+
+def _checked(**changes):
+    """The parameters of the paper's policy with some changed, as a controller takes them."""
+    policy, parameters = policy_parameters(changes)
+    policy.design(parameters, SAMPLE_TIME)
+    return parameters
 
 
 def _numbers():
     """The default of each parameter that is a number, by name."""
-    defaults = ControlParameters()._asdict()
+    defaults = {**ControlParameters()._asdict(), **switched_viscous.Parameters()._asdict()}
     return {name: default for name, default in defaults.items() if not isinstance(default, str)}
 
 
 def test_defaults_are_accepted():
-    assert checked_parameters(ControlParameters()) == ControlParameters()
+    assert _checked() == switched_viscous.Parameters()
 
 
 def test_every_parameter_has_unit_meaning_and_a_closed_range_around_its_default():
-    notes = quantities(ControlParameters())
+    notes = NOTES
     for name, default in _numbers().items():
         assert notes[name].unit, name
         assert notes[name].meaning, name
@@ -32,7 +44,7 @@ def test_every_parameter_has_unit_meaning_and_a_closed_range_around_its_default(
 
 @pytest.mark.parametrize('name', _numbers())
 def test_each_parameter_is_refused_beyond_both_ends_of_its_range(name):
-    note = quantities(ControlParameters())[name]
+    note = NOTES[name]
     width = note.high - note.low
     for value in (note.low - 0.01 * width, note.high + 0.01 * width, float('nan')):
         assert f'{name} ({value:g} {note.unit}) must lie within' in _refusal(**{name: value})
@@ -44,7 +56,7 @@ def test_the_off_level_must_lie_below_the_on_level():
         'else damping switches on and off at every period'
     )
     assert _refusal(switch_off_level=0.0008) == expected
-    assert checked_parameters(ControlParameters(switch_off_level=0.00079))
+    assert _checked(switch_off_level=0.00079)
 
 
 def test_the_lead_must_stay_below_an_eighth_of_a_period():
@@ -53,7 +65,7 @@ def test_the_lead_must_stay_below_an_eighth_of_a_period():
         'a longer delay cannot be predicted'
     )
     assert _refusal(lead_time=0.013, eigenfrequency=10.0) == expected
-    assert checked_parameters(ControlParameters(lead_time=0.0124, eigenfrequency=10.0))
+    assert _checked(lead_time=0.0124, eigenfrequency=10.0)
 
 
 def test_at_least_one_missing_sample_can_be_bridged():
@@ -65,9 +77,13 @@ def test_at_least_one_missing_sample_can_be_bridged():
     ('frequency', 'samples'), [(8.0, 125), (7.9, 127), (2.0, 500), (20.0, 50), (3.0, 333)]
 )
 def test_a_period_is_counted_in_whole_samples(frequency, samples):
-    assert ControlParameters(eigenfrequency=frequency).period_samples == samples
+    assert switched_viscous.Parameters(eigenfrequency=frequency).period_samples == samples
 
 
 def test_another_switching_is_refused_with_the_known_ones():
-    assert checked_parameters(ControlParameters(switching='always')).switching == 'always'
+    assert _checked(switching='always').switching == 'always'
     assert _refusal(switching='never') == "switching 'never' is unknown; known are enabled, always"
+
+
+def test_another_policy_is_refused_with_the_known_ones():
+    assert _refusal(policy='nonsense').startswith("policy 'nonsense' is unknown; known are switched_viscous")

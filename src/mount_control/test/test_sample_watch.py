@@ -4,26 +4,34 @@ import math
 
 import pytest
 
+from mount_control.force_to_current import ForceTableError
 from mount_control.sample_watch import Judgement, SampleCounts, SampleWatch
 
-MS = 1_000_000  # ns
+MS, S = 1_000_000, 1_000_000_000  # ns
 
 
 @pytest.fixture
 def watch():
-    watch = SampleWatch(0.001, 0.020, 0.020)
-    assert watch.judge(1000 * MS, 0.0) == (Judgement.RESTART, 0)  # the first one has no past
+    watch = SampleWatch()
+    watch.note(600 * MS)
+    watch.begin(600 * MS, 0.020, 0.020)
+    assert _judge(watch, 0) == [(Judgement.RESTART, 0)]  # the first one has no past
     return watch
 
 
 def _judge(watch, *milliseconds, displacement=0.0):
-    return [watch.judge(round(1000 * MS + ms * MS), displacement) for ms in milliseconds]
+    judged = []
+    for stamp in (round(1000 * MS + ms * MS) for ms in milliseconds):
+        watch.note(stamp)
+        judged.append(watch.judge(stamp, displacement))
+    return judged
 
 
 def test_samples_in_time_are_used(watch):
     assert _judge(watch, 1, 2, 3) == [(Judgement.USE, 0)] * 3
     assert watch.counts == SampleCounts(samples=4, restarts=1)
-    assert watch.last_stamp == 1003 * MS
+    assert watch.expects(1004 * MS)
+    assert not watch.expects(1005 * MS)
 
 
 @pytest.mark.parametrize('jitter', [-0.49, -0.1, 0.1, 0.49])
@@ -67,3 +75,87 @@ def test_invalid_samples_are_bridged_like_missing_ones(watch):
     assert _judge(watch, 4) == [(Judgement.USE, 3)]
     _judge(watch, *range(5, 30), displacement=math.nan)
     assert _judge(watch, 30) == [(Judgement.RESTART, 0)]
+
+
+# Does a table belong to the present measurements?
+
+
+def _stream(*stamps):
+    stream = SampleWatch()
+    for stamp in stamps:
+        stream.note(stamp)
+    return stream
+
+
+def _refusal(table, air_gap, stream):
+    with pytest.raises(ForceTableError) as caught:
+        stream.check_belongs(table, air_gap)
+    return str(caught.value)
+
+
+def test_a_table_of_the_present_stream_is_accepted():
+    _stream(3 * S, 4 * S, 5 * S).check_belongs(4 * S, 4 * S)
+    _stream(3 * S).check_belongs(3 * S, 3 * S)
+
+
+def test_without_table_or_air_gap_it_is_refused():
+    stream = _stream(S)
+    assert _refusal(None, S, stream) == 'no current_force_table was received; activate mount_init (again)'
+    assert _refusal(S, None, stream) == 'no air_gap was received; activate mount_init (again)'
+    assert 'no current_force_table' in _refusal(None, None, stream)
+
+
+def test_table_and_air_gap_of_different_activations_are_refused():
+    assert _refusal(4 * S, 3 * S, _stream(S, 2 * S, 3 * S, 4 * S)) == (
+        'current_force_table (activation 4.000 s) and air_gap (activation 3.000 s) are of different '
+        'activations; activate mount_init (again)'
+    )
+
+
+def test_without_displacement_it_is_refused():
+    assert _refusal(S, S, SampleWatch()) == ('no displacement was received; activate mount_driver first')
+
+
+def test_a_table_from_before_a_break_is_refused():
+    assert _refusal(2 * S, 2 * S, _stream(S, 2 * S, 4 * S, 5 * S)) == (
+        'current_force_table is of 2.000 s, but the measurements restarted at 4.000 s; '
+        'activate mount_init (again)'
+    )
+
+
+def test_a_table_from_before_the_time_went_back_is_refused():
+    stream = _stream(100 * S, 101 * S, 5 * S, 6 * S)
+    assert 'newest displacement is of 6.000 s: the time of the measurements went back' in _refusal(
+        101 * S, 101 * S, stream
+    )
+
+
+def test_up_to_one_second_of_silence_is_no_break():
+    assert _stream(S, 2 * S).first == S
+    assert _stream(S, 2 * S + 1).first == 2 * S + 1
+
+
+def test_a_repeated_or_overtaken_sample_is_no_break():
+    stream = _stream(10 * S, 10 * S + 2 * MS, 10 * S + MS, 10 * S + MS)
+    assert (stream.first, stream.last) == (10 * S, 10 * S + 2 * MS)
+
+
+def test_a_sample_is_answered_only_where_the_table_was_made_during_the_present_measurements():
+    for activation, expected in (
+        (S - 1, Judgement.INTERRUPTED),
+        (S, Judgement.RESTART),
+        (2 * S, Judgement.RESTART),
+        (3 * S, Judgement.EARLY),
+        (3 * S + 1, Judgement.INTERRUPTED),
+    ):
+        stream = _stream(S, 2 * S, 3 * S)
+        stream.begin(activation, 0.020, 0.020)
+        assert stream.judge(3 * S, 0.0) == (expected, 0)
+        assert stream.interrupted == (expected is Judgement.INTERRUPTED)
+
+
+def test_an_interruption_stands_until_the_next_activation(watch):
+    assert _judge(watch, 1, 1002, 1003) == [(Judgement.USE, 0), *[(Judgement.INTERRUPTED, 0)] * 2]
+    watch.begin(2003 * MS, 0.020, 0.020)
+    assert _judge(watch, 1004) == [(Judgement.RESTART, 0)]
+    assert watch.counts == SampleCounts(samples=1, restarts=1)

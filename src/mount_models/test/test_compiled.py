@@ -34,3 +34,21 @@ def test_code_for_one_processor_is_not_taken_for_another(tmp_path):
             env={**plain, 'XDG_CACHE_HOME': str(tmp_path), **names}, check=True,
         )  # fmt: skip
     assert len(list(tmp_path.rglob('elementary.exp-*.nbc'))) == 2
+
+
+def test_a_function_is_compiled_with_names_bound_anew_and_cached_by_its_name(tmp_path, monkeypatch):
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
+    doubled, trebled = (
+        compiled.specialised(scaled, f'by_{factor:.0f}', {'FACTOR': factor}) for factor in (2.0, 3.0)
+    )
+    assert (scaled(5.0), doubled(5.0), trebled(5.0)) == (5.0, 10.0, 15.0)
+    cached = {file.name.split('-')[0] for file in tmp_path.rglob('*.nbi')}
+    assert cached == {'test_compiled.by_2.scaled', 'test_compiled.by_3.scaled'}
+
+
+FACTOR = 1.0
+
+
+def scaled(number):
+    """The number times what `FACTOR` is where it is compiled."""
+    return FACTOR * number

@@ -135,11 +135,12 @@ def _intermediates(
     return tuple(
         _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known])
         for name, values in given.answers.traces.items()
+        if name in (traces.dtype.names or ())  # another policy traces something else
     )
 
 
 def _judged(topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray) -> SignalDifference:
-    unit = next(scalar.unit for scalar in topic.scalars if scalar.name == signal)
+    unit = topic.unit(signal)
     column = Column('', topic.name, signal, '' if unit == '1' else unit, time, a, b)
     return signal_difference(column, EXACT, None, SAMPLE_TIME)
 

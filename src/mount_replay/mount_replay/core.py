@@ -7,16 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bringup.chosen import Parameters, chosen_damper, control_parameters, friction_model
-from mount_control.activation import MeasurementStream
-from mount_control.controller import TRACE, ControlLaw, Controller
-from mount_control.force_to_current import CurrentTable, resample
-from mount_control.parameters import SAMPLE_TIME, ControlParameters
-from mount_control.sample_watch import Judgement, SampleCounts, SampleWatch
+from mount_bringup.chosen import Parameters, chosen_control
+from mount_control.answering import Answering
+from mount_control.sample_watch import SampleCounts
+from mount_control.settings import ControlSettings
 from mount_init.errors import InitialisationError
-from mount_models.damper import DamperCurve
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
+from mount_models.sampling import SAMPLE_TIME
 from mount_replay.given.input import Column, ControlRun, ReplayError, ReplayInput, Times
 from mount_replay.given.parameter_changes import changed
 from mount_replay.given.ramps import MeasuredGap, Ramp, initialisation
@@ -37,7 +33,7 @@ class ControlAnswers:
     stamps: Times
     setpoints: Column
     traced: NDArray[np.bool_]
-    traces: NDArray[np.void]  # `TRACE`, one for each sample; only where `traced`
+    traces: NDArray[np.void]  # the policy's records, one for each sample; only where `traced`
     counts: SampleCounts
     refusal: str = ''  # why the table did not hold until the end, or empty
 
@@ -110,76 +106,43 @@ def run_control(
 ) -> ControlAnswers:
     """Return what mount_control answers to the samples of a run, activated with `gap`.
 
-    Samples that follow each other without a doubt pass the compiled controller at once; all others are
-    judged one by one, as in the node. `changes` of its parameters act from the sample of their stamp on.
+    `changes` of its parameters act from the sample of their stamp on.
     """
     begun = changed(parameters, [change for change in changes if change.time <= run.stamps[0]])
-    laws = _laws(run, gap, begun, [change for change in changes if change.time > run.stamps[0]])
-    settings = control_parameters(begun)
-    controller = controller_for(gap, begun)
-    watch = SampleWatch(SAMPLE_TIME, settings.longest_bridge, settings.displacement_range)
-    stream = MeasurementStream(gap.stamp, max(gap.stamp, int(run.stamps[0])))
-    count = len(run.stamps)
-    answers = ControlAnswers(
-        run.stamps, np.zeros(count), np.zeros(count, bool), np.zeros(count, TRACE), watch.counts
+    later = _changed_later(run, begun, [change for change in changes if change.time > run.stamps[0]])
+    answering = answering_from(gap, begun, activation_before(run))
+    answers = answering.answer_many(run.stamps, run.displacement, later)
+    counts, refusal = answering.watch.counts, answering.refusal
+    return ControlAnswers(
+        run.stamps, answers.currents, answers.traced, answers.traces, counts, refusal and f'0 A: {refusal}'
     )
-    doubtful = sorted({*np.flatnonzero(~_follows(run, settings)).tolist(), *laws})
-    for begin, end in zip(doubtful, [*doubtful[1:], count], strict=True):
-        stamp, displacement = int(run.stamps[begin]), float(run.displacement[begin])
-        stream.note(stamp)
-        if not stream.holds(gap.stamp):
-            answers.refusal = 'the measurements were interrupted for more than 1 s: 0 A from there on'
-            break
-        judgement, missing = watch.judge(stamp, displacement)
-        if judgement in (Judgement.INVALID, Judgement.IGNORE):
-            continue
-        for law in laws.get(begin, ()):
-            controller.change(law)
-        if judgement is Judgement.RESTART:
-            controller.restart(displacement)
-        controller.step(displacement, missing)
-        answers.traces[begin] = controller.trace
-        if end > begin + 1:
-            controller.run(run.displacement[begin + 1 : end], answers.traces[begin + 1 : end])
-            watch.follow(int(run.stamps[end - 1]), end - begin - 1)
-            stream.last = watch.last_stamp
-        answers.traced[begin:end] = True
-    answers.setpoints[answers.traced] = answers.traces['current'][answers.traced]
-    return answers
 
 
-def controller_for(gap: MeasuredGap, parameters: Parameters) -> Controller:
-    """Return the controller that mount_control makes when it is activated with `gap`."""
-    return Controller(*_ingredients(gap, parameters))
+def activation_before(run: ControlRun) -> int:
+    """Return the stamp (ns) by which a run is activated: one sample before its first.
+
+    The recording may begin long after the activation; the controller asks whether the measurements went on
+    from there without a break.
+    """
+    return int(run.stamps[0]) - _PERIOD
 
 
-def _ingredients(
-    gap: MeasuredGap, parameters: Parameters
-) -> tuple[ControlParameters, DamperCurve, FrictionCoefficients, FrictionContact, CurrentTable]:
-    settings = control_parameters(parameters)
-    table = resample(
-        gap.table.current, gap.table.normal_force, gap.numbers['offset_current'], settings.highest_current
-    )
-    return settings, chosen_damper(parameters), *friction_model(parameters), table
+def answering_from(gap: MeasuredGap, parameters: Parameters, activation: int) -> Answering:
+    """Return what answers as mount_control does, activated with `gap` as of the stamp `activation` (ns)."""
+    settings, answering = chosen_control(parameters), Answering()
+    table = settings.table(gap.table.current, gap.table.normal_force, gap.numbers['offset_current'])
+    answering.watch.note(activation)
+    answering.begin(settings, table, activation)
+    return answering
 
 
-def _laws(
-    run: ControlRun, gap: MeasuredGap, parameters: Parameters, changes: Sequence[ParametersChanged]
-) -> dict[int, list[ControlLaw]]:
-    """Return the laws by the places of the samples that are the first to be answered by them."""
-    laws: dict[int, list[ControlLaw]] = {}
+def _changed_later(
+    run: ControlRun, parameters: Parameters, changes: Sequence[ParametersChanged]
+) -> dict[int, list[ControlSettings]]:
+    """Return the settings by the places of the samples that are the first to be answered by them."""
+    later: dict[int, list[ControlSettings]] = {}
     for count, change in enumerate(changes, 1):
         place = int(np.searchsorted(run.stamps, change.time))
         if place < len(run.stamps):
-            law = ControlLaw(*_ingredients(gap, changed(parameters, changes[:count])))
-            laws.setdefault(place, []).append(law)
-    return laws
-
-
-def _follows(run: ControlRun, settings: ControlParameters) -> NDArray[np.bool_]:
-    """Return which samples are valid and stand one period after a valid one."""
-    valid = np.abs(run.displacement) <= settings.displacement_range  # not so for NaN
-    follows = np.zeros(len(run.stamps), bool)
-    steps = np.diff(run.stamps)
-    follows[1:] = valid[1:] & valid[:-1] & (steps > 0) & (steps < _PERIOD + _PERIOD // 2)
-    return follows
+            later.setdefault(place, []).append(chosen_control(changed(parameters, changes[:count])))
+    return later

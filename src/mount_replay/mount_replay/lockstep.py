@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from rclpy.context import Context
@@ -20,12 +20,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_bringup.chosen import Parameters
-from mount_control.controller import TRACE
 from mount_control.node import MountControl
-from mount_control.sample_watch import SampleCounts
 from mount_init.node import MountInit
-from mount_models.sampling import SAMPLE_TIME
-from mount_replay.core import OFF, ControlAnswers, Progress, RampAnswers, Replayed
+from mount_replay.core import OFF, ControlAnswers, Progress, RampAnswers, Replayed, activation_before
 from mount_replay.given.input import Column, ControlRun, ReplayError, ReplayInput, Times
 from mount_replay.given.ramps import MeasuredGap, Ramp
 from mount_ros import topics
@@ -39,11 +36,10 @@ from mount_ros.nodes.hosting import ros_context, transition
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 
 PATIENCE = 10.0  # s, chosen: a node that answers later does not answer
-_PERIOD = round(SAMPLE_TIME * 1e9)
 _LOOK_PERIOD = 0.1  # s
-_COUNTS = ('samples', 'bridged', 'restarts', 'ignored', 'invalid')
 
 Send = Callable[[bytes], None]
+N = TypeVar('N', bound=SafeLifecycleNode)
 
 
 def replay_in_lockstep(
@@ -129,9 +125,7 @@ class _Player:
             dialogue = _Dialogue(send, run.stamps, messages)
             path.subscribe(topics.CURRENT_SETPOINT, dialogue.take_setpoint)
             path.subscribe(topics.CONTROL_TRACE, dialogue.take_trace)
-            # The recording may begin long after the activation; the node asks whether the measurements went
-            # on from there without a break. So the table is dated one sample before the first.
-            stamp = int(run.stamps[0]) - _PERIOD
+            stamp = activation_before(run)
             gap_layout = ScalarsLayout(topics.AIR_GAP)
             table = np.stack([gap.table.current, gap.table.normal_force])
             send_gap, send_table = path.sender(topics.AIR_GAP), path.sender(topics.CURRENT_FORCE_TABLE)
@@ -150,9 +144,7 @@ class _Player:
             return answers
 
     @contextmanager
-    def _node(
-        self, kind: type[SafeLifecycleNode], name: str, own: Mapping[str, Any]
-    ) -> Iterator[SafeLifecycleNode]:
+    def _node(self, kind: type[N], name: str, own: Mapping[str, Any]) -> Iterator[N]:
         values = {**self._parameters.get(name, {}), **own, 'lockstep': True}
         overrides = [Parameter(key, value=value) for key, value in values.items()]
         node = kind(context=self._context, namespace=self._namespace, parameter_overrides=overrides)
@@ -251,19 +243,19 @@ def _with_temperatures(send_ripple: Send, send_temperature: Send, ramp: Ramp) ->
     return send
 
 
-def _control_answers(run: ControlRun, dialogue: _Dialogue, node: SafeLifecycleNode) -> ControlAnswers:
+def _control_answers(run: ControlRun, dialogue: _Dialogue, node: MountControl) -> ControlAnswers:
     verdict = node.judge()
-    counts = SampleCounts(*(int(str(verdict.figures[name])) for name in _COUNTS))
+    counts = node.answering.watch.counts
     _wait_for(lambda: len(dialogue.traces) >= counts.samples, 'the last control_trace')
     answers = ControlAnswers(
         run.stamps,
         dialogue.setpoints(),
         np.zeros(len(run.stamps), bool),
-        np.zeros(len(run.stamps), TRACE),
+        np.zeros(len(run.stamps), node.answering.trace_type),
         counts,
         verdict.sentence if verdict.level is Level.ERROR else '',
     )
-    unpack = ScalarsLayout(topics.CONTROL_TRACE).unpack
+    unpack = ScalarsLayout(node.trace_topic).unpack
     for raw in dialogue.traces:
         stamp, numbers, _ = unpack(raw)
         place = int(np.searchsorted(run.stamps, stamp))

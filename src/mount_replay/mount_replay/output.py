@@ -86,7 +86,7 @@ def _answers(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
 
 
 def _traces(given: ReplayInput, run: ControlAnswers) -> Iterator[_Entry]:
-    layout = ScalarsLayout(topics.CONTROL_TRACE)
+    layout = ScalarsLayout(topics.control_trace(run.traces.dtype.names or ()))
     stamps, traces = run.stamps[run.traced], np.ascontiguousarray(run.traces[run.traced])
     rows = layout.pack_rows(stamps, traces.view(np.float64).reshape(len(traces), len(layout.names)))
     for stamp, row in zip(stamps.tolist(), rows, strict=True):

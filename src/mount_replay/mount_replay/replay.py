@@ -7,19 +7,23 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mount_bags.bag.recording import Recording
 from mount_bags.run.folder import RunFolder, make_run_folder
 from mount_bags.run.place import open_run
-from mount_bringup.chosen import Parameters, chosen_damper, chosen_specimen, control_parameters
+from mount_bringup.chosen import (
+    Parameters,
+    check_policy,
+    chosen_control,
+    chosen_specimen,
+)
 from mount_bringup.settings import checked_settings, defaults_of_nodes
+from mount_control.controller import load_compiled_law
 from mount_init.parameters import InitParameters
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, with_flattened
 from mount_replay.agreement import Agreement, agreement
-from mount_replay.core import Progress, Replayed, controller_for, replay_in_core
+from mount_replay.core import Progress, Replayed, replay_in_core
 from mount_replay.given.foreign import ForeignOrder, chosen_gap, foreign_input
 from mount_replay.given.input import ReplayError, ReplayInput, replay_input
 from mount_replay.given.parameter_changes import without
@@ -124,8 +128,7 @@ def _told(given: ReplayInput, mode: str) -> list[str]:
 def check_parameters(parameters: Parameters) -> None:
     """Refuse what a node would refuse, before one is started; raises a `ValueError`."""
     control = parameters.get('mount_control', {})
-    control_parameters(parameters)
-    chosen_damper(parameters)
+    check_policy(parameters)
     with_flattened(FrictionCoefficients(), control, 'friction')
     with_flattened(FrictionContact(), control, 'contact')
     with_flattened(InitParameters(), parameters.get('mount_init', {}))
@@ -210,9 +213,7 @@ def with_changes(
 
 def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
     """Load or compile the laws, which a process does once."""
-    controller = controller_for(given.controls[0].gap, parameters)
-    controller.step(0.0)
-    controller.run(np.zeros(1))
+    load_compiled_law(chosen_control(parameters))
     chosen_specimen(parameters)
 
 

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from mount_bringup.chosen import Parameters, chosen_damper, control_parameters
+from mount_bringup.chosen import Parameters, chosen_damper, control_parameters, switched_viscous_parameters
 from mount_bringup.mount_choice import seat_of
-from mount_control.parameters import DEFAULT_DAMPER
+from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
 from mount_report.drive.evaluation import load_drive, tracking_error, wanted_force
@@ -33,7 +33,10 @@ def run_facts(signals: Signals) -> RunFacts:
             tracking_remark='the recording has no session that tells which force was wanted',
         )
     try:
-        control = control_parameters(parameters)
+        levels, highest = (
+            switched_viscous_parameters(parameters),
+            control_parameters(parameters).highest_current,
+        )
         coil = with_flattened(RippleCoil(), parameters.get('mount_sim', {}), 'coil')
         no_friction = without_friction(seat_of(parameters))
     except (ValueError, TypeError, AttributeError) as error:
@@ -45,9 +48,9 @@ def run_facts(signals: Signals) -> RunFacts:
     if not no_friction:
         tracking, remark = _tracking(signals, parameters)
     return RunFacts(
-        levels=Levels(control.switch_on_level, control.switch_off_level, control.highest_current),
+        levels=Levels(levels.switch_on_level, levels.switch_off_level, highest),
         resistance=coil.resistance,
-        resistance_remark=f'R = {coil.resistance:g} ohm, limit {control.highest_current:g} A',
+        resistance_remark=f'R = {coil.resistance:g} ohm, limit {highest:g} A',
         tracking=tracking,
         tracking_remark=remark,
         without_friction=no_friction,
@@ -72,7 +75,7 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
     if lacking:
         return None, f'what was not recorded is needed: {", ".join(lacking)}'
     try:
-        control, damper = control_parameters(parameters), chosen_damper(parameters)
+        control, damper = switched_viscous_parameters(parameters), chosen_damper(parameters)
         drive = load_drive(recording)
         wanted, _ = wanted_force(drive, control, damper)
         error = tracking_error(drive, control, damper)

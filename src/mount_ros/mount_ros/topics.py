@@ -4,7 +4,8 @@ Names are relative, so that several mounts live in one car under namespaces. SI 
 degC where a type demands it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from mount_models.sampling import SAMPLE_RATE
@@ -39,11 +40,16 @@ class Topic:
     rate: float
     content: str
     scalars: tuple[Scalar, ...] = ()
+    optional: tuple[Scalar, ...] = ()  # that some senders name between them
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the scalars in the order of the message."""
         return tuple(scalar.name for scalar in self.scalars)
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a scalar, empty where it is not known here."""
+        return next((scalar.unit for scalar in (*self.scalars, *self.optional) if scalar.name == name), '')
 
     @property
     def has_derivatives(self) -> bool:
@@ -115,14 +121,10 @@ CONTROL_TRACE = Topic(
     JOINT_STATE,
     Delivery.STREAM,
     SAMPLE_RATE,
-    'every intermediate of one control step',
+    'every intermediate of one control step; between velocity and damping_active those of the policy',
     (
         Scalar('displacement', 'm'),
         Scalar('velocity', 'm/s'),
-        Scalar('band_displacement', 'm'),
-        Scalar('band_velocity', 'm/s'),
-        Scalar('predicted_velocity', 'm/s'),
-        Scalar('magnitude', 'm'),
         Scalar('damping_active', '1'),
         Scalar('desired_force', 'N'),
         Scalar('friction_deflection', 'm'),
@@ -130,6 +132,12 @@ CONTROL_TRACE = Topic(
         Scalar('normal_force', 'N'),
         Scalar('current', 'A'),
         Scalar('bridged_samples', '1'),
+    ),
+    (
+        Scalar('band_displacement', 'm'),
+        Scalar('band_velocity', 'm/s'),
+        Scalar('predicted_velocity', 'm/s'),
+        Scalar('magnitude', 'm'),
     ),
 )
 
@@ -220,6 +228,12 @@ TOPICS: tuple[Topic, ...] = (
 
 RACK_TOPICS: tuple[Topic, ...] = (SIM_CLAMP_FORCE,)
 """What no node publishes: only recordings of experiments on a simulated rack have it."""
+
+
+def control_trace(names: Iterable[str]) -> Topic:
+    """Return `CONTROL_TRACE` as a policy sends it that traces `names`, in their order."""
+    scalars = tuple(Scalar(name, CONTROL_TRACE.unit(name)) for name in names)
+    return replace(CONTROL_TRACE, scalars=scalars, optional=())
 
 
 def topic(name: str) -> Topic:

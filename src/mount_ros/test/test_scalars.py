@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from mount_ros.messages.scalars import OneNumberLayout, ScalarsError, ScalarsLayout, stamp_of
-from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, TOPICS
+from mount_ros.messages import scalars
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsError, ScalarsLayout, ScalarsReader, stamp_of
+from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, TOPICS, control_trace
 
 STAMP = 1_763_680_000_123_456_789
 stamps = st.integers(0, 2**31 * 1_000_000_000 - 1)
@@ -53,6 +54,26 @@ def test_a_foreign_order_of_names_is_read_by_name():
     message.header.stamp.sec = 7
     stamp, positions, velocities = ScalarsLayout(COIL_RIPPLE).unpack(serialize_message(message))
     assert (stamp, positions, velocities) == (7_000_000_000, (3.0, 1.0), (6.0, 4.0))
+
+
+def test_a_reader_takes_names_from_messages_of_any_and_remembers_their_layout(monkeypatch):
+    reader = ScalarsReader(('current', 'magnitude'))
+    named = (('current',), ('x', 'magnitude', 'current'))
+    short, long = (ScalarsLayout(control_trace(names)) for names in named)
+    assert reader.read(long.pack(STAMP, (1.0, 2.0, 3.0))) == (STAMP, [3.0, 2.0])
+    monkeypatch.setattr(scalars, 'deserialize_message', lambda *_: pytest.fail('decoded once more'))
+    assert reader.read(long.pack(STAMP + 1, (4.0, 5.0, 6.0))) == (STAMP + 1, [6.0, 5.0])
+    monkeypatch.undo()
+    stamp, (current, magnitude) = reader.read(short.pack(STAMP, (7.0,)))
+    assert (stamp, current) == (STAMP, 7.0)
+    assert math.isnan(magnitude)
+
+
+def test_a_reader_reads_messages_with_a_frame_in_their_header():
+    message = JointState(name=['current'], position=[2.5])
+    message.header.frame_id = 'somewhere'
+    message.header.stamp.sec = 7
+    assert ScalarsReader(('current',)).read(serialize_message(message)) == (7_000_000_000, [2.5])
 
 
 def test_missing_velocities_are_unknown_and_not_zero():

@@ -1,5 +1,6 @@
 """Marks that the recorder sets by itself, from the streams that it sees."""
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from enum import Enum
@@ -56,19 +57,20 @@ class AutomaticMarks:
 
 
 class SwitchOnWatch:
-    """Marks where `damping_active` goes from 0 to 1."""
+    """Marks where `damping_active` leaves 0."""
 
     def __init__(self, marks: AutomaticMarks):
         self._marks = marks
         self._active = False
 
     def add(self, stamp: int, active: float, magnitude: float) -> None:
-        """Take one control step; `magnitude` is the band displacement that decided, m."""
-        if active == self._active:
+        """Take one control step; `magnitude` is the band displacement that decided, m, NaN where none did."""
+        if (active > 0.0) == self._active:
             return
-        self._active = bool(active)
+        self._active = active > 0.0
         if self._active:
-            text = f'damping on at {1e3 * magnitude:.2f} mm in the band'
+            level = '' if math.isnan(magnitude) else f' at {1e3 * magnitude:.2f} mm in the band'
+            text = f'damping on{level}'
             self._marks.mark(MarkKind.SWITCH_ON, stamp, text)
 
 

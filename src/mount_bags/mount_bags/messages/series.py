@@ -193,7 +193,7 @@ class Series:
 
     def unit(self, name: str) -> str:
         """Return the unit of `series[name]`, empty where the registry does not know it."""
-        return next((scalar.unit for scalar in self._scalars() if scalar.name == name), '')
+        return self.registered.unit(name) if self.registered else ''
 
     def derivative_unit(self, name: str) -> str:
         """Return the unit of `series.derivative(name)`, empty where the registry does not know it."""

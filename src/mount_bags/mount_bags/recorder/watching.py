@@ -14,7 +14,7 @@ from mount_bags.events.automatic_marks import (
     SwitchOnWatch,
 )
 from mount_bags.recorder.recorder import Observe, Recorder
-from mount_ros.messages.scalars import ScalarsLayout, stamp_of
+from mount_ros.messages.scalars import ScalarsReader, stamp_of
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DIAGNOSTICS, Delivery, Topic
 
 PresentTime = Callable[[], int]
@@ -39,13 +39,12 @@ def _stream_observer(samples: LostSampleWatch, switching: SwitchOnWatch | None) 
     add = samples.add
     if switching is None:
         return lambda raw, _: add(stamp_of(raw))
-    layout = ScalarsLayout(CONTROL_TRACE)
-    active, magnitude = (CONTROL_TRACE.names.index(name) for name in ('damping_active', 'magnitude'))
+    reader = ScalarsReader(('damping_active', 'magnitude'))
 
     def observe(raw: bytes, _: int) -> None:
-        stamp, numbers, _ = layout.unpack(raw)
+        stamp, (active, magnitude) = reader.read(raw)
         add(stamp)
-        switching.add(stamp, numbers[active], numbers[magnitude])
+        switching.add(stamp, active, magnitude)
 
     return observe
 

@@ -14,16 +14,13 @@ from rich.table import Table
 from sensor_msgs.msg import JointState
 
 from mount_bags.bag.writer import BagWriter
+from mount_bringup.chosen import chosen_control
 from mount_cli.bench.comparison import Comparison, in_turn
 from mount_cli.bench.storage import ROUNDS as STORAGE_ROUNDS
 from mount_cli.bench.storage import storage_figures
-from mount_control.controller import Controller
+from mount_control.controller import ControlLaw, Controller
 from mount_control.force_to_current import resample
-from mount_control.parameters import ControlParameters
 from mount_driver.codec import DATABASE_FILE, Measurement, MountCodec
-from mount_models.damper import damper_curve
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.loop.run import run_core
 from mount_replay.replay import ReplayOrder, replay_without_output
@@ -84,9 +81,7 @@ def _coding() -> Comparison:
 
 def _control() -> Comparison:
     table = resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
-    controller = Controller(
-        ControlParameters(), damper_curve('viscous_2000'), FrictionCoefficients(), FrictionContact(), table
-    )
+    controller = Controller(ControlLaw(chosen_control({}), table))
     displacement = 1e-3 * np.sin(2.0 * np.pi * 8.0 * np.arange(60_000) * SAMPLE_TIME)
     ours = _median_time(lambda: controller.run(displacement)) / len(displacement)
     return Comparison('one control step', ours, 'real time', SAMPLE_TIME)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mount_control.parameters import DEFAULT_DAMPER
+from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_experiments.harness.closed_loop import FloatArray, Ride
 from mount_experiments.harness.contract import ExperimentError
 from mount_models.damper import damper_curve

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_control.parameters import ControlParameters
+from mount_control.policy import switched_viscous
 from mount_experiments.harness.closed_loop import FloatArray, Ride
 from mount_report.drive.evaluation import switching
 
@@ -21,7 +21,7 @@ class Crossing:
     exceeded: float | None
 
 
-def figures_of(crossing: Crossing, control: ControlParameters) -> dict[str, Any]:
+def figures_of(crossing: Crossing, control: switched_viscous.Parameters) -> dict[str, Any]:
     """Return delays and durations of damping (s), rms and peaks (m); None if the level was not exceeded."""
     found: dict[str, Any] = {'exceeded_s': crossing.exceeded}
     if crossing.exceeded is None:
@@ -57,12 +57,12 @@ def figures_of(crossing: Crossing, control: ControlParameters) -> dict[str, Any]
     }
 
 
-def _last_above(ridden: Ride, control: ControlParameters, off: float) -> float:
+def _last_above(ridden: Ride, control: switched_viscous.Parameters, off: float) -> float:
     """Return when the displacement was last at or above the switch-off level before damping went off."""
     return _last(ridden.seen.time, ridden.seen.displacement, control.switch_off_level, off)
 
 
-def _last_above_in_band(ridden: Ride, control: ControlParameters, off: float) -> float:
+def _last_above_in_band(ridden: Ride, control: switched_viscous.Parameters, off: float) -> float:
     """Return the same of the band-passed displacement, which the control compares with the level."""
     return _last(ridden.band_time, ridden.band_displacement, control.switch_off_level, off)
 

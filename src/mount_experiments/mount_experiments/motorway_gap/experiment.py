@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mount_control.parameters import DEFAULT_DAMPER, ControlParameters
+from mount_control.policy import switched_viscous
 from mount_experiments.harness.closed_loop import Ride, mode_of, ride
 from mount_experiments.harness.contract import (
     Experiment,
@@ -41,7 +41,7 @@ class GapParameters(NamedTuple):
     gap_time: Annotated[float, Quantity('s', 'when the wheel meets it', 0.5, 60.0)] = 2.0
     duration: Annotated[float, Quantity('s', 'length of the drive', 2.5, 120.0)] = 6.0
     compared_depths: str = '0.010, 0.020, 0.030'
-    damper: str = DEFAULT_DAMPER
+    damper: str = switched_viscous.DEFAULT_DAMPER
 
 
 def run(order: Order, progress: Progress) -> Outcome:
@@ -50,7 +50,7 @@ def run(order: Order, progress: Progress) -> Outcome:
 
     parameters = parameters_of(order, NAME, GapParameters())
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
-    control = with_flattened(ControlParameters(), order.settings.get('mount_control', {}))
+    control = with_flattened(switched_viscous.Parameters(), order.settings.get('mount_control', {}))
     compared = numbers_of(f'{NAME}.compared_depths', parameters.compared_depths, 0.001, 0.1)
     depths = sorted({*compared, parameters.gap_depth})
     crossings: dict[float, Crossing] = {}
@@ -91,7 +91,10 @@ def _exceeded(ridden: Ride, level: float, parameters: GapParameters) -> float | 
 
 
 def _figures(
-    crossings: dict[float, Crossing], parameters: GapParameters, control: ControlParameters, mode: str
+    crossings: dict[float, Crossing],
+    parameters: GapParameters,
+    control: switched_viscous.Parameters,
+    mode: str,
 ) -> dict[str, Any]:
     told = {f'{1e3 * depth:g} mm': figures_of(each, control) for depth, each in crossings.items()}
     return {

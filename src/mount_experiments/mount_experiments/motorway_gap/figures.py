@@ -11,12 +11,12 @@ from mount_experiments.harness.drawing import BLUE, GREEN, GREY, RED, finish, ne
 from mount_experiments.motorway_gap.evaluation import FRICTION, HYDRO, OFF, Crossing
 
 if TYPE_CHECKING:
-    from mount_control.parameters import ControlParameters
+    from mount_control.policy import switched_viscous
 
 _BEFORE, _AFTER = 0.3, 1.5  # s round the moment at which the switch-on level is exceeded
 
 
-def draw_gap(crossing: Crossing, depth: float, control: ControlParameters, file: Path) -> Path:
+def draw_gap(crossing: Crossing, depth: float, control: switched_viscous.Parameters, file: Path) -> Path:
     """Draw displacement with both switching levels above, the coil's current below, Fig. 15."""
     figure = new_figure(f'Over a gap of {1e3 * depth:g} mm in the motorway (Fig. 15)', 6.5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mount_control.parameters import DEFAULT_DAMPER, ControlParameters
+from mount_control.policy import switched_viscous
 from mount_experiments.harness.closed_loop import FloatArray, Ride, mode_of, ride
 from mount_experiments.harness.contract import (
     Experiment,
@@ -50,7 +50,7 @@ class RecordedDriveParameters(NamedTuple):
     topic: str = ''
     scale: AccelerationScale = 1.0
     duration: Annotated[float, Quantity('s', 'so much from its beginning; 0: all of it', 0.0, 3600.0)] = 0.0
-    damper: str = DEFAULT_DAMPER
+    damper: str = switched_viscous.DEFAULT_DAMPER
 
 
 def run(order: Order, progress: Progress) -> Outcome:
@@ -72,7 +72,7 @@ def run(order: Order, progress: Progress) -> Outcome:
         )
     damper_curve(parameters.damper)  # refuses an unknown one before anything is made
     rate = recorded_signal(_scenario(parameters)).rate  # refuses what cannot be read
-    control = with_flattened(ControlParameters(), order.settings.get('mount_control', {}))
+    control = with_flattened(switched_viscous.Parameters(), order.settings.get('mount_control', {}))
     rides = {}
     for number, (name, mount) in enumerate(_MOUNTS.items()):
         progress(0.95 * number / len(_MOUNTS), name)
@@ -107,7 +107,10 @@ def _own(parameters: RecordedDriveParameters, mount: str) -> dict[str, dict[str,
 
 
 def _figures(
-    rides: dict[str, Ride], parameters: RecordedDriveParameters, control: ControlParameters, mode: str
+    rides: dict[str, Ride],
+    parameters: RecordedDriveParameters,
+    control: switched_viscous.Parameters,
+    mode: str,
 ) -> dict[str, Any]:
     friction = rides[FRICTION]
     seen = friction.seen

@@ -17,7 +17,7 @@ from mount_experiments.recorded_drive.evaluation import (
 )
 
 if TYPE_CHECKING:
-    from mount_control.parameters import ControlParameters
+    from mount_control.policy import switched_viscous
     from mount_experiments.harness.closed_loop import Ride
 
 _LOWEST, _HIGHEST = 0.7, 45.0  # Hz, chosen: what the bands lie in, and no more than a car's sensor has
@@ -51,7 +51,7 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
     return finish(figure, file)
 
 
-def draw_traces(rides: dict[str, Ride], control: ControlParameters, file: Path) -> Path:
+def draw_traces(rides: dict[str, Ride], control: switched_viscous.Parameters, file: Path) -> Path:
     """Draw the whole drive above, the seconds round its largest displacement below."""
     friction = rides[FRICTION]
     seen = friction.seen

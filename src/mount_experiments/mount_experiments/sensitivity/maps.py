@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_control.parameters import DEFAULT_DAMPER
+from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_experiments.harness.closed_loop import FloatArray
 from mount_models.quantity import Quantity
 

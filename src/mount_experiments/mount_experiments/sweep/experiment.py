@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from mount_control.parameters import DEFAULT_DAMPER, ControlParameters
+from mount_control.policy import switched_viscous
 from mount_experiments.harness.closed_loop import mode_of, ride
 from mount_experiments.harness.contract import (
     Experiment,
@@ -49,7 +49,7 @@ class SweepParameters(NamedTuple):
     idle_amplitude: Annotated[
         float, Quantity('N', 'F_i: force of the idling engine; 0: none of these runs', 0.0, 2000.0)
     ] = 200.0
-    damper: str = DEFAULT_DAMPER
+    damper: str = switched_viscous.DEFAULT_DAMPER
 
 
 def run(order: Order, progress: Progress) -> Outcome:
@@ -102,7 +102,7 @@ def _own(parameters: SweepParameters, mount: str, idle: float) -> dict[str, dict
 
 def _switch_on_level(order: Order) -> float:
     control = order.settings.get('mount_control', {})
-    return float(control.get('switch_on_level', ControlParameters().switch_on_level))
+    return float(control.get('switch_on_level', switched_viscous.Parameters().switch_on_level))
 
 
 def _figures(

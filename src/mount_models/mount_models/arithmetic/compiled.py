@@ -12,7 +12,8 @@ import hashlib
 import importlib.util
 import os
 import re
-from collections.abc import Callable
+import types
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -27,14 +28,39 @@ _OURS = re.compile(r'^\s*(?:from|import)\s+(mount_\w+)', re.MULTILINE)
 
 def compiled(function: F) -> F:
     """Return `function` compiled by numba on its first call and cached on disk."""
-    file = Path(function.__code__.co_filename).resolve()
+    return _compiled(function, _packages_behind(_file_of(function)))
+
+
+def specialised(function: F, name: str, bound: Mapping[str, Any]) -> F:
+    """Return `function` compiled with other values of the global names in `bound`, and cached on disk.
+
+    `name` tells it from the same function with other values. Modules in `bound` are part of what a change
+    makes compile anew.
+    """
+    clone = types.FunctionType(
+        function.__code__, {**function.__globals__, **bound}, function.__name__, function.__defaults__
+    )
+    clone.__qualname__ = f'{name}.{function.__qualname__}'
+    packages = set(_packages_behind(_file_of(function)))
+    for value in bound.values():
+        if isinstance(value, types.ModuleType) and value.__file__ is not None:
+            packages.update(_packages_behind(Path(value.__file__).resolve()))
+    return cast(F, _compiled(clone, tuple(sorted(packages))))
+
+
+def _compiled(function: F, packages: tuple[Path, ...]) -> F:
     config: Any = numba_config  # numba reads the folder when it decorates
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(_cache_root() / _sources_digest(_packages_behind(file)))
+    config.CACHE_DIR = str(_cache_root() / _sources_digest(packages))
     try:
-        return cast(F, numba.njit(cache=True, error_model='numpy')(function))
+        # inlined: a call costs more than many a law, for arrays are counted at each (7 % of a core drive)
+        return cast(F, numba.njit(cache=True, error_model='numpy', forceinline=True)(function))
     finally:
         config.CACHE_DIR = before
+
+
+def _file_of(function: Callable[..., Any]) -> Path:
+    return Path(function.__code__.co_filename).resolve()
 
 
 def _package_folder(file: Path) -> Path:

@@ -13,7 +13,7 @@ from mount_bags.signals.loading import is_recording, load_signal
 from mount_bags.signals.plausibility import check_size
 from mount_bags.signals.resampling import has_step, resampled
 from mount_bags.signals.signal import SECOND
-from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters
+from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters, switched_viscous_parameters
 from mount_init.parameters import InitParameters
 from mount_models.actuator.closing import ClosingMechanics
 from mount_models.arithmetic.averages import mean
@@ -86,7 +86,7 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     `SignalError`.
     """
     notes: list[str] = []
-    longest_gap = 1.0 / control_parameters(parameters).eigenfrequency
+    longest_gap = 1.0 / switched_viscous_parameters(parameters).eigenfrequency
     signals = {name: _signal(path, place, longest_gap, notes) for name, place in order.fields.items()}
     stamps, values = _on_one_grid(signals, notes)
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it

@@ -4,7 +4,7 @@ Only the samples that a node has taken belong to its run: in real time a message
 come too late for the controller, which then bridged it. Whether it did stands in `control_trace`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from mount_bags.messages.series import Payloads
 from mount_bags.messages.time_axis import time_axis
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
+from mount_control.settings import policy_parameters
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.given.parameter_changes import recorded_changes
@@ -41,7 +42,8 @@ _READ = (
     topics.CURRENT_FORCE_TABLE,
     topics.SESSION,
 )
-_QUIET_AT_FIRST = ('velocity', 'band_displacement', 'band_velocity', 'bridged_samples')
+_QUIET_AT_FIRST = ('velocity', 'friction_deflection', 'bridged_samples')  # 0 in the first step of all
+_LENGTHS = ('m', 'm/s')  # units of a policy's own fields that are 0 in its first step
 _BREAK = SECOND  # ns: after it the controller takes no table from before
 
 
@@ -83,6 +85,7 @@ class RecordedAnswers:
     currents: Column
     trace_stamps: Times
     traces: dict[str, Column]
+    quiet_at_first: tuple[str, ...] = _QUIET_AT_FIRST
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
             f'{recording.path} holds no air_gap with its current_force_table, so no current can be told; '
             'give one of another recording with --table RECORDING, or --table default'
         )
-    answers = recorded_answers(recording, notes)
+    answers = recorded_answers(recording, parameters['mount_control'], notes)
     ramps = ramps_of(recording, parameters, gaps, notes)
     samples = _samples_taken(displacement, answers, ramps, gaps, notes)
     longest_bridge = with_flattened(ControlParameters(), parameters['mount_control']).longest_bridge
@@ -171,8 +174,13 @@ def dated(gap: MeasuredGap, stamp: int) -> MeasuredGap:
     return MeasuredGap(stamp, gap.numbers, ForceTable(stamp, gap.table.current, gap.table.normal_force))
 
 
-def recorded_answers(recording: Recording, notes: Notes) -> RecordedAnswers | None:
-    """Return the recorded setpoints, the first for each stamp, and traces; None where there are none."""
+def recorded_answers(
+    recording: Recording, control: Mapping[str, Any], notes: Notes
+) -> RecordedAnswers | None:
+    """Return the recorded setpoints, the first for each stamp, and traces; None where there are none.
+
+    `control` holds the recorded parameters of mount_control.
+    """
     if not has(recording, topics.CURRENT_SETPOINT):
         notes.append('the recording holds no current_setpoint: there is nothing to compare with')
         return None
@@ -186,8 +194,10 @@ def recorded_answers(recording: Recording, notes: Notes) -> RecordedAnswers | No
         return RecordedAnswers(stamps, setpoints['coil_current'][first], empty.astype(np.int64), traces)
     series = recording[topics.CONTROL_TRACE.name]
     trace_stamps, places = np.unique(series.stamps, return_index=True)
-    traces = {name: series[name][places] for name in topics.CONTROL_TRACE.names if name in series.names}
-    return RecordedAnswers(stamps, setpoints['coil_current'][first], trace_stamps, traces)
+    traces = {name: series[name][places] for name in series.names}
+    own = policy_parameters(control)[0].TRACE
+    quiet = (*_QUIET_AT_FIRST, *(name for name, unit in own.items() if unit in _LENGTHS))
+    return RecordedAnswers(stamps, setpoints['coil_current'][first], trace_stamps, traces, quiet)
 
 
 # Samples.
@@ -288,13 +298,13 @@ def _taken_without_answer(stamps: Times, answered: Times, answers: RecordedAnswe
 
 def _starts_afresh(answers: RecordedAnswers, step: int) -> bool:
     """Whether a recorded step is the first of an empty memory: then nothing moves in it yet."""
-    return all(answers.traces[name][step] == 0.0 for name in _QUIET_AT_FIRST if name in answers.traces)
+    return all(answers.traces[name][step] == 0.0 for name in answers.quiet_at_first if name in answers.traces)
 
 
 def _moved_then_afresh(answers: RecordedAnswers) -> NDArray[np.bool_]:
     """Return which recorded steps are the first of an empty memory right after one that was not empty."""
     quiet = np.ones(len(answers.trace_stamps), bool)
-    for name in _QUIET_AT_FIRST:
+    for name in answers.quiet_at_first:
         quiet &= answers.traces[name] == 0.0 if name in answers.traces else True
     return quiet & ~np.roll(quiet, 1)
 

@@ -4,24 +4,15 @@ The same cores as in the nodes, in the same order: the initialisation answers un
 controller from the next sample on.
 """
 
-from mount_bringup.chosen import (
-    Parameters,
-    chosen_damper,
-    chosen_specimen,
-    control_parameters,
-    friction_model,
-)
-from mount_control.controller import Controller
-from mount_control.force_to_current import resample
-from mount_control.sample_watch import Judgement, SampleWatch
+from mount_bringup.chosen import Parameters, chosen_control, chosen_specimen
+from mount_control.answering import Answer, Answering
+from mount_control.policy.contract import Policy
+from mount_control.sample_watch import Judgement
 from mount_init.coil_temperature import TemperatureReadings
-from mount_init.initialisation import OFF, Initialisation, InitialisationResult
+from mount_init.initialisation import Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics.electronics import Reading
-
-_PERIOD = round(SAMPLE_TIME * 1e9)  # ns
 
 
 class CoreChain:
@@ -33,55 +24,36 @@ class CoreChain:
         self._initialisation = Initialisation(
             chosen_specimen(parameters), init_parameters, self._temperatures
         )
-        self._control = control_parameters(parameters)
-        self._damper = chosen_damper(parameters)
-        self._friction, self._contact = friction_model(parameters)
-        self._watch = SampleWatch(SAMPLE_TIME, self._control.longest_bridge, self._control.displacement_range)
+        self._control = chosen_control(parameters)
+        self.answering = Answering()
         self.result: InitialisationResult | None = None
-        self.controller: Controller | None = None
         self.controlled = False  # whether the controller answered the last sample, if only with 0 A
-        self.traced = False  # whether it made a step for it, so that its trace is of this sample
 
     @property
     def displacement_range(self) -> float:
         """Displacements (m) up to here are believed."""
-        return self._control.displacement_range
+        return self._control.parameters.displacement_range
 
-    def expects(self, stamp: int) -> bool:
-        """Whether a believable sample of time `stamp` (ns) just goes on where the last one ended."""
-        return self._watch.last_stamp == stamp - _PERIOD
-
-    def follow(self, last_stamp: int, count: int) -> None:
-        """Note `count` samples that the controller answered elsewhere, the last at `last_stamp` (ns)."""
-        self._watch.follow(last_stamp, count)
+    @property
+    def policy(self) -> Policy:
+        """The policy of the controller."""
+        return self._control.policy
 
     def take_temperature(self, stamp: int, celsius: float) -> None:
         """Take a coil temperature (degC) of time `stamp` (ns) as it came over the bus."""
         self._temperatures.take(stamp, celsius)
 
-    def answer(self, stamp: int, reading: Reading) -> float:
-        """Return the setpoint (A) for a sample of time `stamp` (ns) as it came over the bus."""
-        self.traced = False
-        self.controlled = self.controller is not None
-        if self.controller is not None:
-            return self._control_step(self.controller, stamp, reading.displacement)
+    def answer(self, stamp: int, reading: Reading) -> Answer:
+        """Return the answer to a sample of time `stamp` (ns) as it came over the bus."""
+        answer = self.answering.answer(stamp, reading.displacement)
+        self.controlled = answer.reason is not Judgement.INACTIVE
+        if self.controlled:
+            return answer
         setpoint = self._initialisation.step(
             stamp, reading.coil_current, reading.current_rate, reading.flux_rate
         )
         if self._initialisation.finished:
             self.result = self._initialisation.result()
-            self.controller = self._make_controller(self.result)
-        return setpoint
-
-    def _control_step(self, controller: Controller, stamp: int, displacement: float) -> float:
-        judgement, missing = self._watch.judge(stamp, displacement)
-        if judgement in (Judgement.INVALID, Judgement.IGNORE):
-            return OFF
-        if judgement is Judgement.RESTART:
-            controller.restart(displacement)
-        self.traced = True
-        return controller.step(displacement, missing)
-
-    def _make_controller(self, result: InitialisationResult) -> Controller:
-        table = resample(*result.table, result.offset_current, self._control.highest_current)
-        return Controller(self._control, self._damper, self._friction, self._contact, table)
+            table = self._control.table(*self.result.table, self.result.offset_current)
+            self.answering.begin(self._control, table, stamp)
+        return answer._replace(current=setpoint)

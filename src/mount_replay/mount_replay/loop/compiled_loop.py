@@ -4,9 +4,13 @@ It calls, in the order of the wire, what the simulated mount, the bus and the co
 is no law in it. Samples that need a judgement end it: the caller takes them one by one.
 """
 
+import functools
 import math
+from collections.abc import Callable
+from typing import Any
 
-from mount_control import controller
+from mount_control.controller import compiled_with
+from mount_control.policy.contract import Policy
 from mount_driver.quantisation import (
     quantised_coil_current,
     quantised_current_rate,
@@ -14,7 +18,7 @@ from mount_driver.quantisation import (
     quantised_flux_rate,
     quantised_setpoint_current,
 )
-from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.compiled import compiled, specialised
 from mount_sim.plant import plant
 
 
@@ -33,8 +37,16 @@ def over_the_bus(displacement, coil_current, current_rate, flux_rate):
     )
 
 
-@compiled
-def run(ahead, memory, believable, pending, readings, setpoints, truths, traces):
+@functools.cache
+def run_with(policy: Policy) -> Callable[..., tuple[int, float, float]]:
+    """Return `_run` compiled with a policy."""
+    return specialised(_run, policy.__name__, {'policy': policy, 'step': compiled_with(policy).step})
+
+
+step: Any = None  # of the controller; bound by `run_with`
+
+
+def _run(ahead, memory, believable, pending, readings, setpoints, truths, traces):
     """Take samples until one displacement is not believable; return (number taken, setpoints in A).
 
     The two setpoints are the one that has arrived for the next sample and the one taken over last.
@@ -52,9 +64,7 @@ def run(ahead, memory, believable, pending, readings, setpoints, truths, traces)
         reading = over_the_bus(displacement, coil_current, current_rate, flux_rate)
         if not abs(reading[0]) <= believable:  # also NaN
             return index, pending, last
-        setpoint = controller.step(
-            memory.law, memory.tables, memory.state, memory.window, traces[index], reading[0], 0
-        )
+        setpoint = step(memory.law, memory.tables, memory.state, memory.window, traces[index], reading[0], 0)
         for place in range(4):
             readings[index, place] = reading[place]
         setpoints[index] = setpoint

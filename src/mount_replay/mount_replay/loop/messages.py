@@ -7,7 +7,7 @@ import numpy as np
 from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
 
-from mount_control.controller import TRACE
+from mount_control.policy.contract import Policy, trace_dtype, trace_fields
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros import topics
@@ -33,13 +33,14 @@ WriteColumns = Callable[[Columns, NDArray[np.int64]], None]
 class Samples:
     """Answered samples in a row; what stands behind `count` is not valid."""
 
-    def __init__(self, capacity: int):
+    def __init__(self, capacity: int, policy: Policy):
         self.count = 0
+        self.trace_topic = topics.control_trace(trace_fields(policy))
         self.stamps = np.zeros(capacity, np.int64)  # ns
         self.readings = np.zeros((capacity, 4))  # as they arrive: m, A, A/s, T/s
         self.setpoints = np.zeros(capacity)  # A
         self.truths = np.zeros((capacity, TRUTH.itemsize), np.uint8)  # records `TRUTH`
-        self.traces = np.zeros((capacity, TRACE.itemsize), np.uint8)  # records `TRACE`, where `traced`
+        self.traces = np.zeros((capacity, trace_dtype(policy).itemsize), np.uint8)  # where `traced`
         self.traced = np.zeros(capacity, bool)
 
     @property
@@ -61,7 +62,6 @@ class CoreMessages:
         self._temperature = temperature_layout()
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
-        self._trace = ScalarsLayout(topics.CONTROL_TRACE)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
         self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
         self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
@@ -113,7 +113,8 @@ class CoreMessages:
             (topics.SIM_MOUNT_FORCE, self._force.pack_rows(stamps, truth['mount_force'])),
         ]
         if samples.traced[part.start]:
-            traces = self._trace.pack_rows(stamps, _numbers(samples.traces[part]))
+            layout = ScalarsLayout(samples.trace_topic)
+            traces = layout.pack_rows(stamps, _numbers(samples.traces[part]))
             columns.append((topics.CONTROL_TRACE, traces))
         return columns
 

@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 
 from mount_bringup.chosen import Parameters
-from mount_control.controller import Controller
 from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
@@ -75,15 +74,15 @@ def run_core_into(
     mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
     chain = CoreChain(parameters)
     celsius = _coil_temperature(sim)
-    samples = Samples(_BLOCK)
+    samples = Samples(_BLOCK, chain.policy)
     pending: float | None = None
     begin = time.monotonic()
     while not mount.finished:
         if not samples.room:
             messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-        if pending is not None and chain.controller is not None and chain.expects(_stamp(mount)):
-            taken, pending = _take_many(mount, chain, chain.controller, samples, pending)
+        if pending is not None and chain.answering.expects(_stamp(mount)):
+            taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
         if mount.sample % STATUS_EVERY == 0:
@@ -103,7 +102,7 @@ def run_core_into(
         wall_time=time.monotonic() - begin,
         result=chain.result,
         beyond_range=mount.beyond_range,
-        control_faults=chain.controller.faults if chain.controller is not None else 0,
+        control_faults=chain.answering.faults,
     )
 
 
@@ -124,26 +123,29 @@ def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending
     """Take one sample and return the setpoint (A) as it arrives for the next."""
     place, stamp = samples.count, _stamp(mount)
     reading = Reading(*loop.over_the_bus(*mount.measure()))
-    setpoint = chain.answer(stamp, reading)
+    answer = chain.answer(stamp, reading)
+    setpoint = OFF if answer.current is None else answer.current
     samples.stamps[place] = stamp
     samples.readings[place] = reading
     samples.setpoints[place] = setpoint
     samples.truths[place] = np.frombuffer(mount.truth_bytes, np.uint8)
-    samples.traced[place] = chain.traced
-    if chain.traced and chain.controller is not None:
-        samples.traces[place] = np.frombuffer(chain.controller.trace_bytes, np.uint8)
+    samples.traced[place] = answer.trace is not None
+    if answer.trace is not None:
+        samples.traces[place] = np.frombuffer(answer.trace, np.uint8)
     samples.count += 1
     mount.advance(pending)
     return quantised_setpoint_current(setpoint)
 
 
 def _take_many(
-    mount: SimulatedMount, chain: CoreChain, controller: Controller, samples: Samples, pending: float
+    mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float
 ) -> tuple[int, float]:
     """Take samples while nothing is doubtful; return how many, and the setpoint (A) for the next."""
+    controller = chain.answering.controller
+    assert controller is not None
     ahead = mount.ahead(samples.room)
     part = slice(samples.count, samples.count + len(ahead.values))
-    taken, arrived, last = loop.run(
+    taken, arrived, last = loop.run_with(chain.policy)(
         ahead,
         controller.memory,
         chain.displacement_range,
@@ -159,6 +161,6 @@ def _take_many(
         samples.stamps[part] = stamps
         samples.traced[part] = True
         samples.count += taken
-        chain.follow(int(stamps[-1]), taken)
+        chain.answering.watch.follow(int(stamps[-1]), taken)
         mount.skip(taken, last)
     return taken, arrived

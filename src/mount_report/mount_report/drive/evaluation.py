@@ -13,7 +13,7 @@ from mount_bags.bag.recording import Recording
 from mount_bags.events.switching_changes import Switching
 from mount_bags.messages.time_axis import time_axis
 from mount_control import band_pass
-from mount_control.parameters import ControlParameters
+from mount_control.policy import switched_viscous
 from mount_models.damper import DamperCurve
 from mount_models.sampling import SAMPLE_TIME
 
@@ -108,7 +108,7 @@ def switching(drive: Drive) -> Switching:
     return Switching(tuple(drive.time[change > 0].tolist()), tuple(drive.time[change < 0].tolist()))
 
 
-def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCurve) -> float:
+def tracking_error(drive: Drive, parameters: switched_viscous.Parameters, damper: DamperCurve) -> float:
     """Return the rms error of the friction force while damping is on, as a share of the peak wanted force.
 
     NaN if damping was never on.
@@ -122,7 +122,7 @@ def tracking_error(drive: Drive, parameters: ControlParameters, damper: DamperCu
 
 
 def wanted_force(
-    drive: Drive, parameters: ControlParameters, damper: DamperCurve
+    drive: Drive, parameters: switched_viscous.Parameters, damper: DamperCurve
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the wanted friction force (N) at the true times, and which of them belongs to each sample.
 

@@ -14,7 +14,7 @@ from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.recorder.snapshot import saved_snapshots
 from mount_bags.run.folder import RunFolder
-from mount_bringup.chosen import Parameters, control_parameters
+from mount_bringup.chosen import Parameters, switched_viscous_parameters
 from mount_report.drive.evaluation import Drive, load_drive, samples_at_the_ends
 from mount_report.drive.summary import (
     SUMMARISED,
@@ -80,7 +80,7 @@ def tell_snapshots(
 def _draw(folder: RunFolder, parameters: Parameters, drive_data: Drive, figures: dict[str, Any]) -> None:
     from mount_report.drive.figure import draw_drive  # after the drive: what draws takes a second to load
 
-    control = control_parameters(parameters)
+    control = switched_viscous_parameters(parameters)
     title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
     begin = figures['excitation_start_s']
     draw_drive(drive_data, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)

@@ -21,6 +21,7 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.topics import Topic
 
 _STAMP = struct.Struct('<iI')
+_NUMBER = struct.Struct('<d')
 _STAMP_OFFSET = 4  # behind the CDR encapsulation header
 _STAMP_END = _STAMP_OFFSET + _STAMP.size
 _NANOSECONDS = 1_000_000_000
@@ -110,6 +111,41 @@ class ScalarsLayout:
         full = len(message.velocity) == len(message.name)
         velocities = tuple(message.velocity[index] if full else math.nan for index in order)
         return stamp_of(raw), positions, velocities
+
+
+class ScalarsReader:
+    """Reads some named scalars out of `JointState` messages that name what they like, NaN where one lacks.
+
+    It remembers the layout of the last message, and reads the next ones of the same layout in place.
+    """
+
+    def __init__(self, names: Sequence[str]):
+        self._names = names
+        self._head, self._size = b'', 0
+        self._places: list[int | None] = []
+        self._begin = 0
+
+    def read(self, raw: bytes) -> tuple[int, list[float]]:
+        """Return (stamp ns, positions) in the order of the names."""
+        if len(raw) != self._size or raw[_STAMP_END : self._begin] != self._head:
+            self._learn(raw)
+        numbers = [
+            math.nan if place is None else _NUMBER.unpack_from(raw, place)[0] for place in self._places
+        ]
+        return stamp_of(raw), numbers
+
+    def _learn(self, raw: bytes) -> None:
+        message = deserialize_message(raw, JointState)
+        names = list(message.name)
+        if len(message.position) != len(names):
+            raise ScalarsError(f'a message with {len(names)} names has {len(message.position)} positions')
+        message.position = _marks(len(names), 0)
+        marked = bytearray(serialised(message))
+        self._begin = _offset_of(marked, _marks(len(names), 0)) if names else _STAMP_END
+        self._head, self._size = raw[_STAMP_END : self._begin], len(raw)
+        self._places = [
+            self._begin + _NUMBER.size * names.index(name) if name in names else None for name in self._names
+        ]
 
 
 class OneNumberLayout:

@@ -1,0 +1,23 @@
+"""The policies by their names."""
+
+from mount_control.policy import switched_viscous
+from mount_control.policy.contract import Policy
+from mount_models.quantity import ParameterError
+
+DEFAULT = 'switched_viscous'
+
+POLICIES: dict[str, Policy] = {
+    'switched_viscous': switched_viscous,
+}
+
+
+def chosen_policy(name: str) -> Policy:
+    """Return the policy of this name, or raise `ParameterError` with the known ones."""
+    if name not in POLICIES:
+        raise ParameterError(f'policy {name!r} is unknown; known are {", ".join(POLICIES)}')
+    return POLICIES[name]
+
+
+def prefix_of(name: str) -> str:
+    """Return what stands before the names of a policy's parameters; those of the oldest have none."""
+    return '' if name == DEFAULT else name
