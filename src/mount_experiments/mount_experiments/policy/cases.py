@@ -45,7 +45,7 @@ DAMPINGS = (1500.0, 2000.0, 2600.0, 3200.0)  # N s/m
 NAMED = {
     'gentle': (0.12e-3, 0.40e-3, 1500.0),
     'default': (0.12e-3, 0.40e-3, 2600.0),
-    'sparing': (0.30e-3, 0.60e-3, 2000.0),
+    'sparing': (0.30e-3, 0.60e-3, 1500.0),
 }
 """Points of the front that are worth a name: lowest and full amplitude (m), damping coefficient (N s/m)."""
 LEARNT_ROADS, LEARNT_SCALES = (2e-6, 16e-6), (0.85, 1.0, 1.15)

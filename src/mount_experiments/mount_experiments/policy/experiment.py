@@ -89,12 +89,11 @@ def statements(figures: dict[str, Any]) -> list[Statement]:
 EXPERIMENT = Experiment(
     name=NAME,
     title='Control policies side by side',
-    reference='Secs. 6, 7',
+    reference='Figs. 14, 15; Secs. 6, 7',
     summary=(
         "The paper's switched policy and the continuous law on the same roads, racks and engines, beside the "
         'hydromount and the mount without current: what each gives, and what it costs.'
     ),
     defaults=PolicyParameters(),
     run=run,
-    closed_loop=True,
 )

@@ -69,13 +69,29 @@ def _in_short(figures: dict[str, Any]) -> str:
     lines += [
         f'| {name} | ' + ' | '.join(f'{value:.2f}' for value in each) + ' |' for name, each in rows.items()
     ]
+    return '\n'.join(lines) + '\n\n' + _lost(figures)
+
+
+def _lost(figures: dict[str, Any]) -> str:
+    """Return what the continuous law costs."""
+    road, tip = figures['roads'][figures['energy_road']], figures['tip_in'][CONTINUOUS]
     paper, ours = road[PAPER], road[CONTINUOUS]
-    lines.append(
-        f'\nWhat is lost: the pads wear {ours["j_per_km"] / max(paper["j_per_km"], 1e-9):.1f} times '
-        f'as fast as '
-        f'with `{PAPER}`, and the coil takes {ours["heat_w"]:.2f} W instead of {paper["heat_w"]:.2f} W.\n'
-    )
-    return '\n'.join(lines)
+    lines = [
+        'What is lost:\n',
+        f'- The pads wear {ours["j_per_km"] / max(paper["j_per_km"], 1e-9):.1f} times as fast as with '
+        f'`{PAPER}` ({figures["energy_road"]} road), and the coil takes {ours["heat_w"]:.2f} W instead of '
+        f'{paper["heat_w"]:.2f} W.',
+        f'- On a tip-in the chassis gets {tip["acceleration"]:.2f} times the acceleration of the mount '
+        f'without current, the engine moves {tip["peak"]:.2f} times as far as on the hydromount.',
+    ]
+    if 'idling' in figures:
+        cases = [values for each in figures['idling'].values() for values in each[CONTINUOUS].values()]
+        lines.append(
+            f'- With an idling engine on a road the acceleration rises up to {max(c[0] for c in cases):.2f} '
+            f'times ({100.0 * np.mean([c[0] > 1.05 for c in cases]):.0f} % of the cases above 1.05), and '
+            f'the engine moves up to {max(c[1] for c in cases):.2f} times as far as on the hydromount.'
+        )
+    return '\n'.join(lines) + '\n'
 
 
 def _sweeps(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
