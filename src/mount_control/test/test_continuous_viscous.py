@@ -76,7 +76,7 @@ def test_opening_follows_at_once_and_closes_to_exactly_zero() -> None:
     answers, _ = followed(shaken)
     first = int(np.argmax(answers[:, 2] > 0.5))
     assert first < 45  # within about a third of a period
-    assert answers[-1000:, 2].max() == 0.0
+    assert answers[-500:, 2].max() == 0.0
 
 
 def test_force_opposes_the_velocity_at_which_it_acts_and_never_exceeds_its_limit() -> None:

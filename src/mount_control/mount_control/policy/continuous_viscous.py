@@ -67,7 +67,7 @@ class Parameters(NamedTuple):
     opening_time: Annotated[float, Quantity('s', 'time constant of the opening', 0.001, 1.0, 'chosen')] = (
         0.008
     )
-    closing_time: Annotated[float, Quantity('s', 'and of the closing', 0.001, 10.0, 'chosen')] = 0.15
+    closing_time: Annotated[float, Quantity('s', 'and of the closing', 0.001, 10.0, 'chosen')] = 0.4
     idle_weight: Annotated[
         float,
         Quantity('1', 'how much an idle line closes; 0: as if the engine never idled', 0.0, 100.0, 'chosen'),

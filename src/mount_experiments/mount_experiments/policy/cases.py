@@ -50,6 +50,8 @@ NAMED = {
 """Points of the front that are worth a name: lowest and full amplitude (m), damping coefficient (N s/m)."""
 LEARNT_ROADS, LEARNT_SCALES = (2e-6, 16e-6), (0.85, 1.0, 1.15)
 _ROUGH, _HELD_OUT_SEED = 16e-6, 101  # m^3: class A of ISO 8608; a road that nothing was tuned on
+ROADS = {'random': _ROUGH, 'smooth': 2e-6}
+"""Roughness (m^3) of the random roads: class A of ISO 8608, and a good motorway."""
 _GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
 _RACK_AMPLITUDE, _RACK_SECONDS = 1e-3, 3.5  # m, s
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
@@ -151,8 +153,9 @@ class Jobs:
     def roads(self) -> Iterator[PolicyJob]:
         """Yield roads that nothing was tuned on, a tip-in, and the road behind the recording."""
         for idle, who in product((0.0, self._parameters.idle_amplitude), COMPARED):
-            sim = _motorway(_ROUGH, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
-            yield self._job(('road', who, 'random', idle), sim, 'road')
+            for road, roughness in ROADS.items():
+                sim = _motorway(roughness, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
+                yield self._job(('road', who, road, idle), sim, 'road')
             if self._parameters.recorded is not None:
                 sim = {'scenario': 'motorway', 'idle.amplitude': idle}
                 recorded = self._parameters.recorded

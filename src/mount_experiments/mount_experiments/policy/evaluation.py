@@ -18,6 +18,7 @@ from mount_experiments.policy.cases import (
     OFF,
     PAPER,
     POLICIES,
+    ROADS,
     SPEED,
     Axes,
     PolicyParameters,
@@ -119,7 +120,7 @@ def _high(found: Found, axes: Axes, idle: float) -> dict[str, dict[str, float]]:
 
 
 def _of_roads(found: Found, parameters: PolicyParameters) -> dict[str, Any]:
-    roads = {'random': SPEED}
+    roads = dict.fromkeys(ROADS, SPEED)
     if parameters.recorded is not None:
         roads['recorded'] = parameters.recorded_speed
     return {

@@ -136,8 +136,8 @@ def _roads(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
         shown, 'policy_recorded', 'Acceleration on the recorded road'
     )
     text += (
-        'A random road of class A, and where a recording was given, the road that gives the model '
-        'its vertical '
+        'A random road of class A, a smooth one (2e-6 m^3), and where a recording was given, the road that '
+        'gives the model its vertical '
         'acceleration (0.9 to 50 Hz). Acceleration of the chassis from 20 to 200 Hz; largest '
         'displacement:\n\n'
         '| road | | acceleration | engine idling | displacement | J/km | coil, W '
