@@ -37,7 +37,8 @@ test: $(VENV)/.ready-dev ## pass all tests
 	@$(BIN)/python -m pytest -m real_time $(REAL_TIME_TESTS)
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/explanation/experiments.md and docs/explanation/figures
-	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md
+	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md $(if $(RECORDED_DRIVE),\
+		--set policy.recording=$(RECORDED_DRIVE) --set policy.column=accelerometer.2 --set policy.scale=-1)
 ifneq ($(RECORDED_DRIVE),)
 	@$(BIN)/engine-mount experiment recorded_drive --set recorded_drive.file=$(RECORDED_DRIVE) \
 		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/explanation/recorded_drive.md

@@ -300,7 +300,7 @@ def test_a_list_that_is_no_list_of_levels_is_refused(text, tmp_path):
 def test_what_fails_in_a_process_ends_the_grid_with_its_reason():
     job = Job(('wrong',), {'mount_sim': {'scenario': 'nowhere'}})
     with pytest.raises(ValueError, match='nowhere'):
-        run_all([job], 1, lambda done: None)
+        run_all([job], 1, lambda done: None, run_job)
 
 
 def test_a_job_of_the_grid_is_the_run_that_the_experiment_records(swept):

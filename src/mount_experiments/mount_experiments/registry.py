@@ -16,6 +16,7 @@ NAMES = (
     'sweep',
     'motorway_gap',
     'sensitivity',
+    'policy',
     'recorded_drive',
 )
 """The names of the experiments, which are those of their folders."""

@@ -138,6 +138,10 @@ CONTROL_TRACE = Topic(
         Scalar('band_velocity', 'm/s'),
         Scalar('predicted_velocity', 'm/s'),
         Scalar('magnitude', 'm'),
+        Scalar('amplitude', 'm'),
+        Scalar('idle_amplitude', 'm'),
+        Scalar('idle_frequency', 'Hz'),
+        Scalar('engine_velocity', 'm/s'),
     ),
 )
 

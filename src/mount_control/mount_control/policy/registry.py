@@ -1,6 +1,6 @@
 """The policies by their names."""
 
-from mount_control.policy import switched_viscous
+from mount_control.policy import continuous_viscous, switched_viscous
 from mount_control.policy.contract import Policy
 from mount_models.quantity import ParameterError
 
@@ -8,6 +8,7 @@ DEFAULT = 'switched_viscous'
 
 POLICIES: dict[str, Policy] = {
     'switched_viscous': switched_viscous,
+    'continuous_viscous': continuous_viscous,
 }
 
 

@@ -17,7 +17,7 @@ from mount_experiments.harness.contract import (
 )
 from mount_experiments.harness.number_list import numbers_of
 from mount_experiments.sensitivity import REFERENCE, TITLE
-from mount_experiments.sensitivity.grid import Job, run_all
+from mount_experiments.sensitivity.grid import Job, run_all, run_job
 from mount_experiments.sensitivity.maps import (
     Axes,
     Maps,
@@ -49,6 +49,7 @@ def run(order: Order, progress: Progress) -> Outcome:
         jobs,
         parameters.workers,
         lambda done: progress(0.97 * done / len(jobs), f'{done} of {len(jobs)} runs'),
+        run_job,
     )
     maps = _maps(axes, found)
     progress(0.97, 'pictures')

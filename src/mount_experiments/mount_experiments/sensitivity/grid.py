@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,7 @@ from mount_report.sections.periodic import harmonics, whole_periods
 from mount_sim.plant.plant import TRUTH
 
 FloatArray = npt.NDArray[np.float64]
+J = TypeVar('J')
 
 _NICENESS = 10  # chosen: who works at the machine comes first
 _ORDERS = 8
@@ -42,16 +43,16 @@ class Job:
 
 
 class TruthOnly:
-    """Keeps displacement, force and chassis acceleration of a run, nothing else."""
+    """Keeps some fields of the truth of a run, nothing else."""
 
-    def __init__(self) -> None:
+    def __init__(self, names: Sequence[str] = ('displacement', 'mount_force', 'chassis_acceleration')):
+        self._names = names
         self._pieces: list[FloatArray] = []
 
     def write_samples(self, samples: Samples) -> None:
         """Take the block's truths and empty it."""
         truth = samples.truths[: samples.count].view(TRUTH)[:, 0]
-        names = ('displacement', 'mount_force', 'chassis_acceleration')
-        self._pieces.append(np.stack([truth[name] for name in names]))
+        self._pieces.append(np.stack([truth[name] for name in self._names]))
         samples.count = 0
 
     def write_result(self, stamp: int, result: InitialisationResult) -> None:
@@ -61,19 +62,27 @@ class TruthOnly:
         """Let the last setpoint pass."""
 
     def signals(self, start: float) -> FloatArray:
-        """Return (3, n): displacement (m), force (N), acceleration (m/s^2) from `start` (s) on."""
+        """Return (fields, n), one row for each field, SI, from `start` (s) on."""
         return np.concatenate(self._pieces, axis=1)[:, round(start / SAMPLE_TIME) :]
 
 
-def run_all(jobs: Sequence[Job], workers: int, told: Callable[[int], None]) -> dict[tuple[Any, ...], Any]:
-    """Return {key: figures} of all jobs; `told` takes how many are done. 0 workers: one for each core."""
+def run_all(
+    jobs: Sequence[J],
+    workers: int,
+    told: Callable[[int], None],
+    work: Callable[[J], tuple[tuple[Any, ...], Any]],
+) -> dict[tuple[Any, ...], Any]:
+    """Return {key: figures} of all jobs; `told` takes how many are done. 0 workers: one for each core.
+
+    `work` returns key and figures of one job, as `run_job` does.
+    """
     count = min(workers or len(os.sched_getaffinity(0)), len(jobs))
     found: dict[tuple[Any, ...], Any] = {}
     # spawned, not forked: this process may hold threads of middleware and compiler
     context = multiprocessing.get_context('spawn')
     pool = ProcessPoolExecutor(count, mp_context=context, initializer=os.nice, initargs=(_NICENESS,))
     try:
-        waiting = [pool.submit(run_job, job) for job in jobs]
+        waiting = [pool.submit(work, job) for job in jobs]
         for done in as_completed(waiting):
             key, figures = done.result()
             found[key] = figures

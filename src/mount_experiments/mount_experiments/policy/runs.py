@@ -1,0 +1,146 @@
+"""One run of a policy, in a process of its own, and its figures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mount_experiments.harness.closed_loop import FloatArray
+from mount_experiments.policy.excitations import on_recorded_road, tip_in
+from mount_experiments.policy.learnable import frequency_in_band, friction_scale
+from mount_experiments.sensitivity.grid import TruthOnly
+from mount_experiments.sweep.evaluation import (
+    BELOW_ISOLATION,
+    FIRST_FREQUENCY,
+    ISOLATION_BANDS,
+    RATE,
+    peak_in,
+    rms_in,
+)
+from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME
+from mount_replay.loop.run import run_core_into
+from mount_report.sections.periodic import distortion, harmonics, whole_periods
+from mount_sim.excitation.scenario import RecordedScenario
+from mount_sim.parameters import SimParameters
+
+ACOUSTIC = (20.0, 200.0)  # Hz: what the chassis passes on
+_FIELDS = (
+    'displacement',
+    'velocity',
+    'friction_force',
+    'mount_force',
+    'chassis_acceleration',
+    'coil_current',
+)
+_SETTLING = 1.0  # s, chosen: a road fades in for so long
+_PERIODS, _ORDERS = 8, 8
+_CLEAR = 0.3  # chosen: a turning point of so much of the largest one counts as the first
+_FIRST_WITHIN = 0.3  # s
+
+
+@dataclass(frozen=True)
+class PolicyJob:
+    """One run: its key, the parameters of the nodes, what is looked at, and what no scenario holds.
+
+    `damper` (N s/m, m/s) is the law that the rack's force is compared with. `kept`: the displacement is
+    returned too.
+    """
+
+    key: tuple[Any, ...]
+    parameters: Mapping[str, Mapping[str, Any]]
+    kind: str
+    recorded: RecordedScenario | None = None
+    damper: tuple[float, float] = (0.0, 0.0)
+    kept: bool = False
+
+
+def run_policy_job(job: PolicyJob) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Run one job through the same closed loop as every drive in core; return its key and its figures."""
+    truth = TruthOnly(_FIELDS)
+    sim = with_flattened(SimParameters(), job.parameters['mount_sim'])
+    excitation = None
+    if job.recorded is not None:
+        excitation = on_recorded_road(job.recorded, sim.idle, sim.timeline.start)
+    elif job.kind == 'tip_in':
+        excitation = tip_in(sim)
+    outcome = run_core_into(truth, job.parameters, excitation=excitation)
+    signals = dict(zip(_FIELDS, truth.signals(outcome.excitation_start), strict=True))
+    figures = _FIGURES[job.kind](signals, sim, job)
+    if job.kept:
+        figures['displacement'] = signals['displacement']
+    return job.key, figures
+
+
+def _of_sweep(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+    frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(signals['displacement'].size)
+    return {
+        'peak_m': peak_in(frequency, signals['displacement'], BELOW_ISOLATION),
+        'rms': [rms_in(frequency, signals['chassis_acceleration'], band) for band in ISOLATION_BANDS],
+    }
+
+
+def _of_gap(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+    behind = signals['displacement'][round(sim.motorway.gap_time / SAMPLE_TIME) :]
+    force = signals['friction_force'][-behind.size :] / sim.friction.scale
+    return {
+        'peak_m': float(np.max(np.abs(behind))),
+        'first_m': first_extremum(behind),
+        'friction_scale': friction_scale(behind, force),
+    }
+
+
+def first_extremum(displacement: FloatArray) -> float:
+    """Return the size (m) of the first clear turning point of a displacement from the gap on."""
+    part = displacement[: round(_FIRST_WITHIN / SAMPLE_TIME)]
+    slope = np.diff(part)
+    turning = np.flatnonzero(slope[1:] * slope[:-1] <= 0.0) + 1
+    moved = np.abs(part - part[0])
+    clear = turning[moved[turning] > _CLEAR * moved.max()]
+    return float(np.abs(part[clear[0]])) if clear.size else float(np.abs(part).max())
+
+
+def _of_rack(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+    frequency = sim.bench.frequency
+    time = SAMPLE_TIME * np.arange(signals['displacement'].size)
+    part, _ = whole_periods(time, frequency, _PERIODS)
+    damping, dead = job.damper
+    velocity = signals['velocity'][part]
+    wanted = np.sign(velocity) * damping * np.maximum(np.abs(velocity) - dead, 0.0)
+    error = signals['friction_force'][part] - wanted
+    return {
+        'thd': 100.0 * distortion(harmonics(time[part], signals['mount_force'][part], frequency, _ORDERS)),
+        'tracking': 100.0 * float(np.sqrt(np.mean(error**2)) / np.abs(wanted).max()) if damping else None,
+    }
+
+
+def _of_road(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+    part = slice(round(_SETTLING / SAMPLE_TIME), None)
+    moved = {name: values[part] for name, values in signals.items()}
+    power = np.abs(moved['friction_force'] * moved['velocity'])
+    return {
+        'acceleration': band_rms(moved['chassis_acceleration'], ACOUSTIC),
+        'peak_m': float(np.abs(moved['displacement']).max()),
+        'rms_m': band_rms(moved['displacement'], BELOW_ISOLATION),
+        'power_w': float(np.mean(power)),
+        'frequency_hz': frequency_in_band(moved['displacement']),
+        'heat_w': sim.coil.resistance * float(np.mean(moved['coil_current'] ** 2)),
+        'spectrum': None if not job.kept else one_hertz(moved['chassis_acceleration']),
+    }
+
+
+def band_rms(values: FloatArray, band: tuple[float, float]) -> float:
+    """Return the rms of what lies within a band (Hz) of values at 1 kHz."""
+    spectrum = np.abs(np.fft.rfft(values - values.mean()))
+    frequency = np.fft.rfftfreq(values.size, SAMPLE_TIME)
+    within = (frequency >= band[0]) & (frequency < band[1])
+    return float(np.sqrt(2.0 * np.sum(spectrum[within] ** 2)) / values.size)
+
+
+def one_hertz(values: FloatArray) -> list[float]:
+    """Return the rms in bands of 1 Hz from 0 to 100 Hz."""
+    return [band_rms(values, (float(low), low + 1.0)) for low in range(100)]
+
+
+_FIGURES = {'sweep': _of_sweep, 'gap': _of_gap, 'rack': _of_rack, 'road': _of_road, 'tip_in': _of_road}
