@@ -10,7 +10,7 @@ damper from opening, and what force there is follows the engine alone.
     s = min(2 |v|, max(v_n sign v, 0)),  |F| = min(c g (sqrt(s^2 + d^2) - d), F_max)
 
 v_ab is the velocity of an alpha-beta tracker of x_n, index b the band-pass. T is designed so that v_n has
-phase 0 at the eigenfrequency, tracker and delay of the loop included. Figures: docs/policy.md.
+phase 0 at the eigenfrequency, tracker and delay of the loop included. Figures: docs/explanation/policy.md.
 """
 
 import math
