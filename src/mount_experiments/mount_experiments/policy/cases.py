@@ -151,7 +151,7 @@ class Jobs:
             yield self._job(('rack', who, frequency), sim, 'rack', damper=dampers.get(who, (0.0, 0.0)))
 
     def roads(self) -> Iterator[PolicyJob]:
-        """Yield roads that nothing was tuned on, a tip-in, and the road behind the recording."""
+        """Yield random roads, a tip-in, and the road behind the recording."""
         for idle, who in product((0.0, self._parameters.idle_amplitude), COMPARED):
             for road, roughness in ROADS.items():
                 sim = _motorway(roughness, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
