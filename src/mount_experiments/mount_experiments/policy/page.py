@@ -248,8 +248,8 @@ def _front(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
             amplitudes = f'{1e3 * point["lowest_amplitude_m"]:g}, {1e3 * point["full_amplitude_m"]:g}'
             text += f'| {point["name"]} | {amplitudes} | {point["damping_coefficient"]:g} | {cells} |\n'
     return text + (
-        '\nThe default was chosen so that engines from 6 to 11 Hz stay at or below 0.8 of the hydromount with '
-        'worn pads too: see the table of engines.\n'
+        '\nThe default was chosen so that engines from 6 to 11 Hz stay at or below 0.8 of the hydromount '
+        'with worn pads too: see the table of engines.\n'
     )
 
 
