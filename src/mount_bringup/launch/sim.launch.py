@@ -9,6 +9,8 @@ from launch.substitutions import LaunchConfiguration
 
 from mount_bringup.graph.launch import launch_graph
 from mount_bringup.graph.nodes import SIMULATED
+from mount_control.policy.registry import DEFAULT
+from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -18,12 +20,17 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument('config', default_value=str(config), description='parameters of all nodes'),
         DeclareLaunchArgument('recording', description='folder that the recording creates'),
         DeclareLaunchArgument('scenario', default_value='motorway', description='motorway or bench'),
-        DeclareLaunchArgument('damper', default_value='viscous_2000', description='damper characteristic'),
+        DeclareLaunchArgument('policy', default_value=DEFAULT, description='control policy'),
+        DeclareLaunchArgument(
+            'damper', default_value=DEFAULT_DAMPER, description='damper characteristic of switched_viscous'
+        ),
     ]
     config_file = LaunchConfiguration('config')
     parameters = {node.name: [config_file] for node in SIMULATED}
     parameters['mount_recorder'].append({'uri': LaunchConfiguration('recording')})
     parameters['mount_sim'].append({'scenario': LaunchConfiguration('scenario')})
-    parameters['mount_control'].append({'damper': LaunchConfiguration('damper')})
+    parameters['mount_control'].append(
+        {'policy': LaunchConfiguration('policy'), 'damper': LaunchConfiguration('damper')}
+    )
     graph = launch_graph(SIMULATED, LaunchConfiguration('namespace'), parameters)
     return LaunchDescription([*arguments, *graph])

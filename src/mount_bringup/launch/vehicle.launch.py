@@ -9,6 +9,8 @@ from launch.substitutions import LaunchConfiguration
 
 from mount_bringup.graph.launch import launch_graph
 from mount_bringup.graph.nodes import VEHICLE
+from mount_control.policy.registry import DEFAULT
+from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -27,7 +29,10 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'specimen', default_value='', description='name that the specimen file must bear; empty: any'
         ),
-        DeclareLaunchArgument('damper', default_value='viscous_2000', description='damper characteristic'),
+        DeclareLaunchArgument('policy', default_value=DEFAULT, description='control policy'),
+        DeclareLaunchArgument(
+            'damper', default_value=DEFAULT_DAMPER, description='damper characteristic of switched_viscous'
+        ),
     ]
     config_file = LaunchConfiguration('config')
     parameters = {node.name: [config_file] for node in VEHICLE}
@@ -42,6 +47,8 @@ def generate_launch_description() -> LaunchDescription:
                 'specimen': LaunchConfiguration('specimen'),
             }
         )
-    parameters['mount_control'].append({'damper': LaunchConfiguration('damper')})
+    parameters['mount_control'].append(
+        {'policy': LaunchConfiguration('policy'), 'damper': LaunchConfiguration('damper')}
+    )
     graph = launch_graph(VEHICLE, LaunchConfiguration('namespace'), parameters)
     return LaunchDescription([*arguments, *graph])

@@ -38,7 +38,7 @@ def settings_of_options(options: Sequence[str]) -> dict[str, dict[str, Any]]:
         name, equals, text = option.partition('=')
         node, dot, parameter = name.partition('.')
         if not (equals and dot and parameter):
-            raise SettingError(f'--set {option}: write NODE.NAME=VALUE, as in mount_control.quality=0.7')
+            raise SettingError(f'--set {option}: write NODE.NAME=VALUE, as in mount_sim.seed=2')
         parameters.setdefault(node, {})[parameter] = setting_value(option, text)
     return parameters
 
