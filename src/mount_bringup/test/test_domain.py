@@ -25,9 +25,13 @@ def test_slashes_around_a_namespace_do_not_change_its_port():
 
 
 def test_a_second_graph_in_a_namespace_is_refused_until_the_first_has_ended():
-    with domain_lock(3, 'left'), domain_lock(3, 'right'), domain_lock(4, 'left'):
-        with pytest.raises(DomainError, match=r'already runs in ROS domain 3, namespace /left \(process \d'):
-            domain_lock(3, '/left').__enter__()
+    with (
+        domain_lock(3, 'left'),
+        domain_lock(3, 'right'),
+        domain_lock(4, 'left'),
+        pytest.raises(DomainError, match=r'already runs in ROS domain 3, namespace /left \(process \d'),
+    ):
+        domain_lock(3, '/left').__enter__()
     with domain_lock(3, 'left'):
         pass
 

@@ -1,4 +1,4 @@
-"""One graph, and one simulated CAN bus, per ROS domain and namespace: a second one would drive the same coil."""
+"""One graph, with one CAN bus, per ROS domain and namespace: a second one would drive the same coil."""
 
 import contextlib
 import fcntl
