@@ -12,11 +12,10 @@ import pytest
 import mount_bags
 from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
+from mount_bringup.graph.domain import can_port
 from mount_driver.bus import MULTICAST_GROUP, open_bus
 from mount_driver.codec import MountCodec
 from mount_ros.testing import wait_until
-
-FIRST_PORT, PORTS_OF_DOMAIN = 7530, 250
 
 # One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
 ENDLESS = (
@@ -35,7 +34,7 @@ def bus_listener(domain):
     bus = open_bus(
         'udp_multicast',
         MULTICAST_GROUP,
-        port=FIRST_PORT + PORTS_OF_DOMAIN * domain,
+        port=can_port(domain, ''),
         receive=[codec.setpoint.frame_id],
     )
     ending = threading.Event()

@@ -1,7 +1,6 @@
 """Parameters of the nodes as given by the user: names known, types as declared, before a node starts."""
 
 import contextlib
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,7 +11,7 @@ from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
-from mount_models.quantity import ParameterError, flattened
+from mount_models.quantity import ParameterError, check_name, flattened
 from mount_sim.parameters import SimParameters
 
 
@@ -70,8 +69,10 @@ def checked_settings(
     for node, values in settings.items():
         if node not in known:
             raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
+        for name in values:
+            check_name(node, name, known[node])
         checked[node] = {
-            name: _typed(f'{node}.{name}', value, known[node][_known_name(node, name, known[node])])
+            name: _typed(f'{node}.{name}', value, known[node][name])
             for name, value in _with_damper_text(node, values).items()
         }
     return checked
@@ -83,14 +84,6 @@ def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]
     if node != 'mount_control' or not isinstance(damper, (str, Mapping)):
         return values
     return {**values, 'damper': damper_text(damper)}
-
-
-def _known_name(node: str, name: str, known: Mapping[str, Any]) -> str:
-    if name in known:
-        return name
-    near = difflib.get_close_matches(name, known, n=3)
-    hint = f'; did you mean {" or ".join(near)}?' if near else f'; known are {", ".join(known)}'
-    raise ParameterError(f'{name!r} is no parameter of {node}{hint}')
 
 
 def _typed(name: str, value: Any, default: Any) -> Any:

@@ -7,7 +7,10 @@ import pytest
 from mount_bringup.graph import processes
 from mount_bringup.graph.nodes import CONTROL, RECORDER, GraphSettings
 
-TELL = 'import os; print(os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)'
+TELL = (
+    'import os; from mount_ros.nodes.starter import take_priority; take_priority(); '
+    'print(os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)'
+)
 
 
 def may_be_urgent():

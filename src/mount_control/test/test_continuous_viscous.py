@@ -96,10 +96,12 @@ def test_force_is_small_where_the_velocity_reverses() -> None:
 
 
 def test_idle_line_is_not_in_the_force() -> None:
-    answers, traces = followed(sine(8.0, 1e-3) + sine(27.0, 0.1e-3) + sine(54.0, 0.01e-3))
+    answers, traces = followed(sine(8.0, 1e-3) + sine(27.0, 0.1e-3) + sine(54.0, 0.03e-3))
     line = abs(phasor(27.0, answers[:, 1]))
     assert line == pytest.approx(2.0 * np.pi * 27.0 * 0.1e-3, rel=0.05)
     assert abs(phasor(27.0, traces['engine_velocity'])) < 0.05 * line
+    double = 2.0 * np.pi * 54.0 * 0.03e-3
+    assert abs(phasor(54.0, traces['engine_velocity'])) < 0.1 * double
     assert traces['idle_frequency'][-1] == pytest.approx(27.0, abs=0.1)
     assert traces['idle_amplitude'][-1] == pytest.approx(0.1e-3, rel=0.05)
 
@@ -120,9 +122,9 @@ def test_idle_line_is_found_from_540_to_1000_turns_per_minute(frequency: float) 
 
 
 def test_impact_is_taken_for_no_line() -> None:
-    impact = 3e-3 * np.exp(-TIME / 0.05) * np.sin(2.0 * np.pi * 8.0 * TIME)
-    _, traces = followed(impact)
-    assert traces['idle_amplitude'].max() < 0.05e-3
+    blow = 5e-3 * np.exp(-(((TIME - 0.5) / 0.008) ** 2))
+    _, traces = followed(blow)
+    assert traces['idle_amplitude'].max() < 0.1e-3
 
 
 def test_first_sample_after_a_start_traces_no_motion() -> None:

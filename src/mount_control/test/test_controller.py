@@ -16,6 +16,8 @@ from mount_control.controller import (
 )
 from mount_control.force_maker import FADE_SAMPLES
 from mount_control.policy import switched_viscous
+from mount_control.policy.contract import trace_fields
+from mount_control.policy.registry import POLICIES
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.simplified import faded_coefficient
@@ -34,9 +36,10 @@ def _equal(one, other):
     return one.tobytes() == other.tobytes()
 
 
-def test_trace_has_the_names_of_its_topic():
-    known = {scalar.name for scalar in (*topics.CONTROL_TRACE.scalars, *topics.CONTROL_TRACE.optional)}
-    assert set(PAPER.trace.names) <= known
+def test_traces_have_the_names_and_units_of_their_topic():
+    scalars = (*topics.CONTROL_TRACE.scalars, *topics.CONTROL_TRACE.optional)
+    traced = {name: unit for policy in POLICIES.values() for name, unit in trace_fields(policy).items()}
+    assert traced == {scalar.name: scalar.unit for scalar in scalars}
     assert {PAPER.trace[name] for name in PAPER.trace.names} == {np.dtype('f8')}
 
 

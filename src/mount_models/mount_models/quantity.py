@@ -5,9 +5,10 @@ compiled code. Each field is declared as ``Annotated[float, Quantity(unit, meani
 source)] = default``.
 """
 
+import difflib
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
@@ -31,6 +32,14 @@ class Quantity:
     high: float = math.inf
     source: str = 'chosen'
     may_be_unknown: bool = False
+
+
+def check_name(owner: str, name: str, known: Collection[str]) -> None:
+    """Raise `ParameterError` with the nearest names if `name` is none of the `known` ones of `owner`."""
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=3)
+        hint = f'; did you mean {" or ".join(near)}?' if near else f'; known are {", ".join(known)}'
+        raise ParameterError(f'{name!r} is no parameter of {owner}{hint}')
 
 
 def quantities(parameters: type[P] | P) -> dict[str, Quantity]:

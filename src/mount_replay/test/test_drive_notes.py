@@ -48,20 +48,10 @@ class Graph:
 
 
 @pytest.mark.parametrize('mode', ['real time', 'lock-step'])
-def test_a_drive_that_goes_on_without_its_recording_says_so_once(tmp_path, monkeypatch, mode):
+def test_a_drive_that_goes_on_without_its_recording_says_so_once(tmp_path, monkeypatch, domain, mode):
     monkeypatch.setattr(drive, 'Supervisor', Graph)
     shown = io.StringIO()
     folder = make_run_folder(tmp_path / 'run', 'bench')
-    order = DriveOrder('bench', mode, {}, domain=0)
+    order = DriveOrder('bench', mode, {}, domain=domain)
     drive._drive_graph(order, Excitation(Seat.BENCH, [], 5e-5, 0.0), folder, Screen(shown), [])
     assert shown.getvalue().count('goes on without recording') == 1
-
-
-def test_each_domain_and_namespace_has_a_bus_of_its_own_where_nobody_else_is_given_a_port():
-    orders = [
-        DriveOrder('bench', 'real time', {}, domain, name) for domain in range(101) for name in ('', 'left')
-    ]
-    ports = [drive._port(order) for order in orders]
-    assert len(set(ports)) == len(orders)
-    assert max(ports) < 32768  # above, Linux gives ports to whoever asks for any
-    assert min((port - 7400) % 250 for port in ports) >= 130  # below are the participants of the domain

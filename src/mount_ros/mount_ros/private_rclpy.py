@@ -9,6 +9,7 @@ from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 
 Taken = tuple[bytes, dict[str, int]]
@@ -26,6 +27,13 @@ def raw_taker(subscription: Subscription) -> Callable[[], Taken | None]:
 def given_at_start(node: Node) -> frozenset[str]:
     """Return the names of the parameters set from outside at the start, also to what equals their default."""
     return frozenset(node._parameter_overrides)
+
+
+def integer_as_float(node: Node, name: str) -> None:
+    """Let a whole number that was given from outside at the start for the parameter `name` be a float."""
+    given = node._parameter_overrides.get(name)
+    if given is not None and given.type_ is Parameter.Type.INTEGER:
+        node._parameter_overrides[name] = Parameter(name, value=float(given.value))
 
 
 class OpenLifecycleNode(LifecycleNode):

@@ -6,6 +6,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -122,6 +123,20 @@ def test_a_transition_that_is_not_valid_is_answered_with_no_and_the_node_lives(
     assert operator.change(CONFIGURE)
     assert operator.change(ACTIVATE)
     assert operator.state == ACTIVE
+
+
+def test_a_whole_number_given_for_a_float_is_taken_as_one(context):
+    node = SafeLifecycleNode('subject', context=context, parameter_overrides=[Parameter('level', value=9)])
+    assert repr(node.declare_parameter('level', 8.0).value) == '9.0'
+    node.destroy_node()
+
+
+def test_a_misspelt_parameter_is_named_and_the_node_is_not_configured(context, capfd):
+    node = SafeLifecycleNode('subject', context=context, parameter_overrides=[Parameter('levle', value=9.0)])
+    node.declare_parameter('level', 8.0)
+    assert node.trigger_configure() == TransitionCallbackReturn.FAILURE
+    assert "'levle' is no parameter of subject; did you mean level?" in capfd.readouterr().err
+    node.destroy_node()
 
 
 def test_a_second_activation_is_refused_and_the_node_stays_active(probe, operator):

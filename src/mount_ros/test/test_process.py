@@ -12,6 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from mount_ros.nodes.process import wake
+from mount_ros.nodes.starter import environment_of_children
 from mount_ros.testing import LIMIT, free_domain
 
 PROGRAM = """
@@ -53,11 +54,11 @@ print('over', flush=True)
 class Process:
     """A process with some nodes; `lines` are what it has said."""
 
-    def __init__(self, domain, count, in_service='pass', at_the_end='pass'):
+    def __init__(self, domain, count, in_service='pass', at_the_end='pass', environment=None):
         program = PROGRAM.format(count=count, in_service=in_service, at_the_end=at_the_end)
         self._process = subprocess.Popen(
             [sys.executable, '-c', program],
-            env={**os.environ, 'ROS_DOMAIN_ID': str(domain)},
+            env={**os.environ, 'ROS_DOMAIN_ID': str(domain), **(environment or {})},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -118,6 +119,23 @@ def test_nodes_of_one_process_are_closed_in_reverse_order(start, number):
     assert (code, errors) == (0, '')
     said = [line for line in process.lines if 'served' not in line]
     assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup', 'over']
+
+
+@pytest.mark.parametrize('ends_before', [True, False])
+def test_nodes_whose_starter_is_killed_are_closed_and_say_so(start, monkeypatch, ends_before):
+    with subprocess.Popen(['sleep', '600']) as starter:
+        monkeypatch.setattr(os, 'getpid', lambda: starter.pid)
+        environment = environment_of_children(0)
+        if ends_before:
+            starter.kill()
+            starter.wait()
+        process = start(1, environment=environment)
+        process.wait_for('one served')
+        starter.kill()
+        code, errors = process.end()
+    assert code == 0
+    assert errors == '[ERROR] [one]: the process that started this one has ended, so this one ends too\n'
+    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
 
 
 def test_a_burst_of_signals_ends_the_process_as_one_does(start):

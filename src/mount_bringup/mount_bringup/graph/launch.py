@@ -1,68 +1,96 @@
-"""The graph for `ros2 launch`: lifecycle nodes that come to life one after the other.
+"""The graph for `ros2 launch`: its processes, their supervisor, and the end of all with the first that ends.
 
 Needs the `launch_ros` of a ROS 2 installation; where there is none, `mount_bringup.graph.supervisor` does it.
 """
 
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
-from typing import Any
+import contextlib
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
 
-from launch import LaunchDescriptionEntity
-from launch.actions import EmitEvent, RegisterEventHandler
-from launch.events import matches_action
-from launch_ros.actions import LifecycleNode
-from launch_ros.event_handlers import OnStateTransition
-from launch_ros.events.lifecycle import ChangeState
-from lifecycle_msgs.msg import Transition
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch.events import Shutdown
+from launch.events.process import ProcessExited
+from launch_ros.actions import Node
 
+from mount_bringup.graph.domain import domain_lock
+from mount_bringup.graph.launched import SUPERVISOR, arguments_of, exit_error
 from mount_bringup.graph.nodes import GraphNode
+from mount_bringup.graph.order import LaunchArgument, LaunchOrder, launch_order
+from mount_bringup.graph.processes import node_environment
 from mount_ros.environment import prepare_environment
 
+_PATIENCE = '10'  # s, chosen: until a node that was asked to end is terminated
 
-def launch_graph(
-    nodes: Sequence[GraphNode], namespace: Any, parameters: Mapping[str, Sequence[Any]]
-) -> list[LaunchDescriptionEntity]:
-    """Return the actions that start `nodes`, configure all of them in order, then activate them in order.
 
-    `parameters`: for each node its parameter files and dictionaries, the later ones win.
-    """
+def launch_description(
+    nodes: Sequence[GraphNode], arguments: Sequence[LaunchArgument], config: str
+) -> LaunchDescription:
+    """Return the launch file of `nodes`; `config` is the name of the shipped parameter file."""
     prepare_environment()  # discovery on this machine only, unless the user has chosen otherwise
-    actions = [
-        LifecycleNode(
-            package=node.package,
-            executable=node.name,
-            name=node.name,
-            namespace=namespace,
-            parameters=list(parameters.get(node.name, ())),
+    file = Path(get_package_share_directory('mount_bringup')) / 'config' / config
+    every = (LaunchArgument('config', 'parameter file of all nodes', default=str(file)), *arguments)
+    declared = [
+        DeclareLaunchArgument(
+            argument.name,
+            default_value=argument.default,
+            description=argument.meaning,
+            choices=list(argument.choices) or None,
+        )
+        for argument in every
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=partial(_graph, nodes, every))])
+
+
+def _graph(
+    nodes: Sequence[GraphNode], arguments: Sequence[LaunchArgument], context: LaunchContext
+) -> list[LaunchDescriptionEntity]:
+    given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
+    order = launch_order(nodes, arguments, given)
+    lock = contextlib.ExitStack()
+    lock.enter_context(domain_lock(order.settings.domain, order.settings.namespace))
+    processes = [_node(node, order) for node in order.nodes]
+    processes.append(
+        Node(
+            package='mount_bringup',
+            executable=SUPERVISOR,
+            arguments=arguments_of(order),
+            additional_env=node_environment((), 0),
+            sigterm_timeout=_PATIENCE,
             output='both',
         )
-        for node in nodes
-    ]
-    handlers = _chain(actions, 'inactive', Transition.TRANSITION_CONFIGURE)
-    handlers.append(_when(actions[-1], 'inactive', actions[0], Transition.TRANSITION_ACTIVATE))
-    handlers += _chain(actions, 'active', Transition.TRANSITION_ACTIVATE)
-    # Handlers first, so that no transition can happen unheard.
-    return [*handlers, *actions, _emit(actions[0], Transition.TRANSITION_CONFIGURE)]
-
-
-def _chain(actions: Sequence[LifecycleNode], state: str, transition: int) -> list[LaunchDescriptionEntity]:
-    """Return handlers that take each node through `transition` when the one before has reached `state`."""
-    return [_when(before, state, after, transition) for before, after in pairwise(actions)]
-
-
-def _when(
-    before: LifecycleNode, state: str, after: LifecycleNode, transition: int
-) -> LaunchDescriptionEntity:
-    start = 'configuring' if state == 'inactive' else 'activating'
-    return RegisterEventHandler(
-        OnStateTransition(
-            target_lifecycle_node=before,
-            start_state=start,
-            goal_state=state,
-            entities=[_emit(after, transition)],
-        )
     )
+    names = [*(node.name for node in order.nodes), SUPERVISOR]
+    running = set(names)
+
+    def ended(name: str, event: ProcessExited, context: LaunchContext) -> EmitEvent:
+        running.discard(name)
+        if not running:
+            lock.close()
+        error = exit_error(name, event.returncode, asked=context.is_shutdown)
+        if error:
+            raise RuntimeError(error)  # by which launch ends everything, with exit code 1
+        return EmitEvent(event=Shutdown(reason=f'{name} has ended'))
+
+    handlers = [
+        RegisterEventHandler(OnProcessExit(target_action=process, on_exit=partial(ended, name)))
+        for name, process in zip(names, processes, strict=True)
+    ]
+    return [*handlers, *processes]  # handlers first, so that no end can happen unheard
 
 
-def _emit(node: LifecycleNode, transition: int) -> EmitEvent:
-    return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(node), transition_id=transition))
+def _node(node: GraphNode, order: LaunchOrder) -> Node:
+    return Node(
+        package=node.package,
+        executable=node.name,
+        name=node.name,
+        namespace=order.settings.namespace,
+        parameters=[dict(order.settings.parameters[node.name])],
+        additional_env=node_environment((node,), order.settings.priority),
+        ros_arguments=['--log-level', order.log_level],
+        sigterm_timeout=_PATIENCE,
+        output='both',
+    )

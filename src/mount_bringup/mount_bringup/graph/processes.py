@@ -1,21 +1,18 @@
 """The processes of the graph: started with their parameters, watched, ended in order."""
 
-import contextlib
-import ctypes
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 
 from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings
+from mount_ros.nodes.starter import environment_of_children
 
-_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 _INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that was asked to end is terminated
 _TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
 _RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for what it misses is gone
@@ -41,17 +38,9 @@ class NodeProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'},
+                env={**os.environ, **_environment(self.nodes, settings)},
                 start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
-                preexec_fn=partial(_prepare_child, self._scheduling(settings)),
             )
-
-    def _scheduling(self, settings: GraphSettings) -> Callable[[], None]:
-        if not settings.priority:
-            return lambda: None
-        share = _RECORDER_SHARE if RECORDER in self.nodes else 1.0
-        priority = max(1, round(share * settings.priority))
-        return partial(os.sched_setscheduler, 0, os.SCHED_FIFO, os.sched_param(priority))
 
     @property
     def exit_code(self) -> int | None:
@@ -101,6 +90,17 @@ def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder:
     return [NodeProcess(group, settings, folder) for group in groups]
 
 
+def node_environment(nodes: Sequence[GraphNode], priority: int) -> dict[str, str]:
+    """Return what a process in which `nodes` live is told of its starter, this process, and its priority."""
+    share = _RECORDER_SHARE if RECORDER in nodes else 1.0
+    return environment_of_children(max(1, round(share * priority)) if priority else 0)
+
+
+def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
+    own = node_environment(nodes, settings.priority)
+    return {**own, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'}
+
+
 def _program(nodes: Sequence[GraphNode]) -> str:
     imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in nodes)
     classes = ', '.join(node.class_name for node in nodes)
@@ -113,13 +113,3 @@ def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
         for node in nodes
     }
     return yaml.safe_dump(tables, sort_keys=True)
-
-
-def _prepare_child(schedule: Callable[[], None]) -> None:
-    # Without its supervisor a node must not go on driving the coil.
-    ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGINT)
-    # Before the middleware makes its threads, so that those that receive inherit it; those that send again
-    # are taken out of real time by `mount_ros.nodes.scheduling`. Where not permitted the node runs as any
-    # other process.
-    with contextlib.suppress(PermissionError):
-        schedule()

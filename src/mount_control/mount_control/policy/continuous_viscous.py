@@ -10,7 +10,7 @@ damper from opening, and what force there is follows the engine alone.
     s = min(2 |v|, max(v_n sign v, 0)),  |F| = min(c g (sqrt(s^2 + d^2) - d), F_max)
 
 v_ab is the velocity of an alpha-beta tracker of x_n, index b the band-pass. T is designed so that v_n has
-phase 0 at the eigenfrequency, tracker and delay of the loop included. Figures: docs/policy.md.
+phase 0 at the eigenfrequency, tracker and delay of the loop included. Figures: docs/explanation/policy.md.
 """
 
 import math
@@ -160,13 +160,17 @@ def _band_share(parameters: Parameters, alpha: float, beta: float, sample_time: 
     displacement, the band-pass at its centre is 1. V - T w0^2 shall have the phase 90 degrees and the lead,
     so T w0^2 = Re V + Im V tan(lead).
     """
+    # in real numbers: how products of complex ones are rounded differs between processors
     sine, cosine = sine_and_cosine(parameters.eigenfrequency * sample_time)
-    above = complex(cosine, sine) * complex(cosine - 1.0, sine) * (beta / sample_time)
-    square = complex(cosine * cosine - sine * sine, 2.0 * cosine * sine)
-    below = square + (alpha + beta - 2.0) * complex(cosine, sine) + (1.0 - alpha)
-    scale = 1.0 / (below.real * below.real + below.imag * below.imag)
-    real = (above.real * below.real + above.imag * below.imag) * scale
-    imaginary = (above.imag * below.real - above.real * below.imag) * scale
+    square_real, square_imaginary = cosine * cosine - sine * sine, 2.0 * cosine * sine
+    rate = beta / sample_time
+    above_real, above_imaginary = rate * (square_real - cosine), rate * (square_imaginary - sine)
+    sum_of_gains = alpha + beta - 2.0
+    below_real = square_real + sum_of_gains * cosine + (1.0 - alpha)
+    below_imaginary = square_imaginary + sum_of_gains * sine
+    scale = 1.0 / (below_real * below_real + below_imaginary * below_imaginary)
+    real = (above_real * below_real + above_imaginary * below_imaginary) * scale
+    imaginary = (above_imaginary * below_real - above_real * below_imaginary) * scale
     lead_sine, lead_cosine = sine_and_cosine(parameters.eigenfrequency * parameters.lead_time)
     return real + imaginary * lead_sine / lead_cosine
 

@@ -20,14 +20,16 @@ POLICIES = (PAPER, CONTINUOUS)
 OFF, HYDRO = 'no current', 'hydromount'
 COMPARED = (*POLICIES, OFF, HYDRO)
 NOMINAL = 8.0  # Hz
+_NOISE, _JITTER = {'electronics.displacement_noise': 1e-5}, {'electronics.sample_jitter': 3e-4}
 DISTURBANCES: dict[str, dict[str, float]] = {
     'nominal': {},
     'pads -15 %': {'friction.scale': 0.85},
     'pads +15 %': {'friction.scale': 1.15},
-    '10 um noise': {'electronics.displacement_noise': 1e-5},
+    '10 um noise': _NOISE,
+    '0.3 ms jitter': _JITTER,
     'coil at 80 degC': {'electronics.coil_temperature': 80.0},
-    'pads -15 %, 10 um': {'friction.scale': 0.85, 'electronics.displacement_noise': 1e-5},
-    'pads +15 %, 10 um': {'friction.scale': 1.15, 'electronics.displacement_noise': 1e-5},
+    'pads -15 %, noise, jitter': {'friction.scale': 0.85, **_NOISE, **_JITTER},
+    'pads +15 %, noise, jitter': {'friction.scale': 1.15, **_NOISE, **_JITTER},
 }
 ABLATIONS: dict[str, dict[str, float]] = {
     'as it is': {},
@@ -151,7 +153,7 @@ class Jobs:
             yield self._job(('rack', who, frequency), sim, 'rack', damper=dampers.get(who, (0.0, 0.0)))
 
     def roads(self) -> Iterator[PolicyJob]:
-        """Yield roads that nothing was tuned on, a tip-in, and the road behind the recording."""
+        """Yield random roads, a tip-in, and the road behind the recording."""
         for idle, who in product((0.0, self._parameters.idle_amplitude), COMPARED):
             for road, roughness in ROADS.items():
                 sim = _motorway(roughness, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}

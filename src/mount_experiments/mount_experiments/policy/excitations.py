@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import FloatArray
 from mount_models.arithmetic.averages import mean
 from mount_models.arithmetic.series import series_of, series_over_time
 from mount_models.vehicle import Vehicle
+from mount_report.drive.signals import FloatArray
 from mount_sim.excitation.excitation import Excitation, Seat, idle_force
 from mount_sim.excitation.recorded import acceleration_at
 from mount_sim.excitation.scenario import (

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import FloatArray
 from mount_models.sampling import SAMPLE_TIME
+from mount_report.drive.signals import FloatArray
 
 BAND = (4.0, 14.0)  # Hz: where the engine may shake
 _SMOOTH = 30.0  # Hz, chosen: above it no derivative is taken

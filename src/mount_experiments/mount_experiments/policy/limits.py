@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import FloatArray
 from mount_experiments.policy.runs import first_extremum
 from mount_experiments.sweep.evaluation import BELOW_ISOLATION, FIRST_FREQUENCY, RATE, peak_in
 from mount_models.arithmetic.compiled import compiled
 from mount_models.road import Gap, Sweep, gap_in_road, sweep_road
 from mount_models.sampling import SAMPLE_TIME
 from mount_models.vehicle import Vehicle, resting_vehicle, vehicle_step
+from mount_report.drive.signals import FloatArray
 from mount_sim.excitation.scenario import STEP_TIME
 
 _STEPS = round(SAMPLE_TIME / STEP_TIME)

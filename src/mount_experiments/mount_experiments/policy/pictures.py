@@ -16,8 +16,8 @@ from mount_experiments.sweep.evaluation import FIRST_FREQUENCY, RATE
 from mount_models.sampling import SAMPLE_TIME
 
 if TYPE_CHECKING:
-    from mount_experiments.harness.closed_loop import FloatArray
     from mount_experiments.policy.cases import Axes
+    from mount_report.drive.signals import FloatArray
 
 _COLOURS = {CONTINUOUS: BLUE, PAPER: GREEN, HYDRO: RED, OFF: GREY}
 _GAP_TIME, _BEFORE, _AFTER = 2.0, 0.05, 0.8  # s

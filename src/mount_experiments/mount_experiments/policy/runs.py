@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import FloatArray
 from mount_experiments.policy.excitations import on_recorded_road, tip_in
 from mount_experiments.policy.learnable import frequency_in_band, friction_scale
 from mount_experiments.sensitivity.grid import TruthOnly
@@ -21,6 +20,7 @@ from mount_experiments.sweep.evaluation import (
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.loop.run import run_core_into
+from mount_report.drive.signals import FloatArray
 from mount_report.sections.periodic import distortion, harmonics, whole_periods
 from mount_sim.excitation.scenario import RecordedScenario
 from mount_sim.parameters import SimParameters

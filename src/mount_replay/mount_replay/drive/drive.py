@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from mount_bags.run.folder import RunFolder, make_run_folder
 from mount_bags.run.screen import Screen
 from mount_bags.run.session import new_session, session_text
 from mount_bringup.chosen import Parameters
-from mount_bringup.graph.domain import domain_lock
+from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor
@@ -25,11 +24,6 @@ from mount_replay.loop.recording import record_core
 from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
 
-# A ROS domain has 250 UDP ports from 7400 on (RTPS 2.2, section 9.6.1.1), of which two for each participant
-# are in use. The bus takes one behind them: higher up the kernel gives them to any process, and the bus
-# would not open.
-_FIRST_PORT, _PORTS_OF_DOMAIN = 7530, 250  # behind 59 participants
-_PLACES = 119  # namespaces told apart by their ports
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
 
 
@@ -166,7 +160,10 @@ def _control_faults(faults: int) -> list[str]:
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
     lockstep = order.mode == 'lock-step'
-    can = {'interface': 'virtual' if _together(order) else 'udp_multicast', 'port': _port(order)}
+    can = {
+        'interface': 'virtual' if _together(order) else 'udp_multicast',
+        'port': can_port(order.domain, order.namespace),
+    }
     added: dict[str, dict[str, Any]] = {
         'mount_recorder': {'uri': str(folder.recording)},
         'mount_driver': can,
@@ -183,13 +180,6 @@ def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str
 
 def _together(order: DriveOrder) -> bool:
     return order.mode == 'lock-step' and not order.apart
-
-
-def _port(order: DriveOrder) -> int:
-    """Return the UDP port of the CAN bus: one for each domain and namespace."""
-    name = order.namespace.strip('/')
-    place = 1 + zlib.crc32(name.encode()) % _PLACES if name else 0
-    return _FIRST_PORT + _PORTS_OF_DOMAIN * order.domain + place
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:

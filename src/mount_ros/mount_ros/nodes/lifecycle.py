@@ -5,13 +5,15 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
+from mount_ros.nodes.parameters import refuse_unknown
 from mount_ros.nodes.scheduling import calm_resending
-from mount_ros.private_rclpy import OpenLifecycleNode
+from mount_ros.private_rclpy import OpenLifecycleNode, integer_as_float
 
 
 class ServedPath(Protocol):
@@ -57,6 +59,12 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self._refusal = ''
         self._diagnostics = Diagnostics(self, self._present_verdict)
         self._diagnostics.start()
+
+    def declare_parameter(self, name: str, value: Any = None, *arguments, **options) -> Parameter:
+        """Declare a parameter; a whole number given at the start for one that is a float becomes one."""
+        if isinstance(value, float):
+            integer_as_float(self, name)
+        return super().declare_parameter(name, value, *arguments, **options)
 
     # What a node fills in.
 
@@ -126,7 +134,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._lockstep = bool(self.get_parameter('lockstep').value)
-        outcome = self._attempt('configure', self.configure, undo=self._release)
+        outcome = self._attempt('configure', self._configure, undo=self._release)
         if outcome == TransitionCallbackReturn.SUCCESS:
             self._gate.close()
         self.after_configure()
@@ -163,6 +171,10 @@ class SafeLifecycleNode(OpenLifecycleNode):
         except Exception as error:
             self.get_logger().warning(f'transition {transition_id} refused: {error}')
             return TransitionCallbackReturn.FAILURE
+
+    def _configure(self) -> None:
+        refuse_unknown(self)
+        self.configure()
 
     def _attempt(self, what, step, undo) -> TransitionCallbackReturn:
         try:

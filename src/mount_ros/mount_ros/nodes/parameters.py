@@ -8,7 +8,14 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from mount_models.quantity import ParameterError, Quantity, flattened, quantities, with_flattened
+from mount_models.quantity import (
+    ParameterError,
+    Quantity,
+    check_name,
+    flattened,
+    quantities,
+    with_flattened,
+)
 from mount_ros.private_rclpy import given_at_start
 
 P = TypeVar('P', bound=NamedTuple)
@@ -33,6 +40,16 @@ def read(node: Node, defaults: P, prefix: str = '') -> P:
         return with_flattened(defaults, values, prefix)
     except ParameterError as error:
         raise ParameterError(f'{node.get_name()}: {error}') from None
+
+
+def refuse_unknown(node: Node) -> None:
+    """Raise `ParameterError` for a value that was given at the start to what is no parameter of `node`.
+
+    ROS itself ignores it silently, so a misspelt name would leave a default at work.
+    """
+    known = list(node.get_parameters_by_prefix(''))
+    for name in sorted(given_at_start(node)):
+        check_name(node.get_name(), name, known)
 
 
 class SpecimenValues:

@@ -17,6 +17,7 @@ from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.starter import Starter, take_priority
 
 _SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
 
@@ -24,7 +25,7 @@ Create = Callable[[], SafeLifecycleNode]
 
 
 def run_node(create: Create, args: list[str] | None = None) -> None:
-    """Run one lifecycle node until the process is told to end by SIGINT or SIGTERM."""
+    """Run one lifecycle node until the process is told to end by SIGINT or SIGTERM, or its starter ends."""
     run_nodes([create], args)
 
 
@@ -35,6 +36,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     An exception in one of them or in a thread of its data ends all in the same way, with exit code 1.
     """
     prepare_environment()
+    take_priority()
     # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     nodes = [create() for create in creates]
@@ -50,6 +52,8 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     over.wait()
     for node in nodes:
         node.ending.set()
+    if over.starter.ended:
+        nodes[0].get_logger().error('the process that started this one has ended, so this one ends too')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()
@@ -85,7 +89,7 @@ def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
 
 
 class _Ending:
-    """Lets the main thread sleep until a signal or a thread tells it that the process shall end.
+    """Lets the main thread sleep until a signal, a thread or the end of the starter says that all shall end.
 
     By a pipe: a lock, as in `threading.Event`, is held for ever by a second signal that comes amid the first.
     It is written to where the signal arrives, before Python knows of it: a handler in Python waits for the
@@ -95,6 +99,7 @@ class _Ending:
     def __init__(self) -> None:
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
+        self.starter = Starter()
         self.failed = False
 
     def listen(self, *signals: int) -> None:
@@ -112,7 +117,7 @@ class _Ending:
         self.tell()
 
     def wait(self) -> None:
-        os.read(self._read, 1)
+        self.starter.wait_beside(self._read)
 
 
 class _Service:

@@ -1,0 +1,107 @@
+"""The supervisor of a graph whose processes `ros2 launch` has started: the executable `mount_supervisor`."""
+
+import argparse
+import signal
+import time
+
+from rclpy.logging import get_logger
+
+from mount_bags.run.session import new_session, session_text
+from mount_bringup.graph.bringup import Bringup
+from mount_bringup.graph.ending_signals import ending_signals
+from mount_bringup.graph.errors import GraphError, Interrupted
+from mount_bringup.graph.nodes import SIM, SIMULATED, GraphNode, GraphSettings
+from mount_bringup.graph.order import LaunchOrder
+from mount_ros.environment import prepare_environment
+from mount_ros.nodes.leaving import end_process
+from mount_ros.nodes.starter import Starter
+from mount_sim.diagnosis import FINISHED
+
+SUPERVISOR = 'mount_supervisor'
+
+
+class LaunchedGraph(Bringup):
+    """The nodes of a launch file, whose processes launch watches; without launch this one ends too."""
+
+    def __init__(self, nodes: tuple[GraphNode, ...], settings: GraphSettings):
+        super().__init__(nodes, settings)
+        self._starter = Starter()
+
+    def check_processes(self) -> None:
+        if self._starter.ended:
+            raise GraphError('launch has ended')
+
+
+def arguments_of(order: LaunchOrder) -> list[str]:
+    """Return the command line by which `main` supervises the graph of `order`."""
+    return [
+        *(f'--node={node.name}' for node in order.nodes),
+        f'--namespace={order.settings.namespace}',
+        f'--domain={order.settings.domain}',
+        f'--scenario={order.scenario}',
+        f'--duration={order.duration}',
+    ]
+
+
+def exit_error(name: str, code: int, asked: bool) -> str:
+    """Return what is wrong with the end of a process of a launched graph, empty if nothing is.
+
+    `asked`: all have been told to end. The supervisor also ends by itself, at the end of a drive.
+    """
+    if code == 0 and (asked or name == SUPERVISOR):
+        return ''
+    if asked and code == -signal.SIGINT:
+        return ''  # it was told before it could listen
+    reason = ', for the reason that it has told' if name == SUPERVISOR else ''
+    return f'{name} ended with code {code}{reason}'
+
+
+def main() -> None:
+    """Bring the graph to life and watch it; end with code 0 at its end or by a signal, with 1 by a fault."""
+    prepare_environment()
+    parser = argparse.ArgumentParser(prog=SUPERVISOR, description=__doc__)
+    parser.add_argument('--node', action='append', choices=[node.name for node in SIMULATED], required=True)
+    parser.add_argument('--namespace', default='')
+    parser.add_argument('--domain', type=int, required=True)
+    parser.add_argument('--scenario', required=True)
+    parser.add_argument('--duration', type=float, required=True, help='s; inf: until a signal')
+    chosen, _ = parser.parse_known_args()  # the rest is of ROS
+    nodes = tuple(node for node in SIMULATED if node.name in chosen.node)
+    graph = LaunchedGraph(nodes, GraphSettings(namespace=chosen.namespace, domain=chosen.domain))
+    end_process(_supervise(graph, chosen.scenario, chosen.duration))
+
+
+def _supervise(graph: Bringup, scenario: str, duration: float) -> int:
+    logger = get_logger(SUPERVISOR)
+
+    def session(parameters: dict[str, dict[str, object]]) -> str:
+        return session_text(
+            new_session({'scenario': scenario, 'mode': 'real time', 'parameters': parameters})
+        )
+
+    with ending_signals(graph.interrupt):
+        try:
+            graph.start(session, logger.info)
+            logger.info('all nodes are active')
+            end = time.monotonic() + duration
+            graph.wait_until(
+                lambda: graph.figures(SIM).get('sentence') == FINISHED or time.monotonic() > end,
+                float('inf'),
+                'the end',
+            )
+            logger.info('the end of the drive')
+            graph.stop()
+        except Interrupted:
+            graph.leave()  # launch has told the nodes too
+        except GraphError as error:
+            logger.error(str(error))
+            graph.stop()
+            return 1
+        finally:
+            for note in graph.notes:
+                logger.warning(note)
+    return 0
+
+
+if __name__ == '__main__':
+    main()

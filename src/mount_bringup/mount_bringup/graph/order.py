@@ -1,0 +1,173 @@
+"""What a launch file takes from the user, and the graph that this makes; `ros2 launch` is not needed here."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mount_bags.recorder.parameters import RecorderParameters
+from mount_bringup.chosen import chosen_control
+from mount_bringup.graph.domain import can_port, chosen_domain
+from mount_bringup.graph.nodes import DRIVER, RECORDER, SIM, GraphNode, GraphSettings
+from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
+from mount_bringup.parameter_file import settings_of_file
+from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes, setting_value
+from mount_control.policy.registry import POLICIES
+from mount_driver.parameters import DriverParameters
+from mount_init.parameters import InitParameters
+from mount_models.quantity import with_flattened
+from mount_ros.topics import TOPICS
+from mount_sim.parameters import SimParameters
+from mount_sim.plant.mounts import MOUNTS
+
+
+class LaunchArgument(NamedTuple):
+    """An argument of a launch file: its default, and NODE.NAME of the parameters that it sets if not empty.
+
+    Without a `default` that is not empty the parameters keep the values of the `config` file.
+    """
+
+    name: str
+    meaning: str
+    sets: tuple[str, ...] = ()
+    default: str = ''
+    choices: tuple[str, ...] = ()
+
+
+class LaunchOrder(NamedTuple):
+    """A graph as ordered by the arguments of a launch file; `duration` is in s, inf: until it is ended."""
+
+    nodes: tuple[GraphNode, ...]
+    settings: GraphSettings
+    scenario: str
+    duration: float
+    log_level: str
+
+
+_ANY = (
+    LaunchArgument('namespace', 'where the graph lives, such as mount_right; empty: /'),
+    LaunchArgument('record', 'whether the graph records', default='true', choices=('true', 'false')),
+    LaunchArgument('recording', 'folder that the recording creates', ('mount_recorder.uri',)),
+    LaunchArgument('policy', f'how forces are chosen: {", ".join(POLICIES)}', ('mount_control.policy',)),
+    LaunchArgument('damper', 'damper characteristic, such as viscous_2000', ('mount_control.damper',)),
+    LaunchArgument(
+        'parameters_file',
+        'specimen file of this actuator; empty: the shipped one',
+        ('mount_init.parameters_file', 'mount_control.parameters_file'),
+    ),
+    LaunchArgument(
+        'specimen',
+        'name that the specimen file must bear; empty: any',
+        ('mount_init.specimen', 'mount_control.specimen'),
+    ),
+    LaunchArgument(
+        'priority',
+        'real-time priority (SCHED_FIFO, 1 .. 99) of the loop, half of it for the recorder; 0: none',
+        default='0',
+    ),
+    LaunchArgument(
+        'log_level',
+        'what the nodes say at least',
+        default='info',
+        choices=('debug', 'info', 'warn', 'error', 'fatal'),
+    ),
+)
+_PORT = 'UDP port of the simulated CAN bus; empty: one for each ROS domain and namespace'
+
+SIM_ARGUMENTS = (
+    *_ANY,
+    LaunchArgument('scenario', 'what is driven: motorway, bench, sweep, recorded', ('mount_sim.scenario',)),
+    LaunchArgument('mount', f'what is between engine and chassis: {", ".join(MOUNTS)}', ('mount_sim.mount',)),
+    LaunchArgument(
+        'duration', 's of excitation, after which the graph ends', ('mount_sim.timeline.duration',)
+    ),
+    LaunchArgument('port', _PORT, ('mount_driver.port', 'mount_sim.port')),
+)
+"""The arguments of the graph with the simulated car, besides `config`."""
+
+VEHICLE_ARGUMENTS = (
+    *_ANY,
+    LaunchArgument('interface', 'interface of python-can', ('mount_driver.interface',), default='socketcan'),
+    LaunchArgument('channel', 'channel of the interface', ('mount_driver.channel',), default='can0'),
+    LaunchArgument('port', f'{_PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
+    LaunchArgument('duration', 's after which the graph ends; empty: when it is told to end'),
+)
+"""The arguments of the graph in the car, besides `config`."""
+
+
+def launch_order(
+    nodes: Sequence[GraphNode], arguments: Sequence[LaunchArgument], given: Mapping[str, str]
+) -> LaunchOrder:
+    """Return the graph for the texts `given`, {argument: text}; a `ValueError` says what cannot be."""
+    records = given['record'] == 'true'
+    if records and not given['recording']:
+        raise SettingError('a recording needs a folder: recording:=bags/first; or record:=false')
+    chosen = tuple(node for node in nodes if records or node is not RECORDER)
+    namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
+    known = {name: values for name, values in _known().items() if name in {node.name for node in nodes}}
+    port = {'port': can_port(domain, namespace)}
+    settings: dict[str, dict[str, Any]] = {node.name: dict(port) for node in chosen if node in (DRIVER, SIM)}
+    for layer in (settings_of_file(Path(given['config']), namespace, known), _of_arguments(arguments, given)):
+        for name, values in layer.items():
+            settings.setdefault(name, {}).update(values)
+    settings = with_control_of_mount(checked_settings(settings, known))
+    _check(settings)
+    return LaunchOrder(
+        nodes=chosen,
+        settings=GraphSettings(
+            namespace=namespace,
+            domain=domain,
+            parameters={node.name: settings.get(node.name, {}) for node in chosen},
+            priority=_number('priority', given['priority'], 99, int),
+        ),
+        scenario=settings.get(SIM.name, {}).get('scenario', SimParameters().scenario)
+        if SIM in nodes
+        else 'car',
+        duration=_duration(nodes, given),
+        log_level=given['log_level'],
+    )
+
+
+def _known() -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: default}} of all that a parameter file can set."""
+    known, driver = defaults_of_nodes(), DriverParameters()
+    known[SIM.name] |= {'interface': 'udp_multicast', 'channel': driver.channel, 'port': driver.port}
+    known[RECORDER.name] |= {'uri': '', 'topics': [topic.name for topic in TOPICS]}
+    return known
+
+
+def _of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    settings: dict[str, dict[str, Any]] = {}
+    for argument in arguments:
+        text = given[argument.name]
+        for target in argument.sets if text else ():
+            node, _, name = target.partition('.')
+            is_text = isinstance(_known()[node][name], str)
+            value = text if is_text else setting_value(f'{argument.name}:={text}', text)
+            settings.setdefault(node, {})[name] = value
+    return settings
+
+
+def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
+    """Raise the `ValueError` of the first parameter outside its range, before a node has it."""
+    sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (SIM, SimParameters()))
+    for node, defaults in sets:
+        with_flattened(defaults, settings.get(node.name, {}))
+    with_flattened(InitParameters(), settings.get('mount_init', {}))
+    check_control_of_mount(settings)
+    chosen_control(settings)
+
+
+def _duration(nodes: Sequence[GraphNode], given: Mapping[str, str]) -> float:
+    if SIM in nodes or not given['duration']:
+        return float('inf')  # the simulator tells its end
+    return _number('duration', given['duration'], 1e9, float)
+
+
+def _number(name: str, text: str, highest: float, kind: type) -> Any:
+    try:
+        number = kind(text)
+    except ValueError:
+        number = -1
+    if not 0 <= number <= highest:
+        raise SettingError(f'{name}:={text} must be a number within 0 .. {highest:g}')
+    return number
