@@ -1,5 +1,6 @@
 """Another policy than the paper's, one file and one line: driven, recorded, replayed, asked afterwards."""
 
+import io
 import sys
 from pathlib import Path
 
@@ -7,13 +8,23 @@ import numpy as np
 import pytest
 
 import mount_bags
-from mount_bags.run.session import session_text
+from mount_bags.compare.compare import compare
+from mount_bags.run.screen import Screen
+from mount_bags.run.session import recorded_session, session_content, session_parameters, session_text
+from mount_bringup.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES
+from mount_models.quantity import ParameterError
+from mount_replay.drive.drive import DriveOrder, record_drive
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, parsed_changes, replay_without_output
+from mount_report.drive.evaluation import tracking_error
+from mount_report.drive.signals import load_drive
+from mount_report.run_facts import run_facts
+from mount_report.signals import Signals
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'src' / 'mount_control' / 'test'
 SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 1.0}
+CONTINUOUS = {'policy': 'continuous_viscous'}
 CHOSEN = {'policy': 'viscous_example', 'viscous_example.damping_coefficient': 800.0}
 
 
@@ -36,7 +47,7 @@ def drives(tmp_path_factory):
     found = {}
     for name, control in {
         'switched_viscous': {'policy': 'switched_viscous'},
-        'continuous_viscous': {'policy': 'continuous_viscous'},
+        'continuous_viscous': CONTINUOUS,
         'viscous_example': CHOSEN,
     }.items():
         folder = tmp_path_factory.mktemp(name) / 'recording'
@@ -60,6 +71,48 @@ def test_a_recording_names_the_policy_and_what_it_traced(drives):
 def test_each_is_replayed_to_the_bit(drives, policy, mode):
     outcome = replay_without_output(ReplayOrder(drives[policy], mode))
     assert outcome.agreement.equal, outcome.agreement
+
+
+@pytest.mark.parametrize(('policy', 'levels'), [('switched_viscous', 2), ('viscous_example', 0)])
+def test_a_report_reads_a_drive_of_any_policy(drives, policy, levels):
+    recording = mount_bags.open(drives[policy])
+    drive, facts = load_drive(recording), run_facts(Signals(recording))
+    assert len(facts.levels.displacement) == levels
+    assert np.isfinite(drive.seen.band_displacement).any() == (policy == 'switched_viscous')
+    assert facts.tracking.error < 0.03
+    own = policy_of(with_recorded_policy(session_parameters(session_content(recorded_session(recording)))))
+    assert facts.tracking.error == tracking_error(drive, *own)
+
+
+def test_openings_are_compared_as_a_switch_and_as_a_signal(drives, tmp_path):
+    continuous = mount_bags.open(drives['continuous_viscous'])
+    slower = {'mount_sim': SIM, 'mount_control': {**CONTINUOUS, 'continuous_viscous.opening_time': 0.05}}
+    record_core(tmp_path / 'slower', slower, session_text({'parameters': slower}))
+    found = compare(continuous, mount_bags.open(tmp_path / 'slower'))
+    assert 'damping_active' in [signal.signal for signal in found.differing]
+    assert [change.on for change in found.switching] == [True]
+    paper = mount_bags.open(drives['switched_viscous'])
+    assert 'damping_active' not in [signal.signal for signal in compare(paper, paper).signals]
+
+
+def test_a_session_without_a_policy_is_of_the_first_and_a_drive_names_its_own(tmp_path):
+    parameters = {'mount_sim': SIM, 'mount_control': {'policy': 'switched_viscous'}}
+    record_core(tmp_path / 'old', parameters, session_text({'parameters': {'mount_sim': SIM}}))
+    assert replay_without_output(ReplayOrder(tmp_path / 'old', CORE)).agreement.equal
+    order = DriveOrder('bench', 'core', {'mount_sim': SIM}, out=tmp_path / 'new')
+    folder, _, _ = record_drive(order, Screen(io.StringIO()))
+    assert 'policy: continuous_viscous' in mount_bags.open(folder.recording).latched('session').data
+    outcome = replay_without_output(ReplayOrder(folder.recording, CORE))
+    assert outcome.agreement.equal
+    assert 'amplitude' in outcome.replayed.runs[0].traces.dtype.names
+
+
+def test_a_change_that_the_recorded_policy_does_not_know_is_refused(drives):
+    changes = parsed_changes({'continuous_viscous.quality': 0.7})
+    with pytest.raises(
+        ParameterError, match='for the chosen policy is switched_viscous'
+    ):
+        replay_without_output(ReplayOrder(drives['switched_viscous'], CORE, changes=changes))
 
 
 def test_a_recording_is_asked_what_another_policy_would_have_answered(drives):

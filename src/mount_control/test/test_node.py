@@ -1,6 +1,7 @@
 """The node between a driver and an initialisation that the test plays, in the real middleware."""
 
 import math
+import types
 from dataclasses import replace
 
 import numpy as np
@@ -584,3 +585,16 @@ def test_a_damper_file_is_in_the_parameters_with_its_points(make_control, tmp_pa
     np.testing.assert_array_equal(
         control._settings.design.table, damper_curve('{velocity: [0, 0.1], force: [0, 100]}').table
     )
+
+
+def test_a_parameter_of_another_policy_is_told_as_a_warning(make_control, monkeypatch):
+    told = []
+    for values in ({'quality': 0.7}, {'continuous_viscous.quality': 0.7}, {'quality': 1.0}):
+        control = make_control(policy='continuous_viscous', **values)
+        warned = types.SimpleNamespace(warning=told.append)
+        monkeypatch.setattr(control, 'get_logger', lambda warned=warned: warned)
+        assert control.trigger_configure() == SUCCESS
+    assert len(told) == 1
+    assert told[0].startswith('mount_control: quality of the policy switched_viscous would have no effect')
+    assert _set(control, damper='degressive') == []
+    assert 'damper of the policy switched_viscous' in told[-1]
