@@ -61,7 +61,8 @@ def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equal
 
 def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switching_too(command):
     options = (
-        '--mount', 'hydro', '--set', 'mount_control.switching=always', '--scenario', 'sweep',
+        '--mount', 'hydro', '--set', 'mount_control.policy=switched_viscous',
+        '--set', 'mount_control.switching=always', '--scenario', 'sweep',
         '--duration', '1', '--set', 'mount_sim.timeline.start=3',
         '--set', 'mount_sim.sweep.first_frequency=8', '--set', 'mount_sim.idle.amplitude=200',
         '--set', 'mount_sim.electronics.coil_temperature=55.04',

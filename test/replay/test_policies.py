@@ -109,9 +109,7 @@ def test_a_session_without_a_policy_is_of_the_first_and_a_drive_names_its_own(tm
 
 def test_a_change_that_the_recorded_policy_does_not_know_is_refused(drives):
     changes = parsed_changes({'continuous_viscous.quality': 0.7})
-    with pytest.raises(
-        ParameterError, match='for the chosen policy is switched_viscous'
-    ):
+    with pytest.raises(ParameterError, match='for the chosen policy is switched_viscous'):
         replay_without_output(ReplayOrder(drives['switched_viscous'], CORE, changes=changes))
 
 

@@ -71,7 +71,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
     recording.load_columns(
         {
             DISPLACEMENT.name: DISPLACEMENT.names,
-            CONTROL_TRACE.name: _TRACED,
+            CONTROL_TRACE.name: (*_TRACED, _OF_SOME),
             SIM_TRUTH.name: (*scalars, *_AT_THE_END),
         }
     )
@@ -100,7 +100,7 @@ def _seen(recording: Recording, zero: int) -> Seen:
     _, places, of_trace = np.intersect1d(stamps, trace.stamps, return_indices=True)
     traced = {name: np.full(len(stamps), np.nan) for name in (*_TRACED, _OF_SOME)}
     for name, values in traced.items():
-        if name in trace.names or name != _OF_SOME:
+        if name in trace.columns or name != _OF_SOME:
             values[places] = trace[name][of_trace]
     return Seen(
         time=(stamps - zero) / _SECOND,
