@@ -37,7 +37,7 @@ def launch_description(
         DeclareLaunchArgument(
             argument.name,
             default_value=argument.default,
-            description=argument.meaning,
+            description=argument.description,
             choices=list(argument.choices) or None,
         )
         for argument in every

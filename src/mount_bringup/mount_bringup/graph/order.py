@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control
 from mount_bringup.graph.domain import can_port, chosen_domain
-from mount_bringup.graph.nodes import DRIVER, RECORDER, SIM, GraphNode, GraphSettings
+from mount_bringup.graph.nodes import DRIVER, INIT, RECORDER, SIM, GraphNode, GraphSettings
 from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes, setting_value
@@ -16,21 +16,25 @@ from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.quantity import with_flattened
 from mount_ros.topics import TOPICS
+from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import MOUNTS
+from mount_sim.plant.mounts import MOUNTS, seated_mount
 
 
 class LaunchArgument(NamedTuple):
-    """An argument of a launch file: its default, and NODE.NAME of the parameters that it sets if not empty.
-
-    Without a `default` that is not empty the parameters keep the values of the `config` file.
-    """
+    """An argument of a launch file: its default, and NODE.NAME of the parameters that it sets if not empty."""
 
     name: str
     meaning: str
     sets: tuple[str, ...] = ()
     default: str = ''
     choices: tuple[str, ...] = ()
+
+    @property
+    def description(self) -> str:
+        """The meaning, and what an empty text stands for."""
+        told = self.default or not self.sets or 'empty:' in self.meaning
+        return self.meaning if told else f'{self.meaning}; empty: as in the config file'
 
 
 class LaunchOrder(NamedTuple):
@@ -46,17 +50,21 @@ class LaunchOrder(NamedTuple):
 _ANY = (
     LaunchArgument('namespace', 'where the graph lives, such as mount_right; empty: /'),
     LaunchArgument('record', 'whether the graph records', default='true', choices=('true', 'false')),
-    LaunchArgument('recording', 'folder that the recording creates', ('mount_recorder.uri',)),
+    LaunchArgument(
+        'recording',
+        'folder that the recording creates; empty: only with record:=false',
+        ('mount_recorder.uri',),
+    ),
     LaunchArgument('policy', f'how forces are chosen: {", ".join(POLICIES)}', ('mount_control.policy',)),
     LaunchArgument('damper', 'damper characteristic, such as viscous_2000', ('mount_control.damper',)),
     LaunchArgument(
         'parameters_file',
-        'specimen file of this actuator; empty: the shipped one',
+        'specimen file of this actuator; empty: as in the config file, else the shipped one',
         ('mount_init.parameters_file', 'mount_control.parameters_file'),
     ),
     LaunchArgument(
         'specimen',
-        'name that the specimen file must bear; empty: any',
+        'name that the specimen file must bear; empty: as in the config file, else any',
         ('mount_init.specimen', 'mount_control.specimen'),
     ),
     LaunchArgument(
@@ -149,10 +157,12 @@ def _of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str])
 
 def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
     """Raise the `ValueError` of the first parameter outside its range, before a node has it."""
-    sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (SIM, SimParameters()))
+    sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (INIT, InitParameters()))
     for node, defaults in sets:
         with_flattened(defaults, settings.get(node.name, {}))
-    with_flattened(InitParameters(), settings.get('mount_init', {}))
+    sim = with_flattened(SimParameters(), settings.get(SIM.name, {}))
+    seated_mount(sim.mount)
+    build_excitation(sim)
     check_control_of_mount(settings)
     chosen_control(settings)
 

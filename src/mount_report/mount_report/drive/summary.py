@@ -55,6 +55,7 @@ def summarise(
         'asked_samples': found.asked,
         'unanswered_samples': found.unanswered,
         'late_samples': found.late,
+        'misdated_messages': found.misdated,
         'faults': found.as_json()['faults'],
         'real_time_factor': run['real_time_factor'],
         'rest_gap_m': float(gap['rest_gap'][-1]),

@@ -1,0 +1,110 @@
+"""The graph that the arguments of a launch file order."""
+
+from pathlib import Path
+
+import pytest
+
+import mount_bringup
+from mount_bringup.graph.domain import can_port
+from mount_bringup.graph.launched import arguments_of
+from mount_bringup.graph.nodes import RECORDER, SIMULATED, VEHICLE
+from mount_bringup.graph.order import SIM_ARGUMENTS, VEHICLE_ARGUMENTS, launch_order
+from mount_models.quantity import ParameterError
+
+CONFIG = Path(mount_bringup.__file__).parents[1] / 'config'
+
+
+@pytest.fixture(autouse=True)
+def own_domain(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '7')
+
+
+def sim(**given):
+    given = {'config': str(CONFIG / 'sim.yaml'), 'recording': 'bags/first', **given}
+    defaults = {argument.name: argument.default for argument in SIM_ARGUMENTS}
+    return launch_order(SIMULATED, SIM_ARGUMENTS, {**defaults, **given})
+
+
+def vehicle(**given):
+    given = {'config': str(CONFIG / 'vehicle.yaml'), 'recording': 'bags/first', **given}
+    defaults = {argument.name: argument.default for argument in VEHICLE_ARGUMENTS}
+    return launch_order(VEHICLE, VEHICLE_ARGUMENTS, {**defaults, **given})
+
+
+def test_the_shipped_files_order_the_graph_and_its_bus_has_the_port_of_domain_and_namespace():
+    parameters = sim(namespace='/left').settings.parameters
+    assert parameters['mount_sim']['port'] == parameters['mount_driver']['port'] == can_port(7, 'left')
+    assert parameters['mount_recorder'] == {'uri': 'bags/first'}
+    assert parameters['mount_control'] == {'eigenfrequency': 8.0}
+    car = vehicle().settings.parameters
+    assert car['mount_driver']['interface'] == 'socketcan'
+    assert 'mount_sim' not in car
+
+
+def test_arguments_win_over_the_file_and_the_file_over_what_is_not_given(tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text(
+        '/**/mount_control: {ros__parameters: {eigenfrequency: 9, damper: viscous_3000}}\n'
+        '/**/mount_driver: {ros__parameters: {port: 9000}}\n'
+        '/**/mount_sim: {ros__parameters: {port: 9000}}\n'
+    )
+    parameters = sim(config=str(file), mount='hydro', port='9001', duration='5').settings.parameters
+    assert repr(parameters['mount_control']['eigenfrequency']) == '9.0'
+    assert parameters['mount_control']['damper'] == 'viscous_3000'
+    assert (parameters['mount_sim']['port'], parameters['mount_driver']['port']) == (9001, 9001)
+    assert repr(parameters['mount_sim']['timeline.duration']) == '5.0'
+    assert parameters['mount_sim']['mount'] == 'hydro'
+    kept = sim(config=str(file)).settings.parameters
+    assert (kept['mount_sim']['port'], kept['mount_driver']['port']) == (9000, 9000)
+
+
+def test_texts_stay_texts():
+    assert sim(recording='2026').settings.parameters['mount_recorder']['uri'] == '2026'
+
+
+def test_a_mount_that_damps_always_takes_its_control_along():
+    assert sim(mount='friction_always_on').settings.parameters['mount_control']['switching'] == 'always'
+
+
+def test_without_a_recording_there_is_no_recorder():
+    order = sim(record='false', recording='')
+    assert RECORDER not in order.nodes
+    assert set(order.settings.parameters) == {'mount_driver', 'mount_sim', 'mount_init', 'mount_control'}
+
+
+def test_the_supervisor_is_told_what_it_supervises():
+    order = vehicle(namespace='right', record='false', duration='30')
+    assert arguments_of(order) == [
+        '--node=mount_driver', '--node=mount_init', '--node=mount_control',
+        '--namespace=right', '--domain=7', '--scenario=car', '--duration=30.0',
+    ]  # fmt: skip
+    assert '--duration=inf' in arguments_of(vehicle())
+    assert '--scenario=bench' in arguments_of(sim(scenario='bench'))
+    assert '--scenario=motorway' in arguments_of(sim())
+
+
+@pytest.mark.parametrize(
+    ('given', 'words'),
+    [
+        ({'recording': ''}, 'a recording needs a folder'),
+        ({'policy': 'best'}, "policy 'best' is unknown"),
+        ({'mount': 'rubber'}, "mount 'rubber' is unknown"),
+        ({'scenario': 'race'}, "scenario 'race' is unknown"),
+        ({'damper': 'soft'}, "'soft'"),
+        ({'duration': 'long'}, 'timeline.duration must be a float'),
+        ({'port': '80'}, r'port \(80 1\) must lie within 1024'),
+        ({'priority': '-1'}, r'priority:=-1 must be a number within 0 \.\. 99'),
+        ({'parameters_file': 'none.yaml'}, 'none.yaml'),
+        ({'config': 'none.yaml'}, 'none.yaml cannot be read'),
+    ],
+)
+def test_what_cannot_be_is_refused_before_a_process_starts(given, words):
+    with pytest.raises(ValueError, match=words):
+        sim(**given)
+
+
+def test_a_simulator_is_no_node_of_the_car(tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text('/**/mount_sim: {ros__parameters: {seed: 2}}')
+    with pytest.raises(ParameterError, match='is no node of the graph'):
+        vehicle(config=str(file))
