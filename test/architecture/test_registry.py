@@ -46,7 +46,7 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
     'mount_bags/recorder/collector.py',
     'mount_ros/data_path.py',
     'mount_ros/nodes/diagnostics.py',
-    'mount_bringup/graph/supervisor.py',
+    'mount_bringup/graph/bringup.py',
 }
 
 PARAMETER_SETS = (
