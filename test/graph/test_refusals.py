@@ -7,6 +7,8 @@ import pytest
 
 from mount_cli.command import main
 
+PAPER = ('--set', 'mount_control.policy=switched_viscous')
+
 
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path, monkeypatch):
@@ -65,16 +67,27 @@ def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words)
             ('--mount', 'friction_always_on', '--set', 'mount_control.switching=enabled'),
             ('mount friction_always_on needs mount_control.switching always', 'received enabled'),
         ),
-        (('--set', 'mount_control.switching=never'), ("switching 'never' is unknown", 'enabled, always')),
+        (
+            ('--mount', 'friction_always_on', '--set', 'mount_control.policy=continuous_viscous'),
+            ('needs mount_control.policy switched_viscous', 'received continuous_viscous'),
+        ),
+        (
+            ('--set', 'mount_control.switch_on_level=0.0006'),
+            ('switch_on_level of the policy switched_viscous', 'set mount_control.policy to'),
+        ),
+        (
+            (*PAPER, '--set', 'mount_control.switching=never'),
+            ("switching 'never' is unknown", 'enabled, always'),
+        ),
         (('--scenario', 'sweep', '--duration', '60'), ('duration (60 s)', '(49 s)')),
         (('--scenario', 'bench', '--set', 'mount_sim.idle.amplitude=200'), ('idle.amplitude (200 N)',)),
         (('--scenario', 'recorded'), ('needs a file',)),
-        (('--set', 'mount_control.quality=50'), ('quality (50', '0.3 .. 5')),
-        (('--set', 'mount_control.quality=5e1'), ('quality (50', '0.3 .. 5')),
+        ((*PAPER, '--set', 'mount_control.quality=50'), ('quality (50', '0.3 .. 5')),
+        ((*PAPER, '--set', 'mount_control.quality=5e1'), ('quality (50', '0.3 .. 5')),
         (('--set', 'mount_control.qualty=1'), ("'qualty' is no parameter of mount_control", 'quality')),
         (('--set', 'mount_kontrol.quality=1'), ("'mount_kontrol' is no node",)),
-        (('--set', 'mount_control.damper=soft'), ("'soft'", 'viscous_2000')),
-        (('--set', 'mount_control.switch_off_level=0.0009'), ('switch_off_level (0.9 mm)', 'below')),
+        ((*PAPER, '--set', 'mount_control.damper=soft'), ("'soft'", 'viscous_2000')),
+        ((*PAPER, '--set', 'mount_control.switch_off_level=0.0009'), ('switch_off_level (0.9 mm)', 'below')),
         (('--set', 'mount_sim.mechanics.contact_gap=0.0006'), ('contact_gap (600.0 um)', 'rest_gap')),
         (('--set', 'mount_sim.fault.kind=flat_tyre'), ("fault 'flat_tyre' is unknown",)),
         (('--domain', '400'), ("ROS domain '400'", '0 .. 101')),

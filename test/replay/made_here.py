@@ -1,6 +1,6 @@
 """Run as a process of its own: makes with this processor what must be the same bytes on every other.
 
-Arguments: a new folder, the references, a recording to replay, or nothing. Prints how the libraries see the
+Arguments: a new folder, the references, recordings to replay. Prints how the libraries see the
 processor, and whether the recorded answers were met, as JSON.
 """
 
@@ -35,19 +35,25 @@ DRIVE = {
         'idle.amplitude': 80.0,
         'electronics.coil_temperature': 55.0,
     },
-    'mount_control': {'damper': 'degressive'},
 }
 """A warm initialisation, then a gap in a random road under an idling engine."""
+CONTROLS = {
+    'switched_viscous': {'policy': 'switched_viscous', 'damper': 'degressive'},
+    'continuous_viscous': {'policy': 'continuous_viscous'},
+}
+"""What drives it, by the name of the recording."""
 
 
-def make(folder: Path, references: Path, recording: Path | None) -> dict[str, bool]:
+def make(folder: Path, references: Path, recordings: list[Path]) -> dict[str, bool]:
     """Return which recorded answers were met."""
     folder.mkdir()
-    record_core(folder / 'drive', DRIVE, session_text({'parameters': DRIVE}))
+    for name, control in CONTROLS.items():
+        parameters = {**DRIVE, 'mount_control': control}
+        record_core(folder / name, parameters, session_text({'parameters': parameters}))
     np.savez(folder / 'numbers.npz', **numbers(folder))
     met = {}
-    for each in [*sorted(path for path in references.iterdir() if path.is_dir()), *filter(None, [recording])]:
-        outcome = replay(ReplayOrder(each, CORE, out=folder / each.name / 'replay'))
+    for each in [*sorted(path for path in references.iterdir() if path.is_dir()), *recordings]:
+        outcome = replay(ReplayOrder(each, CORE, out=folder / 'replays' / each.name))
         met[each.name] = outcome.held
     return met
 
@@ -84,5 +90,5 @@ def seen_by_libraries() -> dict[str, object]:
 
 if __name__ == '__main__':
     target, reference_folder, *replayed = map(Path, sys.argv[1:])
-    result = make(target, reference_folder, replayed[0] if replayed else None)
+    result = make(target, reference_folder, replayed)
     print(json.dumps({'met': result, 'seen': seen_by_libraries()}))

@@ -22,6 +22,8 @@ DRIVE = (
     '0.6',
     '--set',
     'mount_sim.timeline.start=2.8',
+    '--set',
+    'mount_control.policy=switched_viscous',
 )
 EARLIER = ('--set', 'mount_control.switch_on_level=0.0006')
 

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.messages.series import Series
-from mount_bringup.chosen import chosen_damper, switched_viscous_parameters
+from mount_bringup.chosen import policy_of
 from mount_bringup.mount_choice import with_control_of_mount
+from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.arithmetic.series import series_of
+from mount_models.damper import damper_curve
 from mount_models.specimen import default_specimen
 from mount_replay.loop import chain as core_chain
 from mount_replay.loop import run as core_run
@@ -29,6 +31,7 @@ from mount_ros.topics import Topic
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.plant.simulated_mount import DivergedError
 
+PAPER = {'policy': 'switched_viscous'}
 PERIOD = 0.125  # s, of 8 Hz
 BENCH = {
     'scenario': 'bench',
@@ -55,15 +58,13 @@ class Recorded:
     @property
     def tracking(self) -> float:
         """Rms error of the friction force as a share of the wanted peak."""
-        return tracking_error(
-            self.drive, switched_viscous_parameters(self.settings), chosen_damper(self.settings)
-        )
+        return tracking_error(self.drive, *policy_of(self.settings))
 
 
 @pytest.fixture(scope='module')
 def run(tmp_path_factory) -> Callable[..., Recorded]:
     def run(sim: dict[str, Any], control: dict[str, Any] | None = None) -> Recorded:
-        settings = {'mount_sim': sim, 'mount_control': control or {}}
+        settings = {'mount_sim': sim, 'mount_control': PAPER | (control or {})}
         folder = tmp_path_factory.mktemp('core') / 'recording'
         outcome = record_core(folder, settings, '')
         recording = open_recording(folder)
@@ -96,7 +97,7 @@ def test_friction_force_is_never_far_from_the_damper_s(matched):
     time, force = matched.drive.seen.time[settled], matched[topics.SIM_TRUTH]['friction_force'][settled]
     # what the plant shows at a sample is the force of the step that has just ended, half a sample ago
     velocity = 1e-3 * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * time)
-    wanted = chosen_damper({}).force(velocity)
+    wanted = damper_curve(DEFAULT_DAMPER).force(velocity)
     assert np.abs(force - wanted).max() <= 0.04 * np.abs(wanted).max()
 
 
@@ -140,7 +141,7 @@ def _dissipation_of_the_damper() -> float:
     """Work per period (J) of the selected damper at 8 Hz and 1 mm."""
     time = np.arange(0.0, PERIOD, 1e-5)
     velocity = 1e-3 * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * time)
-    return float(np.sum(chosen_damper({}).force(velocity) * velocity) * 1e-5)
+    return float(np.sum(damper_curve(DEFAULT_DAMPER).force(velocity) * velocity) * 1e-5)
 
 
 def test_damping_goes_on_one_period_after_the_magnitude_exceeds_its_level(matched):
@@ -185,7 +186,7 @@ def test_without_pads_or_current_the_control_asks_in_vain(run, mount):
 
 def test_the_mount_that_is_always_on_damps_without_having_been_shaken(run):
     settings = with_control_of_mount({'mount_sim': {**BENCH, 'mount': 'friction_always_on'}})
-    assert settings['mount_control'] == {'switching': 'always'}
+    assert settings['mount_control'] == {**PAPER, 'switching': 'always'}
     recorded = run(settings['mount_sim'], settings['mount_control'])
     active = recorded[topics.CONTROL_TRACE]['damping_active']
     assert (active[124:] == 1.0).all()

@@ -20,7 +20,7 @@ BENCH = (
 )  # fmt: skip
 SHARED = (
     'samples', 'lost_samples', 'lost_messages', 'asked_samples', 'unanswered_samples', 'late_samples',
-    'faults',
+    'misdated_messages', 'faults',
 )  # fmt: skip
 STALLED = range(3100, 3326)  # samples without an answer of control
 LOST = range(3400, 3405)
@@ -125,6 +125,7 @@ def test_a_good_drive_ends_with_0_and_nothing_to_name(good):
         'asked_samples': 850,
         'unanswered_samples': 0,
         'late_samples': None,
+        'misdated_messages': 0,
         'faults': [],
     }
 
@@ -138,6 +139,7 @@ def test_a_bad_drive_ends_with_1_and_names_what_was_bad(bad):
         'asked_samples': 850 - len(LOST),
         'unanswered_samples': len(STALLED),
         'late_samples': None,
+        'misdated_messages': 0,
     }
     sentences = [fault['sentence'] for fault in bad.summary['faults']]
     assert sentences[2] == 'no setpoint in time for 227 ms (limit 20 ms): the coil went to 0 A'

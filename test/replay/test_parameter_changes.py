@@ -16,7 +16,10 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import change_text, dated
 from mount_ros.topics import EVENT
 
-PARAMETERS = {'mount_sim': {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 2.0}}
+PARAMETERS = {
+    'mount_sim': {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 2.0},
+    'mount_control': {'policy': 'switched_viscous'},
+}
 CHANGES = [
     (3.4, 'viscous_2000', {'damper': ('viscous_2000', 'viscous_3500')}),
     (3.9, 'viscous_3500', {'eigenfrequency': (8.0, 7.0), 'lead_time': (0.0019, 0.004)}),
@@ -28,7 +31,7 @@ def changed_drive(tmp_path_factory):
     """A core drive whose controller was changed twice, as mount_control would be, and what it told of it."""
     folder, told, patch = tmp_path_factory.mktemp('changed') / 'recording', [], pytest.MonkeyPatch()
     take_many, run_core = core_run._take_many, core_recording.run_core
-    values = {'damper': 'viscous_2000'}
+    values = {**PARAMETERS['mount_control'], 'damper': 'viscous_2000'}
 
     def take_many_and_change(mount, chain, samples, pending):
         stamp = mount.sample * 1_000_000

@@ -34,7 +34,11 @@ def example():
 def drives(tmp_path_factory):
     """Core drives of the paper's policy and of the example, with the session that a graph writes."""
     found = {}
-    for name, control in {'switched_viscous': {}, 'viscous_example': CHOSEN}.items():
+    for name, control in {
+        'switched_viscous': {'policy': 'switched_viscous'},
+        'continuous_viscous': {'policy': 'continuous_viscous'},
+        'viscous_example': CHOSEN,
+    }.items():
         folder = tmp_path_factory.mktemp(name) / 'recording'
         parameters = {'mount_sim': SIM, 'mount_control': control}
         record_core(folder, parameters, session_text({'scenario': 'bench', 'parameters': parameters}))
@@ -52,7 +56,7 @@ def test_a_recording_names_the_policy_and_what_it_traced(drives):
 
 
 @pytest.mark.parametrize('mode', [CORE, LOCKSTEP])
-@pytest.mark.parametrize('policy', ['switched_viscous', 'viscous_example'])
+@pytest.mark.parametrize('policy', ['switched_viscous', 'continuous_viscous', 'viscous_example'])
 def test_each_is_replayed_to_the_bit(drives, policy, mode):
     outcome = replay_without_output(ReplayOrder(drives[policy], mode))
     assert outcome.agreement.equal, outcome.agreement

@@ -23,8 +23,9 @@ SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.1}
 )
 @pytest.mark.parametrize('mode', [CORE, LOCKSTEP])
 def test_the_replay_is_equal_and_says_where_the_recording_is_from(others, sentence, mode, domain, tmp_path):
-    content = {'parameters': {'mount_sim': SIM}, 'versions': {**versions(), **others}}
-    record_core(tmp_path / 'drive', {'mount_sim': SIM}, session_text(content))
+    parameters = {'mount_sim': SIM, 'mount_control': {'policy': 'continuous_viscous'}}
+    content = {'parameters': parameters, 'versions': {**versions(), **others}}
+    record_core(tmp_path / 'drive', parameters, session_text(content))
     outcome = replay(ReplayOrder(tmp_path / 'drive', mode, out=tmp_path / 'replay', domain=domain))
     figures, shown = replay_figures(outcome), io.StringIO()
     print_replay(outcome, figures, Screen(shown))

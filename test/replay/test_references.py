@@ -2,11 +2,16 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mount_bags.bag.recording import open_recording
 from mount_bags.compare.accept import ACCEPTED_NAME, LARGEST_TOTAL
 from mount_bags.compare.reference import differences_from_reference
+from mount_bags.events.switching_changes import switching_times
+from mount_bags.run.session import recorded_session, session_content, session_parameters
 from mount_bags.run.versions import version_differences, versions, versions_sentence
+from mount_replay.given.input import Notes, recorded_parameters
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 REFERENCES = sorted(
@@ -29,8 +34,27 @@ def test_the_accepted_setpoints_are_met_to_the_bit(reference, mode, domain, tmp_
     )
 
 
-def test_a_gap_a_rough_stretch_a_fault_and_an_initialisation_are_there_with_a_reason_and_small():
-    assert [folder.name for folder in REFERENCES] == ['fault', 'gap', 'initialisation', 'rough']
+@pytest.mark.parametrize('reference', REFERENCES, ids=lambda folder: folder.name)
+def test_those_from_before_there_were_policies_are_of_the_first(reference):
+    recording = open_recording(reference)
+    named = session_parameters(session_content(recorded_session(recording)))['mount_control'].get('policy')
+    assert named == ('continuous_viscous' if reference.name == 'opening' else None)
+    chosen = recorded_parameters(recording, Notes())['mount_control']['policy']
+    assert chosen == (named or 'switched_viscous')
+
+
+def test_of_the_continuous_law_damping_opens_and_closes_under_an_idling_engine():
+    trace = open_recording(REFERENCES[0].with_name('opening'))['control_trace']
+    opening = trace['damping_active']
+    on, off = switching_times(trace.time, opening)
+    assert len(on) == len(off) == 1
+    assert opening.max() > 0.5
+    assert len(np.unique(opening)) > 1000  # neither on nor off, but between
+    assert trace['idle_amplitude'][-1] > 1e-5
+
+
+def test_all_kinds_of_drives_are_there_with_a_reason_and_small():
+    assert [folder.name for folder in REFERENCES] == ['fault', 'gap', 'initialisation', 'opening', 'rough']
     assert all('reason:' in (folder / ACCEPTED_NAME).read_text() for folder in REFERENCES)
     size = sum(path.stat().st_size for folder in REFERENCES for path in folder.iterdir())
     assert size < LARGEST_TOTAL

@@ -22,7 +22,8 @@ from mount_report.signals import Signals
 from mount_ros.messages.cdr import serialised
 
 REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
-BENCH = ('--scenario', 'bench', '--duration', '2.5', '--set', 'mount_sim.timeline.start=2.8')
+PAPER = ('--set', 'mount_control.policy=switched_viscous')
+BENCH = ('--scenario', 'bench', '--duration', '2.5', '--set', 'mount_sim.timeline.start=2.8', *PAPER)
 MOST = 10_000_000  # bytes of a page
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 

@@ -22,6 +22,8 @@ from mount_bags.compare.words import differences
 from mount_bags.run.versions import versions
 from mount_ros.topics import EVENT, SESSION, TOPICS
 
+from .made_here import CONTROLS
+
 FOLDER = Path(__file__).parents[2] / 'bags' / 'reference'
 REFERENCES = sorted(path.name for path in FOLDER.iterdir() if path.is_dir())
 LIMIT = 600.0  # s: only a hang takes so long; the first time a process compiles the laws for its processor
@@ -62,7 +64,7 @@ def made(folder: Path, emulation: dict[str, str], *recording: Path) -> dict[str,
 def differences_of(here: Path, there: Path) -> list[str]:
     """Return which topics and numbers are other bytes in the second folder, and by how much."""
     told = []
-    for path in ('drive', *(f'{name}/replay/recording' for name in REFERENCES)):
+    for path in (*CONTROLS, *(f'replays/{name}/recording' for name in REFERENCES)):
         a, b = mount_bags.open(here / path), mount_bags.open(there / path)
         changed = [topic for topic in DATA if topic.name in a and payloads(a, topic) != payloads(b, topic)]
         if changed:
@@ -85,7 +87,7 @@ def test_every_processor_makes_and_repeats_the_same_bytes(tmp_path):
     plain = made(tmp_path / 'plain', {})
     told, seen = unmet(plain), {}
     for name, emulation in EMULATED.items():
-        said = made(tmp_path / name, emulation, tmp_path / 'plain' / 'drive')
+        said = made(tmp_path / name, emulation, *(tmp_path / 'plain' / each for each in CONTROLS))
         found = [*differences_of(tmp_path / 'plain', tmp_path / name), *unmet(said)]
         told += [f'{name}: {text}' for text in found]
         seen[name] = said['seen']

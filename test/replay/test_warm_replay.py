@@ -21,7 +21,11 @@ SIM = {
 @pytest.fixture(scope='module')
 def warm_drive(tmp_path_factory):
     folder = tmp_path_factory.mktemp('warm') / 'drive'
-    parameters = {'mount_sim': SIM, 'mount_init': {'coil_temperature_celsius': float('nan')}}
+    parameters = {
+        'mount_sim': SIM,
+        'mount_init': {'coil_temperature_celsius': float('nan')},
+        'mount_control': {'policy': 'continuous_viscous'},
+    }
     record_core(folder, parameters, session_text({'parameters': parameters}))
     return folder
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from compared_drives import answers, text
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from recorded_drive import PERIOD, START, joint_state
+from recorded_drive import PERIOD, RECORDED, START, joint_state
 
 import mount_bags
 from mount_bags.audit.answers import Control, Setpoints, Silence, judge_answers
@@ -224,3 +224,32 @@ def test_of_many_faults_the_first_are_named_and_the_others_counted(tmp_path):
     lines = found.faults_text().splitlines()
     assert lines[:3] == ['8:', '0.100 s number 0;', '0.110 s number 1;']
     assert lines[-2:] == ['0.140 s number 4;', 'and 3 more']
+
+
+# Stamps that no sample has.
+
+
+@pytest.mark.parametrize('stamp', [2_147_483_647_000_000_000, 1, 0, -1_000_000_000_000_000_000])
+@pytest.mark.parametrize('topic', [DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT], ids=lambda topic: topic.name)
+def test_one_stamp_far_off_is_named_and_is_no_loss(tmp_path, topic, stamp):
+    writer = BagWriter(tmp_path / 'bag')
+    for each in RECORDED:
+        writer.add_topic(f'/{each.name}', each.type)
+    for index, time in enumerate(SAMPLES[:1000].tolist()):
+        for each in RECORDED:
+            told = stamp if each is topic and index == 400 else time
+            values = np.zeros(len(each.names))
+            raw = joint_state(told, list(each.names), values, values if each.has_derivatives else np.empty(0))
+            writer.write(f'/{each.name}', raw, time + 300_000)
+    writer.close()
+    recording = mount_bags.open(tmp_path / 'bag')
+    audits = audit(recording)
+    found = losses(recording, audits)
+    assert (found.samples, found.lost_samples, found.lost_messages, found.unanswered) == (1000, 0, 0, 0)
+    assert audits[f'/{topic.name}'].misdated == found.misdated == 1
+    assert not found.sound
+    said = '\n'.join(sentences(audits, found))
+    assert f'/{topic.name}: stamps misdated: 1, the first {stamp / 1e9:.9f} s of message 401' in said
+    assert 'limit 10 s' in said
+    assert 'Misdated: 1 messages' in said
+    assert recording.time_axis.zero == SAMPLES[0]

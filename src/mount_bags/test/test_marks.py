@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hypothesis import given, settings
@@ -22,6 +23,7 @@ from mount_bags.events.automatic_marks import (
     mark_kinds,
 )
 from mount_bags.events.event_marks import present_time
+from mount_bags.events.switching_changes import switching_times
 from mount_bags.messages.stamps import StampWatch
 from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
 from mount_bags.recorder.recorder import Recorder
@@ -104,9 +106,25 @@ def test_present_time_is_that_of_the_stamps_in_lock_step():
 
 def test_switching_on_is_marked_each_time_and_switching_off_is_not(marks, sent):
     watch = SwitchOnWatch(marks)
-    for stamp, active in enumerate((0.0, 1.0, 1.0, 0.0, 1.0)):
-        watch.add(stamp, active, 4.2e-4)
-    assert sent == [Mark(time, 'switch_on', 'damping on at 0.42 mm in the band') for time in (1, 4)]
+    times = 1000, 1001, 1002, 1100
+    for stamp, active in zip(times, (0.0, 1.0, 0.0, 1.0), strict=True):
+        watch.add(stamp * PERIOD, active, 4.2e-4)
+    told = 'damping on at 0.42 mm in the band'
+    assert sent == [Mark(time * PERIOD, 'switch_on', told) for time in (1001, 1100)]
+
+
+def test_an_opening_that_flutters_is_marked_once_and_in_a_report_one_stretch(marks, sent):
+    time = np.arange(400)
+    active = np.where(time % 30 < 15, 0.03, 0.0) * ((time > 100) & (time < 300))
+    watch = SwitchOnWatch(marks)
+    for stamp, value in zip(time.tolist(), active.tolist(), strict=True):
+        watch.add(stamp * PERIOD, value, math.nan)
+    assert [mark.time for mark in sent] == [101 * PERIOD]
+    on, off = switching_times(1e-3 * time, active)
+    assert (on.tolist(), off.tolist()) == ([0.101], [pytest.approx(0.285)])
+    on, off = switching_times(1e-3 * time, (time % 200 < 100).astype(float))
+    assert (on.tolist(), off.tolist()) == ([0.0, 0.2], [0.1, 0.3])
+    assert [len(each) for each in switching_times(time[:0], active[:0])] == [0, 0]
 
 
 def test_damping_that_goes_on_step_by_step_is_marked_once_and_needs_no_magnitude(marks, sent):

@@ -43,7 +43,7 @@ def test_a_recording_of_one_mount_has_one_session_and_one_of_several_none_for_al
 
 def test_what_is_no_session_is_refused_in_words():
     assert session_content('') == {}
-    with pytest.raises(SessionError, match='no YAML'):
+    with pytest.raises(SessionError, match='session is not valid YAML in line 2'):
         session_content('one: [')
     with pytest.raises(SessionError, match='is a list'):
         session_content('[1]')

@@ -5,14 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_bags.messages.stamps import StampWatch, stamp_statistics
+from mount_bags.messages.stamps import StampWatch, misdated, redated, stamp_statistics
 
 RATE = 1000.0
 PERIOD = 1_000_000
+START = 1_700_000_000_000_000_000
 
 
 def stamps_of(indices):
-    return np.array([1_700_000_000_000_000_000 + index * PERIOD for index in indices], np.int64)
+    return np.array([START + index * PERIOD for index in indices], np.int64)
 
 
 def counts(indices):
@@ -136,3 +137,55 @@ def test_watch_counts_the_same_while_samples_arrive(dropped, repeated, swapped):
         found.duplicated,
         found.out_of_order,
     )
+
+
+FAR_OFF = {
+    'future': (1 << 31) * 10**9,
+    'past': -(10**15),
+    'tomorrow': 86_400 * 10**9,
+    'a minute': -60 * 10**9,
+}
+
+
+@pytest.mark.parametrize('place', [0, 1, 7, 500, 997, 998, 999])
+@pytest.mark.parametrize('off', FAR_OFF.values(), ids=FAR_OFF)
+def test_a_stamp_far_off_is_misdated_and_no_loss(off, place):
+    stamps = START + PERIOD * np.arange(1000)
+    told = stamps.copy()
+    told[place] += off
+    wrong = misdated(told)
+    assert np.flatnonzero(wrong).tolist() == [place]
+    assert (redated(told, wrong, RATE) == stamps).all()
+
+
+def test_five_in_a_row_are_found_and_a_long_stretch_too():
+    stamps = START + PERIOD * np.arange(1000)
+    told = stamps.copy()
+    told[100:105] = 0
+    told[300:390] += 10**16
+    assert np.flatnonzero(misdated(told)).tolist() == [*range(100, 105), *range(300, 390)]
+
+
+def test_a_pause_of_a_minute_is_no_wrong_stamp():
+    stamps = START + PERIOD * np.r_[:1000, 61_000:62_000]
+    assert not misdated(stamps).any()
+    assert stamp_statistics(stamps, RATE).lost == 60_000
+
+
+@pytest.mark.parametrize('off', FAR_OFF.values(), ids=FAR_OFF)
+def test_watch_counts_a_stamp_far_off_as_that_alone(off):
+    watch = StampWatch(RATE)
+    for index in range(1000):
+        watch.add(START + PERIOD * index + (off if index == 500 else 0))
+    # The sample that came with it has no time: its place stays empty.
+    assert (watch.misdated, watch.lost, watch.duplicated, watch.out_of_order) == (1, 1, 0, 0)
+
+
+def test_watch_goes_on_behind_a_pause_and_behind_a_clock_that_was_set():
+    watch = StampWatch(RATE)
+    for index in [*range(1000), *range(61_000, 62_000)]:
+        watch.add(START + PERIOD * index)
+    assert (watch.misdated, watch.lost) == (0, 60_000)
+    for index in range(1000):
+        watch.add(START - 10**15 + PERIOD * index)
+    assert (watch.misdated, watch.lost, watch.out_of_order) == (1, 60_000, 0)

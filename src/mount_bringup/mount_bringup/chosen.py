@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from mount_control.parameters import ControlParameters
-from mount_control.policy import switched_viscous
+from mount_control.policy.contract import Policy
+from mount_control.policy.registry import UNPREFIXED
 from mount_control.settings import ControlSettings, control_settings, policy_parameters
-from mount_models.damper import DamperCurve, damper_curve
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import Specimen
@@ -23,18 +23,20 @@ def control_parameters(parameters: Parameters) -> ControlParameters:
 
 def check_policy(parameters: Parameters) -> None:
     """Refuse what the chosen policy cannot work with; raises a `ValueError`."""
-    policy, own = policy_parameters(parameters.get('mount_control', {}))
+    policy, own = policy_of(parameters)
     policy.design(own, SAMPLE_TIME)
 
 
-def switched_viscous_parameters(parameters: Parameters) -> switched_viscous.Parameters:
-    """Return the parameters of the paper's policy in a run, whether it is chosen or not."""
-    return with_flattened(switched_viscous.Parameters(), parameters.get('mount_control', {}))
+def policy_of(parameters: Parameters) -> tuple[Policy, Any]:
+    """Return the policy of a run and its own parameters."""
+    return policy_parameters(parameters.get('mount_control', {}))
 
 
-def chosen_damper(parameters: Parameters) -> DamperCurve:
-    """Return the damper characteristic of the paper's policy in a run."""
-    return damper_curve(switched_viscous_parameters(parameters).damper)
+def with_recorded_policy(parameters: Parameters) -> dict[str, dict[str, Any]]:
+    """Return the parameters of a session; one that names no policy was made with the first."""
+    named = {node: dict(values) for node, values in parameters.items()}
+    named.setdefault('mount_control', {}).setdefault('policy', UNPREFIXED)
+    return named
 
 
 def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specimen:

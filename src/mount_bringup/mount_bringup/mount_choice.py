@@ -3,10 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
+from mount_control.settings import defaults
 from mount_models.quantity import ParameterError
 from mount_sim.parameters import SimParameters
 
 ALWAYS_ON = 'friction_always_on'
+NEEDED = {'policy': 'switched_viscous', 'switching': 'always'}
+"""What the mount `ALWAYS_ON` asks of mount_control."""
 
 
 def seat_of(settings: Mapping[str, Mapping[str, Any]]) -> str:
@@ -15,17 +18,20 @@ def seat_of(settings: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def with_control_of_mount(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the settings of the nodes with `mount_control.switching` as the mount in the seat needs it."""
+    """Return the settings of the nodes with policy and switching as the mount in the seat needs them."""
     completed = {node: dict(values) for node, values in settings.items()}
     if completed.get('mount_sim', {}).get('mount') == ALWAYS_ON:
-        completed.setdefault('mount_control', {}).setdefault('switching', 'always')
+        completed['mount_control'] = {**NEEDED, **completed.get('mount_control', {})}
     return completed
 
 
 def check_control_of_mount(settings: Mapping[str, Mapping[str, Any]]) -> None:
     """Raise `ParameterError` if the mount should damp always and the control was not told so."""
-    switching = settings.get('mount_control', {}).get('switching', 'enabled')
-    if settings.get('mount_sim', {}).get('mount') == ALWAYS_ON and switching != 'always':
-        raise ParameterError(
-            f'mount {ALWAYS_ON} needs mount_control.switching always; instead received {switching}'
-        )
+    if settings.get('mount_sim', {}).get('mount') != ALWAYS_ON:
+        return
+    control = {**defaults(), **settings.get('mount_control', {})}
+    for name, value in NEEDED.items():
+        if control[name] != value:
+            raise ParameterError(
+                f'mount {ALWAYS_ON} needs mount_control.{name} {value}; instead received {control[name]}'
+            )

@@ -5,9 +5,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from mount_bringup.settings import SettingError
+from mount_models.plain_yaml import YamlError, yaml_in_file
 from mount_models.quantity import check_name
 
 _VALUES = 'ros__parameters'
@@ -38,11 +37,9 @@ def settings_of_file(
 
 def _content(file: Path) -> Mapping[str, Any]:
     try:
-        content = yaml.safe_load(file.read_text())
-    except (OSError, UnicodeDecodeError) as error:
-        raise SettingError(f'parameter file {file} cannot be read: {error}') from None
-    except (yaml.YAMLError, ValueError) as error:  # the second of dates that are none
-        raise SettingError(f'parameter file {file} is no YAML: {str(error).splitlines()[0]}') from None
+        content = yaml_in_file(file)
+    except YamlError as error:
+        raise SettingError(f'parameter file {file} {error}') from None
     if not isinstance(content, Mapping):
         raise SettingError(f'parameter file {file} must name nodes with their {_VALUES}')
     return content

@@ -4,13 +4,12 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import yaml
-
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
+from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, check_name, flattened
 from mount_sim.parameters import SimParameters
 
@@ -37,7 +36,7 @@ def settings_of_options(options: Sequence[str]) -> dict[str, dict[str, Any]]:
         name, equals, text = option.partition('=')
         node, dot, parameter = name.partition('.')
         if not (equals and dot and parameter):
-            raise SettingError(f'--set {option}: write NODE.NAME=VALUE, as in mount_control.quality=0.7')
+            raise SettingError(f'--set {option}: write NODE.NAME=VALUE, as in mount_sim.seed=2')
         parameters.setdefault(node, {})[parameter] = setting_value(option, text)
     return parameters
 
@@ -45,10 +44,10 @@ def settings_of_options(options: Sequence[str]) -> dict[str, dict[str, Any]]:
 def setting_value(option: str, text: str) -> Any:
     """Return the value that `text` (YAML) in `--set option` gives; raises `SettingError`."""
     try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError):  # the second of dates that are none
+        return plain_yaml(text)
+    except YamlError as error:
         raise SettingError(
-            f'--set {option}: the value {text!r} is no YAML; put it in quotes of its own, as in '
+            f'--set {option}: the value {text!r:.60} {error}; put it in quotes of its own, as in '
             f'\'{option.removesuffix(text)}"{text}"\''
         ) from None
 

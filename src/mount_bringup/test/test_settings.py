@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mount_bringup.chosen import chosen_damper
 from mount_bringup.settings import checked_settings, settings_of_options
 from mount_models.damper import DamperError, damper_curve
 
@@ -21,7 +20,7 @@ POINTS = {'velocity': [0.0, 0.004, 0.1], 'force': [0.0, 0.0, 200.0]}
 def test_a_damper_is_given_to_core_and_nodes_in_one_text(option, curve):
     settings = checked_settings(settings_of_options([f'mount_control.damper={option}']))
     assert isinstance(settings['mount_control']['damper'], str)  # what a node can declare
-    assert np.array_equal(chosen_damper(settings).table, curve.table)
+    assert np.array_equal(damper_curve(settings['mount_control']['damper']).table, curve.table)
 
 
 def test_the_points_of_a_file_are_in_the_settings_so_that_a_session_keeps_them(tmp_path):
@@ -29,6 +28,6 @@ def test_the_points_of_a_file_are_in_the_settings_so_that_a_session_keeps_them(t
     file.write_text('velocity,force\n0,0\n0.004,0\n0.1,200\n')
     settings = checked_settings(settings_of_options([f'mount_control.damper={file}']))
     file.unlink()
-    assert np.array_equal(chosen_damper(settings).table, damper_curve(POINTS).table)
+    assert np.array_equal(damper_curve(settings['mount_control']['damper']).table, damper_curve(POINTS).table)
     with pytest.raises(DamperError, match='cannot be read'):
         checked_settings({'mount_control': {'damper': str(file)}})

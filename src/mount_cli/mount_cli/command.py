@@ -1,6 +1,7 @@
 """The `engine-mount` command."""
 
 import sys
+from itertools import product
 
 import typer
 
@@ -53,13 +54,14 @@ def bench() -> None:
 @app.command()
 def prepare() -> None:
     """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""
+    from mount_control.policy.registry import POLICIES
     from mount_replay.loop.run import run_core
 
     console = terminal()
     with console.status('compiling the laws for this machine (once, about half a minute)'):
-        for scenario in ('bench', 'motorway'):
+        for scenario, policy in product(('bench', 'motorway'), POLICIES):
             sim = {'scenario': scenario, 'timeline.duration': 0.5}
-            run_core({'mount_sim': sim}, lambda *_: None)
+            run_core({'mount_sim': sim, 'mount_control': {'policy': policy}}, lambda *_: None)
 
 
 app.command(name='audit', epilog=audit.EPILOG)(audit.audit)

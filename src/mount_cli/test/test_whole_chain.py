@@ -17,7 +17,7 @@ import pytest
 from scipy.optimize import brentq
 
 from mount_bags.bag.recording import open_recording
-from mount_bringup.chosen import chosen_control, chosen_damper, switched_viscous_parameters
+from mount_bringup.chosen import chosen_control, policy_of
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
@@ -84,12 +84,16 @@ def tracking(seed, file):
         **{f'coil.{name}': value for name, value in rack.coil._asdict().items()},
     }  # fmt: skip
     chosen = {'parameters_file': str(file), 'specimen': 'drawn'}
-    settings = {'mount_sim': sim, 'mount_init': chosen, 'mount_control': chosen}
+    settings = {
+        'mount_sim': sim,
+        'mount_init': chosen,
+        'mount_control': {**chosen, 'policy': 'switched_viscous'},
+    }
     folder = file.with_name(f'drive_{seed}')
     outcome = record_core(folder, settings, '')
     drive = load_drive(open_recording(folder), outcome.excitation_start)
     assert drive.seen.damping_active.mean() > 0.3
-    return tracking_error(drive, switched_viscous_parameters(settings), chosen_damper(settings))
+    return tracking_error(drive, *policy_of(settings))
 
 
 def step_errors(seed, file):

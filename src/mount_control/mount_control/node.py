@@ -3,7 +3,7 @@
 import contextlib
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rclpy.parameter import Parameter
@@ -15,7 +15,15 @@ from mount_control.controller import load_compiled_law
 from mount_control.diagnosis import ControlFigures, verdict
 from mount_control.policy.contract import trace_fields
 from mount_control.sample_watch import Judgement
-from mount_control.settings import FILES, FRICTION, control_settings, parameter_sets, run_time_parameters
+from mount_control.settings import (
+    FILES,
+    FRICTION,
+    control_settings,
+    defaults,
+    parameter_sets,
+    run_time_parameters,
+    without_effect,
+)
 from mount_models.damper import DamperError, damper_text
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
@@ -57,6 +65,8 @@ class MountControl(SafeLifecycleNode):
             self._of_specimen.give(parameters, prefix, self._specimen.friction)
         self.set_parameters([self.get_parameter('damper')])  # with the points of a file, see _spelled_out
         self._settings = control_settings(self._values(), self._specimen)
+        usual = defaults()
+        self._warn_without_effect(name for name, value in self._values().items() if value != usual.get(name))
         self._parameter_changes = 0
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
@@ -97,6 +107,7 @@ class MountControl(SafeLifecycleNode):
     def take_changes(self, changes: Mapping[str, Change]) -> None:
         self._settings = control_settings(self._values(), self._specimen)
         self._parameter_changes += len(changes)
+        self._warn_without_effect(changes)
         text = change_text(self.get_name(), changes)
         if self.answering.controller is not None:
             self.answering.change(self._settings, text)
@@ -161,6 +172,10 @@ class MountControl(SafeLifecycleNode):
         except ForceTableMessageError as error:
             self._activation.table = None
             self.get_logger().error(str(error))
+
+    def _warn_without_effect(self, names: Iterable[str]) -> None:
+        if sentence := without_effect(names, self._settings.parameters.policy):
+            self.get_logger().warning(sentence)
 
     def _values(self) -> dict[str, Any]:
         return {name: self.get_parameter(name).value for name in self.get_parameters_by_prefix('')}

@@ -1,6 +1,6 @@
 """All that the controller is set up with, checked, from the values of its parameters and the specimen."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from mount_control.policy.registry import POLICIES, chosen_policy, prefix_of
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import check_friction
 from mount_models.friction.contact import FrictionContact
-from mount_models.quantity import flattened, with_flattened, with_values
+from mount_models.quantity import ParameterError, flattened, with_flattened, with_values
 from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import Specimen, SpecimenError
 
@@ -78,6 +78,28 @@ def policy_parameters(values: Mapping[str, Any]) -> tuple[Policy, Any]:
     name = with_flattened(ControlParameters(), values).policy
     policy = chosen_policy(name)
     return policy, with_flattened(policy.Parameters(), values, prefix_of(name))
+
+
+def without_effect(names: Iterable[str], chosen: str) -> str:
+    """Return a sentence about the parameters among `names` that belong to another policy, '' without any."""
+    for name, policy in POLICIES.items():
+        if name != chosen and (idle := sorted({*names} & {*flattened(policy.Parameters(), prefix_of(name))})):
+            return (
+                f'mount_control: {", ".join(idle)} of the policy {name} would have no effect, for the chosen '
+                f'policy is {chosen}; set mount_control.policy to {name}, or leave '
+                f'{"it" if len(idle) == 1 else "them"} out'
+            )
+    return ''
+
+
+def check_effect(values: Mapping[str, Any], chosen: str = '') -> None:
+    """Raise `ParameterError` if {parameter: value} name one of another policy than the chosen one.
+
+    That is the one that they name, else `chosen`, else the default.
+    """
+    policy = values.get('policy') or chosen or ControlParameters().policy
+    if sentence := without_effect(values, policy):
+        raise ParameterError(sentence)
 
 
 def check_fits(parameters: ControlParameters, specimen: Specimen) -> None:

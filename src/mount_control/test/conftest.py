@@ -28,10 +28,12 @@ def table_rows():
 
 @pytest.fixture(scope='session')
 def make_settings():
-    """Return a function that builds the settings of a controller with some parameters changed."""
+    """Return a function that builds the settings of the paper's policy with some parameters changed."""
 
     def make(damper: str = 'viscous_2000', **changes) -> ControlSettings:
-        settings = control_settings({'damper': damper, **changes}, default_specimen())
+        settings = control_settings(
+            {'policy': 'switched_viscous', 'damper': damper, **changes}, default_specimen()
+        )
         return settings._replace(friction=FrictionCoefficients(), contact=FrictionContact())
 
     return make

@@ -34,6 +34,8 @@ MS = 1_000_000  # ns
 ACTIVATION = 5000 * MS
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
+PAPER = {'policy': 'switched_viscous'}
+
 
 class Surroundings:
     """Plays driver and initialisation, and keeps what the controller sends."""
@@ -101,11 +103,11 @@ class Surroundings:
 
 @pytest.fixture
 def make_control(context):
-    """Return a function that creates a controller node with parameters."""
+    """Return a function that creates a controller node with parameters, by default of the paper's policy."""
     made = []
 
     def make(**parameters):
-        values = {'lockstep': True, **parameters}
+        values = {'lockstep': True, **PAPER, **parameters}
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         made.append(MountControl(context=context, parameter_overrides=overrides))
         return made[-1]
@@ -179,7 +181,7 @@ def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
     assert [ms for ms, _ in around.setpoints] == list(range(1, len(displacement) + 1))
     assert [ms for ms, _ in around.traces] == [ms for ms, _ in around.setpoints]
 
-    settings = control_settings({}, default_specimen())
+    settings = control_settings(PAPER, default_specimen())
     core = Controller(ControlLaw(settings, settings.table(*table_rows)))
     core.restart(displacement[0])
     expected = core.run(displacement)
@@ -488,13 +490,13 @@ def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(
     for number in range(401, 600):
         around.send(number, displacement[number - 1])
         _answers(around, number)
-    settings = control_settings({}, default_specimen())
+    settings = control_settings(PAPER, default_specimen())
     table = settings.table(*table_rows)
     core = Controller(ControlLaw(settings, table))
     core.restart(displacement[0])
     expected = core.run(displacement[:400])['current'].tolist()
     for count in range(len(values)):  # each by itself, as it was set
-        so_far = dict(list(values.items())[: count + 1])
+        so_far = PAPER | dict(list(values.items())[: count + 1])
         core.change(ControlLaw(control_settings(so_far, default_specimen()), table))
     expected += core.run(displacement[400:599])['current'].tolist()
     assert [current for _, current in around.setpoints] == expected

@@ -19,7 +19,7 @@ def _refusal(**changes):
 
 def _checked(**changes):
     """The parameters of the paper's policy with some changed, as a controller takes them."""
-    policy, parameters = policy_parameters(changes)
+    policy, parameters = policy_parameters({'policy': 'switched_viscous', **changes})
     policy.design(parameters, SAMPLE_TIME)
     return parameters
 

@@ -10,9 +10,11 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
 
+PAPER = {'policy': 'switched_viscous'}
+
 
 def test_the_defaults_are_settings():
-    settings = control_settings(defaults(), default_specimen())
+    settings = control_settings({**defaults(), **PAPER}, default_specimen())
     assert settings.parameters.displacement_range == 0.02
     assert settings.friction == FrictionCoefficients()
     assert settings.design.window == 125
@@ -20,7 +22,7 @@ def test_the_defaults_are_settings():
 
 def test_what_is_not_named_is_the_specimen_s():
     specimen = replace(default_specimen(), friction={'a_p1': 0.4, 'a_p2': 0.05})
-    settings = control_settings({'friction.a_p2': 0.06, 'quality': 0.7}, specimen)
+    settings = control_settings({**PAPER, 'friction.a_p2': 0.06, 'quality': 0.7}, specimen)
     assert settings.friction == FrictionCoefficients(a_p1=0.4, a_p2=0.06)
     assert settings.design.law.band == band_pass.design(8.0, 0.7, 0.0019, 0.001)
 
@@ -36,7 +38,7 @@ def test_what_is_not_named_is_the_specimen_s():
 )
 def test_what_cannot_be_is_refused(values, reason):
     with pytest.raises(ValueError, match=reason):
-        control_settings(values, default_specimen())
+        control_settings({**PAPER, **values}, default_specimen())
 
 
 def test_more_current_than_was_calibrated_is_refused():

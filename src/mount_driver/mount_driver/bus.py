@@ -23,6 +23,7 @@ MULTICAST_PORT = 43113  # python-can's default port
 # doubles, hold 10000.
 _RECEIVE_BUFFER = 4 * 1024 * 1024  # bytes; the kernel gives what net.core.rmem_max allows
 _CAN_FD_MTU = 72  # bytes: what the kernel shows for an interface in FD mode
+_MOST_UNREADABLE = 1000  # without a pause, chosen: then the bus itself is taken for broken
 
 
 class CanLinkError(OSError):
@@ -63,6 +64,30 @@ def open_bus(
         raise CanLinkError(f'{tried} does not open: {error}; {remedy}') from error
     _widen_receive_buffer(bus)
     return bus
+
+
+class Reception:
+    """Receives frame by frame; one that python-can cannot read is counted and costs nothing but itself."""
+
+    def __init__(self) -> None:
+        self.unreadable = 0
+        """Frames and datagrams that could not be read."""
+        self.reason = ''
+        """Why the last one of them could not."""
+
+    def frame(self, bus: can.BusABC, wait: float) -> can.Message | None:
+        """Return the frame that comes within `wait` s, None if none does; raises `can.CanError`."""
+        for _ in range(_MOST_UNREADABLE):
+            try:
+                return bus.recv(wait)
+            except can.CanError:
+                raise
+            except Exception as error:
+                # What python-can and its adapters make of foreign bytes raises whatever they lead to.
+                self.unreadable += 1
+                self.reason = f'{type(error).__name__}: {error}'
+                wait = 0.0
+        raise can.CanOperationError(f'{_MOST_UNREADABLE} frames in a row not readable; {self.reason}')
 
 
 def may_have_frames(bus: can.BusABC) -> bool:

@@ -38,6 +38,8 @@ class Snapshot(NamedTuple):
     gaps: int = 0
     recoveries: int = 0
     error_frames: int = 0
+    unreadable: int = 0  # frames and datagrams that no frame could be made of
+    unreadable_reason: str = ''
     latest_stamp: int = 0  # ns
     last_refusal: Refusal | None = None
     driving: bool = False
@@ -75,6 +77,8 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         gaps=link.clock.gaps,
         recoveries=exchange.recoveries,
         error_frames=exchange.error_frames,
+        unreadable=exchange.reception.unreadable,
+        unreadable_reason=exchange.reception.reason,
         latest_stamp=latest.stamp if latest is not None else 0,
         last_refusal=link.last_refusal,
         driving=link.driving,
@@ -178,6 +182,10 @@ def _quality_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParame
     if repeated or disordered:
         text = f'{repeated} frames repeated and {disordered} of wrong sequence in the last second, not used'
         found.append((Level.WARN, f'{text}; did the electronics restart, does another node send theirs?'))
+    if now.unreadable > earlier.unreadable:
+        text = f'{now.unreadable - earlier.unreadable} frames of the last second could not be read'
+        reason = f'the last for {now.unreadable_reason:.100}'
+        found.append((Level.WARN, f'{text} ({reason}), not used; does another program send on this bus?'))
     if now.unsent > earlier.unsent:
         text = f'{now.unsent - earlier.unsent} setpoint frames were not taken by the bus in the last second'
         found.append((Level.WARN, f'{text} ({now.unsent_reason}); does another node acknowledge?'))
@@ -224,6 +232,7 @@ def _figures(now: Snapshot) -> dict[str, object]:
         'gaps': now.gaps,
         'recoveries': now.recoveries,
         'error_frames': now.error_frames,
+        'unreadable': now.unreadable,
     }
     if now.status is not None:
         figures['supply_voltage'] = now.status.supply_voltage

@@ -12,7 +12,7 @@ from contextlib import ExitStack, suppress
 
 import can
 
-from mount_driver.bus import CanLinkError, may_have_frames, open_bus
+from mount_driver.bus import CanLinkError, Reception, may_have_frames, open_bus
 from mount_driver.clock import Clock
 from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
@@ -45,6 +45,7 @@ class Exchange:
         steady: Callable[[], int] = time.monotonic_ns,
     ):
         self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9))
+        self.reception = Reception()
         self.failure = ''
         """Why the exchange has ended on its own; empty while it runs."""
         self.trouble = ''
@@ -151,7 +152,7 @@ class Exchange:
         bus = self._bus
         if bus is None or self.failure:
             return False
-        message = bus.recv(wait)
+        message = self.reception.frame(bus, wait)
         received = self._steady()
         if message is not None:
             if message.is_error_frame:

@@ -14,7 +14,8 @@ import struct
 from typing import Any
 
 import can
-from can.interfaces.udp_multicast.utils import pack_message, unpack_message
+import msgpack
+from can.interfaces.udp_multicast.utils import pack_message
 
 _LOOPBACK = '127.0.0.1'
 _LARGEST_DATAGRAM = 4096  # bytes; a frame takes about 200
@@ -30,7 +31,6 @@ class LoopbackMulticastBus(can.BusABC):
     def __init__(self, channel: str, port: int, can_filters: Any = None, **_: Any):
         self.channel_info = f'udp_multicast {channel}:{port} on the loopback interface'
         self._can_protocol = can.CanProtocol.CAN_FD
-        self.foreign_datagrams = 0
         self._destination = (channel, port)
         self._socket = _receiving_socket(channel, port)
         self._sender = _sending_socket()
@@ -65,13 +65,19 @@ class LoopbackMulticastBus(can.BusABC):
             return None, False
         except OSError as error:
             raise can.CanOperationError(f'receiving failed: {error.strerror}', error.errno) from error
-        try:
-            message = unpack_message(datagram, replace={'timestamp': _arrival(told)})
-        except (TypeError, ValueError):
-            self.foreign_datagrams += 1  # another program uses this group and port; no reason to stop
-            return None, False
+        message = _message(datagram, _arrival(told))
         # Like SocketCAN: error frames pass the filter, because they tell the state of the bus.
         return message, message.is_error_frame
+
+
+def _message(datagram: bytes, arrival: float) -> can.Message:
+    """Return the frame in a datagram; what another program sent raises whatever its content leads to."""
+    fields = msgpack.unpackb(datagram)
+    # python-can takes any object for an identifier, and a number for so many bytes of data.
+    if not (isinstance(fields['arbitration_id'], int) and isinstance(fields['data'], bytes)):
+        raise TypeError('a datagram of another form')
+    fields['timestamp'] = arrival
+    return can.Message(**fields)
 
 
 def _receiving_socket(channel: str, port: int) -> socket.socket:

@@ -45,8 +45,8 @@ class FarEnd:
 
     def send_raw(self, number: int, data: bytes | bytearray, **options) -> None:
         """Send any frame."""
-        options = {'is_fd': True} | options
-        self.bus.send(can.Message(arbitration_id=number, is_extended_id=False, data=data, **options))
+        options = {'is_fd': True, 'is_extended_id': False} | options
+        self.bus.send(can.Message(arbitration_id=number, data=data, **options))
 
     def setpoint(self) -> Setpoint:
         """Return the next setpoint that arrives."""

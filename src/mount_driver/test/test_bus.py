@@ -5,9 +5,10 @@ import socket
 import time
 
 import can
+import msgpack
 import pytest
 
-from mount_driver.bus import CanLinkError, _check_socketcan, open_bus
+from mount_driver.bus import CanLinkError, Reception, _check_socketcan, open_bus
 
 
 def frame(number, data=b'\x01' * 24, **options):
@@ -89,6 +90,48 @@ def test_error_frames_pass_the_filter(multicast):
     ):
         far.send(can.Message(arbitration_id=0x40, is_extended_id=False, is_error_frame=True, dlc=8))
         assert near.recv(10.0).is_error_frame
+
+
+FIELDS = {'arbitration_id': 0x210, 'data': bytes(24), 'dlc': 24, 'is_extended_id': False, 'is_fd': True}
+FOREIGN = {
+    'nothing': b'',
+    'no msgpack': b'\xc1',
+    'cut off': msgpack.packb(FIELDS)[:-3],
+    'a list': msgpack.packb([1, 2, 3]),
+    'a text': msgpack.packb('no frame'),
+    'a number': msgpack.packb(7),
+    'none': msgpack.packb(None),
+    'deeply nested': b'\x91' * 4000,
+    'a list longer than the datagram': b'\xdd\xff\xff\xff\xff',
+    'unknown fields': msgpack.packb(FIELDS | {'colour': 'red'}),
+    'no data': msgpack.packb({'arbitration_id': 0x210}),
+    'an identifier that is a text': msgpack.packb(FIELDS | {'arbitration_id': 'x'}),
+    'data that are a number': msgpack.packb(FIELDS | {'data': 1 << 40}),
+    'data that are a text': msgpack.packb(FIELDS | {'data': 'x' * 24}),
+}
+
+
+@pytest.mark.parametrize('datagram', FOREIGN.values(), ids=FOREIGN)
+def test_a_datagram_that_is_no_frame_is_counted_and_the_next_frame_comes(multicast, datagram):
+    group, port = multicast
+    with (
+        open_bus('udp_multicast', group, port=port) as far,
+        open_bus('udp_multicast', group, port=port, receive=(0x210,)) as near,
+    ):
+        reception = Reception()
+        far._sender.sendto(datagram, (group, port))
+        far.send(frame(0x210))
+        assert reception.frame(near, 10.0).arbitration_id == 0x210
+    assert reception.unreadable == 1
+    assert reception.reason
+
+
+def test_a_bus_that_reads_nothing_any_more_is_lost(multicast):
+    group, port = multicast
+    with open_bus('udp_multicast', group, port=port) as near:
+        near.recv = lambda wait: [][0]
+        with pytest.raises(can.CanOperationError, match='1000 frames in a row not readable; IndexError'):
+            Reception().frame(near, 0.0)
 
 
 def test_python_cans_own_multicast_interface_can_listen_in(multicast):

@@ -45,6 +45,11 @@ def test_a_sound_link_is_ok_with_its_figures():
         ({'restarts': 1}, Level.WARN, 'have restarted'),
         ({'repeated': 7}, Level.WARN, '7 frames repeated and 0 of wrong sequence'),
         ({'wrong_sequence': 1}, Level.WARN, '1 of wrong sequence .* not used; did the electronics restart'),
+        (
+            {'unreadable': 2, 'unreadable_reason': 'TypeError: x'},
+            Level.WARN,
+            r'2 .* not be read .*TypeErr.* another',
+        ),
         ({'unsent': 4, 'unsent_reason': 'OSError: full'}, Level.WARN, r'4 .* not taken .*\(OSError: full\)'),
         ({'refused': 6, 'last_refusal': Refusal.STALE}, Level.WARN, '6 setpoints refused.*older than'),
         ({'driving': False, 'timeouts': 1}, Level.WARN, 'no setpoint for 20 ms; is mount_control active'),

@@ -118,6 +118,38 @@ def test_a_corrupt_frame_is_counted_and_not_handed_out(make, samples):
     assert exchange.link.arrivals[Arrival.CORRUPT] == 1
 
 
+@pytest.mark.parametrize('interface', ['udp_multicast', 'virtual'])
+@pytest.mark.parametrize(
+    'odd',
+    [
+        {'data': bytes(8)},
+        {'data': bytes(64), 'dlc': 64},
+        {'data': b'', 'is_fd': False},
+        {'data': b'', 'is_fd': False, 'is_remote_frame': True, 'dlc': 8},
+        {'data': bytes(24), 'is_extended_id': True},
+        {'data': bytes(8), 'is_fd': False, 'is_error_frame': True},
+    ],
+    ids=['short', 'long', 'empty', 'remote', 'extended', 'error'],
+)
+def test_a_frame_of_another_form_costs_itself_alone(make, samples, interface, odd):
+    exchange, far = make(interface=interface)
+    far.send_raw(CODEC.measurement.frame_id, **odd)
+    far.send(sample(1))
+    samples.wait_for(1)
+    assert [measurement.sample_counter for _, measurement in samples] == [1]
+    assert exchange.failure == exchange.trouble == ''
+    assert exchange.recoveries == 0
+
+
+def test_what_python_can_cannot_read_costs_itself_alone(make, samples):
+    exchange, far = make()
+    far.bus._sender.sendto(b'\x93\x01\x02\x03', far.bus._destination)
+    far.send(sample(1))
+    samples.wait_for(1)
+    assert exchange.reception.unreadable == 1
+    assert exchange.failure == ''
+
+
 def test_a_status_is_kept(make):
     exchange, far = make()
     far.send_status(Status(13.5, 41.0, over_current=True))

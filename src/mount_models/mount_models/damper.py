@@ -27,6 +27,7 @@ from mount_models.damper_points import (
     checked_points,
     points_in,
 )
+from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, Quantity, checked
 
 FloatArray = npt.NDArray[np.float64]
@@ -202,9 +203,9 @@ def _curve_of_text(text: str) -> DamperCurve:
         path = Path(text).expanduser()
         return _curve_of_points(path.stem, points_in(path))
     try:
-        mapping = yaml.safe_load(text)
-    except yaml.YAMLError:
-        mapping = None
+        mapping = plain_yaml(text)
+    except YamlError as error:
+        raise DamperError(f'damper {text!r:.60} {error}; known by name are {_KNOWN}') from None
     if isinstance(mapping, Mapping):
         return damper_curve(mapping)
     raise DamperError(f'no damper curve is called {text!r:.60}; known are {_KNOWN}')

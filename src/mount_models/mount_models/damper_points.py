@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import yaml
+
+from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,14 +29,12 @@ class DamperError(ValueError):
 def points_in(path: Path) -> dict[str, list[float]]:
     """Return {'velocity': m/s, 'force': N} of a file CSV or YAML with these columns; raises `DamperError`."""
     try:
-        text = path.read_text(encoding='utf-8-sig')
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, 'strerror', None) or 'it is no text'
-        raise DamperError(f'damper file {path} cannot be read ({reason}); give its full path') from None
-    try:
-        columns = _columns_of_csv(text) if path.suffix == '.csv' else yaml.safe_load(text)
+        text = text_of_file(path)
+        columns = _columns_of_csv(text) if path.suffix == '.csv' else plain_yaml(text)
         velocity, force = checked_points(columns)
-    except (DamperError, yaml.YAMLError, csv.Error) as error:
+    except YamlError as error:
+        raise DamperError(f'damper file {path} {error}') from None
+    except (DamperError, csv.Error) as error:
         raise DamperError(f'damper file {path}: {error}') from None
     return {'velocity': velocity.tolist(), 'force': force.tolist()}
 

@@ -23,6 +23,7 @@ from mount_models.coil.temperature import CompensationError, TemperatureCompensa
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_coefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.provenance import ProvenanceError, check_provenance
 from mount_models.quantity import Quantity, quantities
 from mount_models.sampling import HIGHEST_CURRENT
@@ -79,17 +80,9 @@ def load_specimen(path: str | Path, name: str = '') -> Specimen:
     object.
     """
     try:
-        specimen = _specimen_in(Path(path).read_text(encoding='utf-8'))
-    except OSError as error:
-        raise SpecimenError(
-            f'specimen file {path} cannot be read ({error.strerror}); give its full path'
-        ) from error
-    except UnicodeDecodeError as error:
-        raise SpecimenError(
-            f'specimen file {path} is no text (byte {error.start} is not UTF-8); give a specimen file in YAML'
-        ) from error
-    except yaml.YAMLError as error:
-        raise SpecimenError(f'specimen file {path} is not valid YAML; {error}') from error
+        specimen = _specimen_in(text_of_file(Path(path)))
+    except YamlError as error:
+        raise SpecimenError(f'specimen file {path} {error}') from error
     except SpecimenError as error:
         raise SpecimenError(f'specimen file {path}: {error}') from error
     if name and specimen.name != name:
@@ -195,14 +188,12 @@ def checked_specimen(specimen: Specimen) -> Specimen:
 
 
 _READABLE = 0o644
-# The rules of safe_load, in C where PyYAML has it: all those covariances then take a tenth of the time.
-_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 # Several parts of a run load the same file, and to check it takes some 20 ms.
 @functools.lru_cache(maxsize=8)
 def _specimen_in(text: str) -> Specimen:
-    return specimen_from_mapping(yaml.load(text, Loader=_LOADER))
+    return specimen_from_mapping(plain_yaml(text))
 
 
 def _check_version(content: Any) -> None:

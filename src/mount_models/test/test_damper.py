@@ -159,7 +159,12 @@ def test_table_cannot_be_changed_behind_the_curve():
     [
         ('soft', DamperError, "no damper curve is called 'soft'; known are viscous_1000"),
         ('viscous_5x', DamperError, 'known are .* viscous_<N s/m>, a law such as .*, points .*, or a file'),
-        ('{law: viscous', DamperError, "no damper curve is called '{law: viscous'"),
+        (
+            '{law: viscous',
+            DamperError,
+            "damper '{law: viscous' is not valid YAML in line 2: .*known .* viscous_1000",
+        ),
+        ('{law: viscous, law: degressive}', DamperError, "line 1: the key 'law' stands there twice"),
         ('viscous_0.5', ParameterError, r'damping_coefficient \(0.5 N s/m\) must lie within 1 \.\. 100000'),
         ('{velocity: [0, 1]}', DamperError, 'must have the columns velocity and force, m/s and N'),
         (

@@ -196,6 +196,21 @@ def test_a_file_that_is_no_specimen_is_refused(tmp_path, text):
         load_specimen(tmp_path / 'none.yaml')
 
 
+@pytest.mark.parametrize(
+    ('added', 'sentence'),
+    [
+        ('turns_area: 0.2\n', "line [0-9]+: the key 'turns_area' stands there twice; keep one of them"),
+        ('2026-05-04: 1\n', 'line [0-9]+: the key datetime.date.* is no text; put it in quotes'),
+        ('more: {mass: 9999999999999999999999}\n', 'does not fit into 64 bits'),
+    ],
+)
+def test_what_changes_the_meaning_of_a_file_is_refused_with_its_line(tmp_path, added, sentence):
+    file = tmp_path / 'changed.yaml'
+    file.write_text(DEFAULT_SPECIMEN.read_text(encoding='utf-8') + added)
+    with pytest.raises(SpecimenError, match=f'specimen file {file} is refused in .*{sentence}'):
+        load_specimen(file)
+
+
 def test_a_doubtful_specimen_is_not_saved(tmp_path):
     with pytest.raises(SpecimenError, match='turns_area'):
         save_specimen(replace(DEFAULT, turns_area=math.nan), tmp_path / 'bad.yaml')

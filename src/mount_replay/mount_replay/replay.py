@@ -16,9 +16,12 @@ from mount_bringup.chosen import (
     check_policy,
     chosen_control,
     chosen_specimen,
+    control_parameters,
 )
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
+from mount_control.policy.registry import DEFAULT
+from mount_control.settings import check_effect
 from mount_init.parameters import InitParameters
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -164,6 +167,7 @@ def _read(order: ReplayOrder) -> tuple[ReplayInput, float, float]:
     if order.foreign is not None:
         begin = time.perf_counter()
         parameters = {node: dict(order.changes.get(node, {})) for node in REPLAYED_NODES}
+        parameters['mount_control'].setdefault('policy', DEFAULT)
         check_parameters(parameters)
         gap, sentence = chosen_gap(order.table, parameters)
         given = foreign_input(order.recording, order.foreign, parameters, gap)
@@ -201,8 +205,10 @@ def with_changes(
 ) -> dict[str, dict[str, Any]]:
     """Return the parameters of the nodes that replay, changed.
 
-    With another `parameters_file` the recorded friction goes: it may be that of the file before.
+    With another `parameters_file` the recorded friction goes: it may be that of the file before. Raises
+    `ParameterError` for a change that has no effect with the policy.
     """
+    check_effect(changes.get('mount_control', {}), control_parameters(recorded).policy)
     parameters = {node: dict(recorded.get(node, {})) for node in REPLAYED_NODES}
     if 'parameters_file' in changes.get('mount_control', {}):
         control = parameters['mount_control']

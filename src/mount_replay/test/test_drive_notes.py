@@ -48,10 +48,10 @@ class Graph:
 
 
 @pytest.mark.parametrize('mode', ['real time', 'lock-step'])
-def test_a_drive_that_goes_on_without_its_recording_says_so_once(tmp_path, monkeypatch, mode):
+def test_a_drive_that_goes_on_without_its_recording_says_so_once(tmp_path, monkeypatch, domain, mode):
     monkeypatch.setattr(drive, 'Supervisor', Graph)
     shown = io.StringIO()
     folder = make_run_folder(tmp_path / 'run', 'bench')
-    order = DriveOrder('bench', mode, {}, domain=0)
+    order = DriveOrder('bench', mode, {}, domain=domain)
     drive._drive_graph(order, Excitation(Seat.BENCH, [], 5e-5, 0.0), folder, Screen(shown), [])
     assert shown.getvalue().count('goes on without recording') == 1

@@ -1,14 +1,16 @@
 """What a recording's session tells of its run: levels, coil, damper. A report draws and computes with it."""
 
+from typing import Any
+
 import numpy as np
 
 from mount_bags.run.session import SessionError, session_content, session_parameters
-from mount_bringup.chosen import Parameters, chosen_damper, control_parameters, switched_viscous_parameters
+from mount_bringup.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_bringup.mount_choice import seat_of
-from mount_control.policy.switched_viscous import DEFAULT_DAMPER
+from mount_control.policy.contract import Policy
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
-from mount_report.drive.evaluation import tracking_error, wanted_force
+from mount_report.drive.evaluation import ACTS_AFTER, levels_of, tracking_error, wanted_force
 from mount_report.drive.signals import load_drive
 from mount_report.sections.charts import Levels
 from mount_report.sections.subject import RunFacts, Tracking
@@ -32,8 +34,8 @@ def run_facts(signals: Signals) -> RunFacts:
             tracking_remark='the recording has no session that tells which force was wanted',
         )
     try:
-        levels = switched_viscous_parameters(parameters)
-        highest = control_parameters(parameters).highest_current
+        levels = levels_of(*policy_of(parameters))
+        control = control_parameters(parameters)
         coil = with_flattened(RippleCoil(), parameters.get('mount_sim', {}), 'coil')
         no_friction = without_friction(seat_of(parameters))
     except (ValueError, TypeError, AttributeError) as error:
@@ -45,9 +47,9 @@ def run_facts(signals: Signals) -> RunFacts:
     if not no_friction:
         tracking, remark = _tracking(signals, parameters)
     return RunFacts(
-        levels=Levels(levels.switch_on_level, levels.switch_off_level, highest),
+        levels=Levels(levels, control.highest_current),
         resistance=coil.resistance,
-        resistance_remark=f'R = {coil.resistance:g} ohm, limit {highest:g} A',
+        resistance_remark=f'R = {coil.resistance:g} ohm, limit {control.highest_current:g} A',
         tracking=tracking,
         tracking_remark=remark,
         without_friction=no_friction,
@@ -57,7 +59,8 @@ def run_facts(signals: Signals) -> RunFacts:
 def _parameters(session: str) -> Parameters | None:
     """Return the parameters by node, None where the session tells none."""
     try:
-        return session_parameters(session_content(session)) or None
+        found = session_parameters(session_content(session))
+        return with_recorded_policy(found) if found else None
     except SessionError:
         return None
 
@@ -68,10 +71,10 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
     if lacking:
         return None, f'what was not recorded is needed: {", ".join(lacking)}'
     try:
-        control, damper = switched_viscous_parameters(parameters), chosen_damper(parameters)
+        policy, own = policy_of(parameters)
         drive = load_drive(recording)
-        wanted, _ = wanted_force(drive, control, damper)
-        error = tracking_error(drive, control, damper)
+        wanted, _ = wanted_force(drive, policy, own)
+        error = tracking_error(drive, policy, own)
     except (ValueError, KeyError) as reason:
         return None, f'it cannot be computed: {reason}'
     shift = (drive.zero - signals.zero) / 1e9
@@ -79,5 +82,10 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
     active = np.interp(drive.truth.time, drive.seen.time, drive.seen.damping_active.astype(float)) > 0.5
     shown = np.where(active, wanted, 0.0)
     tracking = Tracking(drive.truth.time + shift, shown, drive.truth.friction_force, error)
-    chosen = parameters.get('mount_control', {}).get('damper', DEFAULT_DAMPER)
-    return tracking, f'wanted is the force of damper {chosen} at the true velocity in the band, without delay'
+    return tracking, _wanted_words(policy, own)
+
+
+def _wanted_words(policy: Policy, own: Any) -> str:
+    if not hasattr(policy, 'wanted_force'):
+        return f'wanted is the force that the policy asked for, {1e3 * ACTS_AFTER:g} ms later, when it acts'
+    return f'wanted is the force of damper {own.damper} at the true velocity in the band, without delay'

@@ -162,9 +162,12 @@ def test_a_long_gap_stays_a_gap_in_the_envelope():
     assert np.isnan(inside).all()
 
 
+LEVELS = {'switch-on level': 8e-4, 'switch-off level': 3.5e-4}
+
+
 def all_charts() -> list[Chart]:
     two = [Named('A', TIME, np.sin(TIME)), Named('B <b>', TIME, np.cos(TIME))]
-    levels = Levels(8e-4, 3.5e-4, 3.0)
+    levels = Levels(LEVELS, 3.0)
     return [
         charts.time_traces(two, two, levels, [(0.5, 1.0)]),
         charts.hysteresis_loops(two, two[:1]),
@@ -201,8 +204,8 @@ def test_long_curves_are_thinned_and_keep_their_numbers():
     assert shown.max() == 7.0
 
 
-def test_displacements_are_drawn_in_mm_with_both_switching_levels():
-    chart = charts.time_traces([Named('', TIME, np.full(len(TIME), 1e-3))], [], Levels(8e-4, 3.5e-4))
+def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy():
+    chart = charts.time_traces([Named('', TIME, np.full(len(TIME), 1e-3))], [], Levels(LEVELS))
     (panel,) = chart.panels
     assert panel.curves[0].y[0] == pytest.approx(1.0)
     assert [(level.value, level.both) for level in panel.levels] == [

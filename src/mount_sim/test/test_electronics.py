@@ -73,11 +73,14 @@ def test_the_current_reaches_its_setpoint_and_0_exactly():
     assert (_loop([0.0] * 1000, 3.0) >= 0.0).all()
 
 
-def _readings(count=20_000, current=0.2, gap=492e-6, seed=1, **changes):
+def _readings(count=20_000, current=0.2, gap=492e-6, seed=1, velocity=0.0, **changes):
     electronics = ElectronicsParameters(**changes)
     noise = Noise(seed)
     return np.array(
-        [read_sensors(electronics, COIL, ACTUATOR, 1e-3, current, gap, noise.next()) for _ in range(count)]
+        [
+            read_sensors(electronics, COIL, ACTUATOR, 1e-3, velocity, current, gap, noise.next())
+            for _ in range(count)
+        ]
     )
 
 
@@ -86,6 +89,14 @@ def test_without_noise_the_ripple_shows_the_coil_s_inductance():
     inductance = ACTUATOR.turns * ACTUATOR.gap_area * readings[3] / readings[2]
     assert inductance == pytest.approx(incremental_inductance(COIL, ACTUATOR, 0.2, 492e-6), rel=1e-12)
     assert (readings[0], readings[1]) == (1e-3, 0.2)
+
+
+def test_jitter_scatters_the_displacement_of_a_moving_mount():
+    quiet = {'displacement_noise': 0.0, 'sample_jitter': 3e-4}
+    moving, resting = _readings(velocity=0.1, **quiet), _readings(100, **quiet)
+    assert np.std(moving[:, 0]) == pytest.approx(0.1 * 3e-4, rel=0.03)
+    assert np.mean(moving[:, 0]) == pytest.approx(1e-3, rel=1e-3)
+    assert (resting[:, 0] == 1e-3).all()
 
 
 @pytest.mark.parametrize('sigma', [0.01, 0.03])

@@ -7,6 +7,7 @@ from mount_models.elastomer import Elastomer, dynamic_stiffness
 from mount_models.energy import LOSSES, imbalance
 from mount_models.quantity import ParameterError
 from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from mount_sim.electronics.electronics import Noise
 from mount_sim.excitation.excitation import Seat
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.plant.mounts import MOUNTS, seated_mount
@@ -141,8 +142,8 @@ def damped_ride(parameters, mount, **chosen):
     forces = np.zeros(len(excitation.values)) if forces is None else forces
     for first in range(0, len(excitation.values), 20):
         step = slice(first, first + 20)
-        plant.read(np.zeros(4))
-        plain.read(np.zeros(4))
+        plant.read(np.zeros(Noise.NUMBERS))
+        plain.read(np.zeros(Noise.NUMBERS))
         assert plain.truth_bytes == plant.truth_bytes
         current = min(0.48 + 8.0 * abs(plant.truth['velocity']), 3.0)
         plant.advance_with_books(excitation.values[step], forces[step], current)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mount_models.quantity import ParameterError, with_flattened
+from mount_sim.electronics.electronics import Noise
 from mount_sim.excitation.excitation import Seat
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant, growth
@@ -24,7 +25,7 @@ def _moved(plant, seat, seconds):
     values = np.zeros(round(seconds / STEP))
     values[0] = 1e-3
     simulation.advance(values, np.zeros(len(values)), 0.0)
-    return simulation.read(np.zeros(4))[0]
+    return simulation.read(np.zeros(Noise.NUMBERS))[0]
 
 
 @pytest.mark.parametrize('seat', Seat)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mount_models.coil.ripple import RippleCoil
-from mount_sim.electronics.electronics import ElectronicsParameters
+from mount_sim.electronics.electronics import ElectronicsParameters, Noise
 from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.plant import Plant, PlantSimulation
@@ -26,7 +26,7 @@ def test_core_and_copper_follow_their_own_coefficients():
 def test_the_plant_reads_its_ripple_at_its_temperature():
     def slope(**changes):
         plant = Plant(electronics=ElectronicsParameters(coil_temperature=70.0), **changes)
-        return PlantSimulation(plant, Seat.BENCH, 1e-4).read(np.zeros(4))[2]
+        return PlantSimulation(plant, Seat.BENCH, 1e-4).read(np.zeros(Noise.NUMBERS))[2]
 
     told = slope(temperature=TemperatureCoefficients(core=0.002, copper=0.0))
     more = slope(temperature=TemperatureCoefficients(core=0.004, copper=0.0))

@@ -17,7 +17,15 @@ from mount_bags.bag.recording import Recording
 from mount_bags.bag.statement import read_statement
 from mount_bags.container.stored import RECORDER_RECORD
 from mount_bags.messages.series import Times, registered_topic
-from mount_bags.messages.stamps import missing_samples, regular_rate, stamp_jitter, stamp_statistics
+from mount_bags.messages.stamps import (
+    FARTHEST,
+    misdated,
+    missing_samples,
+    redated,
+    regular_rate,
+    stamp_jitter,
+    stamp_statistics,
+)
 from mount_bags.messages.time_axis import TimeAxis
 from mount_bags.messages.topic_times import TopicTimes
 from mount_ros.topics import (
@@ -40,7 +48,8 @@ class TopicAudit:
     """What is there of a topic and what is not; None and NaN where it cannot be told, as `remark` says.
 
     `present` counts messages, `duplicated` those of them that repeat a sample, so that
-    expected = present - duplicated + lost. Of `displacement` are told `lost_samples`, counted once
+    expected = present - duplicated + lost. The stamp of a `misdated` one cannot be that of its sample; for
+    all else it counts as taken where it came. Of `displacement` are told `lost_samples`, counted once
     whether their displacement, their ripple or both are missing, and how the samples were answered;
     `latency` of `current_setpoint`.
     """
@@ -50,6 +59,7 @@ class TopicAudit:
     lost: int | None
     duplicated: int | None = None
     out_of_order: int | None = None
+    misdated: int | None = None
     longest_gap_s: float = math.nan
     rate_hz: float = math.nan
     jitter_s: float = math.nan  # rms
@@ -63,7 +73,7 @@ class TopicAudit:
     def sound(self) -> bool:
         """Whether nothing is known to be lost, repeated, out of order or unanswered."""
         unanswered = self.answers is not None and (self.answers.unanswered or self.answers.silences)
-        return not (self.lost or self.duplicated or self.out_of_order or unanswered)
+        return not (self.lost or self.duplicated or self.out_of_order or self.misdated or unanswered)
 
 
 def audit(recording: Recording) -> dict[str, TopicAudit]:
@@ -73,17 +83,18 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     and is not there, whichever is more.
     """
     times, told = recording.times(), _told_by_recorder(recording)
+    plausible = {name: _redated(found) for name, found in times.items()}
     audits = {
-        name: _with_told(_audit_topic(times, name), recording.missing.get(name, 0), told.get(name))
+        name: _with_told(_audit_topic(plausible, times[name]), recording.missing.get(name, 0), told.get(name))
         for name in recording
     }
     mounts = [name for name, found in times.items() if _own_topic(found) is DISPLACEMENT and len(found)]
     if mounts:
         reports, axis = node_reports(recording), recording.time_axis
         for namespace in (name.removesuffix(DISPLACEMENT.name) for name in mounts):
-            answers = _answers(times, namespace, _inactive(reports, namespace, axis))
-            _add_samples(audits, namespace, _lost_samples(times, audits, namespace), answers)
-            _add_lost_steps(audits, namespace, _lost_steps(recording, times, namespace, answers))
+            answers = _answers(plausible, namespace, _inactive(reports, namespace, axis))
+            _add_samples(audits, namespace, _lost_samples(plausible, audits, namespace), answers)
+            _add_lost_steps(audits, namespace, _lost_steps(recording, plausible, namespace, answers))
     return audits
 
 
@@ -119,7 +130,15 @@ def _with_told(entry: TopicAudit, missing: int, told: int | None) -> TopicAudit:
     return replace(entry, expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
 
 
-def _audit_topic(times: AllTimes, name: str) -> TopicAudit:
+def _redated(found: TopicTimes) -> TopicTimes:
+    topic = _own_topic(found)
+    if found.stamps is None or topic is None or not topic.rate:
+        return found
+    return replace(found, stamps=redated(found.stamps, misdated(found.stamps), topic.rate))
+
+
+def _audit_topic(times: AllTimes, as_told: TopicTimes) -> TopicAudit:
+    name = as_told.topic
     found = times[name]
     present = len(found)
     if not present:
@@ -133,7 +152,7 @@ def _audit_topic(times: AllTimes, name: str) -> TopicAudit:
     rate = topic.rate if topic is not None else regular_rate(found.stamps)
     if rate is None:
         return TopicAudit(None, present, None, remark='stamps without a regular rate: only counted')
-    entry = _from_stamps(found.stamps, topic, rate)
+    entry = _with_misdated(_from_stamps(found.stamps, topic, rate), as_told.stamps)
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE) and _has_samples(times, name.removesuffix(topic.name)):
         entry = replace(entry, expected=entry.present - (entry.duplicated or 0), lost=0)
     if topic is CURRENT_SETPOINT:
@@ -163,6 +182,22 @@ def _from_stamps(stamps: Times, topic: Topic | None, rate: float) -> TopicAudit:
         worst_jitter_s=jitter.worst,
         remark='' if topic is not None else f'rate of {rate:.4g} Hz taken from the stamps',
     )
+
+
+def _with_misdated(entry: TopicAudit, stamps: Times | None) -> TopicAudit:
+    wrong = np.zeros(0, bool) if stamps is None else misdated(stamps)
+    if stamps is None or not wrong.any():
+        return entry
+    first = int(np.flatnonzero(wrong)[0])
+    most = (
+        float(np.abs(stamps[wrong] - np.median(stamps[~wrong])).max()) / 1e9 if not wrong.all() else math.nan
+    )
+    remark = (
+        f'stamps misdated: {np.count_nonzero(wrong)}, the first {stamps[first] / 1e9:.9f} s '
+        f'of message {first + 1}, '
+        f'up to {most:.6g} s off (limit {FARTHEST / 1e9:g} s); who else publishes there?'
+    )
+    return replace(entry, misdated=int(np.count_nonzero(wrong)), remark=remark)
 
 
 def _has_samples(times: AllTimes, namespace: str) -> bool:

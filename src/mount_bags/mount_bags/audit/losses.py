@@ -19,7 +19,7 @@ class Losses:
     `lost_samples` of `samples` were taken by the electronics and lack their displacement or ripple;
     `lost_messages` are those of any topic that were sent and are not there. While control was active,
     `asked` samples were taken, of which `unanswered` have no setpoint and `late` one that came too late to be
-    used. None where the recording cannot tell.
+    used. `misdated` messages have a stamp that is none of a sample. None where the recording cannot tell.
     """
 
     samples: int | None
@@ -28,6 +28,7 @@ class Losses:
     asked: int | None
     unanswered: int | None
     late: int | None
+    misdated: int
     faults: tuple[Fault, ...]
     whole: bool  # nothing of the recording is known to be damaged or missing
 
@@ -48,6 +49,8 @@ class Losses:
             said.append(f'samples lost: {self.lost_text()}')
         if self.unanswered:
             said.append(f'samples unanswered: {self.answers_text()}')
+        if self.misdated:
+            said.append(f'messages misdated: {self.misdated}; the audit tells their topics')
         if self.faults:
             said.append(f'faults: {len(self.faults)}, the first at {self.faults[0]}')
         return said if self.whole else [*said, 'the recording is not whole']
@@ -91,6 +94,7 @@ class Losses:
             'asked_samples': self.asked,
             'unanswered_samples': self.unanswered,
             'late_samples': self.late,
+            'misdated_messages': self.misdated,
             'faults': [
                 {'time_s': round(fault.time, 6), 'node': fault.node or None, 'sentence': fault.sentence}
                 for fault in self.faults
@@ -109,6 +113,7 @@ def losses(recording: Recording, audits: Mapping[str, TopicAudit]) -> Losses:
         asked=_sum([each.asked for each in answers]),
         unanswered=_sum([each.unanswered for each in answers]),
         late=_sum([each.late for each in answers]),
+        misdated=sum(entry.misdated or 0 for entry in audits.values()),
         faults=tuple(faults(recording, audits)),
         whole=recording.whole,
     )

@@ -9,7 +9,7 @@ from mount_bags.audit.latency import EDGES, Latency
 from mount_bags.audit.losses import Losses
 from mount_bags.run.screen import Table
 
-_TROUBLES = {'duplicated': 'twice', 'out_of_order': 'late'}
+_TROUBLES = {'duplicated': 'twice', 'out_of_order': 'late', 'misdated': 'misdated'}
 _HEADS = ('topic', 'expected', 'present', 'lost', 'gap ms', 'jitter us')
 _BAR = 40  # characters
 
@@ -26,6 +26,7 @@ def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
                 'duplicated': entry.duplicated,
                 'longest_gap_s': _known(entry.longest_gap_s),
                 'out_of_order': entry.out_of_order,
+                'misdated': entry.misdated,
                 'rate_hz': _known(entry.rate_hz),
                 'jitter_s': _known(entry.jitter_s),
                 'worst_jitter_s': _known(entry.worst_jitter_s),
@@ -85,6 +86,7 @@ def latency_lines(audits: Mapping[str, TopicAudit]) -> list[str]:
 def _verdict(audits: Mapping[str, TopicAudit], found: Losses) -> str:
     lost = {name: entry.lost for name, entry in audits.items() if entry.lost}
     said = ['Lost: ' + ', '.join(f'{count} of {name}' for name, count in lost.items())] if lost else []
+    said += [f'Misdated: {found.misdated} messages'] if found.misdated else []
     said += [f'Unanswered: {found.unanswered} samples'] if found.unanswered else []
     said += [f'Faults: {len(found.faults)}'] if found.faults else []
     if said:

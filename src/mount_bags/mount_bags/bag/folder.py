@@ -9,6 +9,7 @@ from mount_bags.container.mcap_file import McapFile
 from mount_bags.container.sqlite_file import SqliteFile
 from mount_bags.container.stored import StoredFile
 from mount_bags.container.whole_files import COMPRESSED_SUFFIXES
+from mount_models.plain_yaml import YamlError, text_of_file
 
 _STORAGES = {'mcap': '.mcap', 'sqlite3': '.db3'}
 _NUMBER = re.compile(r'(.*)_(\d+)')
@@ -33,11 +34,11 @@ def find_pieces(path: Path) -> Found:
     if not path.is_dir():
         return Found((path,))
     present = _present(path)
-    try:
-        information = read_metadata((path / METADATA_NAME).read_text(encoding='utf-8'))
-    except FileNotFoundError:
+    if not (path / METADATA_NAME).exists():
         return _undescribed(path, present, f'{METADATA_NAME} is missing; the files tell themselves')
-    except (OSError, UnicodeDecodeError, MetadataError) as error:
+    try:
+        information = read_metadata(text_of_file(path / METADATA_NAME))
+    except (YamlError, MetadataError) as error:
         return _undescribed(
             path, present, f'{METADATA_NAME} is not readable ({error}); the files tell themselves'
         )

@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from mount_bags.bag.metadata import BagInformation
+from mount_models.plain_yaml import YamlError, plain_yaml
 
 KEY = 'made_from'
 ZERO_KEY = 'zero_ns'
@@ -19,8 +20,8 @@ def origin(information: BagInformation | None) -> list[dict[str, Any]]:
     """Return the steps that led to a recording, oldest first; empty for an original."""
     text = information.custom_data.get(KEY, '') if information else ''
     try:
-        steps = yaml.safe_load(text)
-    except yaml.YAMLError:
+        steps = plain_yaml(text)
+    except YamlError:
         return []
     return [step for step in steps if isinstance(step, dict)] if isinstance(steps, list) else []
 

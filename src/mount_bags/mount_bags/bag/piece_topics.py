@@ -6,12 +6,11 @@ What the files say counts more: there it is under checksums.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import yaml
-
 from mount_bags.bag.metadata import BagInformation, TopicInformation
 from mount_bags.bag.offered_qos import OfferedQos, QosError, read_qos
 from mount_bags.container.stored import PIECE_RECORD, StoredFile, StoredTopic
 from mount_bags.messages.definitions import Definition, DefinitionError, installed_definition, text_definition
+from mount_models.plain_yaml import YamlError, plain_yaml
 
 
 @dataclass
@@ -115,7 +114,7 @@ def offers_of(topic: StoredTopic) -> tuple[OfferedQos, ...]:
 
 def _noted(file: StoredFile) -> frozenset[str]:
     try:
-        names = yaml.safe_load(file.metadata.get(PIECE_RECORD, {}).get('repeated', '[]'))
+        names = plain_yaml(file.metadata.get(PIECE_RECORD, {}).get('repeated', '[]'))
         return frozenset(map(str, names))
-    except (yaml.YAMLError, TypeError):
+    except (YamlError, TypeError):
         return frozenset()

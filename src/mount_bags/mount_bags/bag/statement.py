@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import yaml
 
+from mount_models.plain_yaml import plain_yaml
+
 
 @dataclass(slots=True)
 class Reception:
@@ -29,9 +31,9 @@ def excerpt_statement(receptions: Mapping[str, Reception], kept: Mapping[str, in
 def read_statement(record: Mapping[str, str]) -> dict[str, dict[str, int]]:
     """Return {topic: {`received`, `kept`, `lost`, `missing`}} of the record; {} if it is not understood."""
     try:
-        topics = yaml.safe_load(record['topics'])
+        topics = plain_yaml(record['topics'])
         return {str(name): {key: int(count) for key, count in row.items()} for name, row in topics.items()}
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         return {}
 
 

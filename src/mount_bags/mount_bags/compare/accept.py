@@ -18,6 +18,7 @@ from mount_bags.compare.words import sentences
 from mount_bags.edit.messages import Messages, in_log_order, read_messages
 from mount_bags.messages.series import Payloads
 from mount_bags.run.session import recorded_session, session_content, session_message, session_text, time_text
+from mount_models.plain_yaml import YamlError, yaml_in_file
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
@@ -184,8 +185,13 @@ def _write(folder: Path, parts: list[Messages]) -> None:
 
 def _write_history(made: Path, target: Path, entry: dict[str, Any]) -> None:
     earlier = target / ACCEPTED_NAME
-    entries = yaml.safe_load(earlier.read_text(encoding='utf-8')) if earlier.is_file() else []
-    text = yaml.safe_dump([*(entries or []), entry], sort_keys=False, allow_unicode=True, width=100)
+    try:
+        entries = (yaml_in_file(earlier) or []) if earlier.is_file() else []
+    except YamlError as error:
+        raise AcceptError(f'{earlier} {error}') from None
+    if not isinstance(entries, list):
+        raise AcceptError(f'{earlier} must be a list of entries; restore it from the repository')
+    text = yaml.safe_dump([*entries, entry], sort_keys=False, allow_unicode=True, width=100)
     (made / ACCEPTED_NAME).write_text(text, encoding='utf-8')
 
 

@@ -174,7 +174,7 @@ def _compared(
     signals = {
         name: unit
         for name, unit in topic.signals.items()
-        if not (topic.mount in switching and _is_switch(topic, name))
+        if not (topic.mount in switching and _is_switch(topic, name) and _only_on_or_off(topic))
     }
     hidden = 0
     if topic.different_messages().any():
@@ -222,10 +222,16 @@ def _switching(matched: Collection[MatchedTopic]) -> dict[str, list[SwitchingCha
     for topic in matched:
         if topic.samples and any(_is_switch(topic, signal) for signal in topic.signals):
             column = topic.column(_ACTIVE)
-            if np.isin(np.concatenate([column.a, column.b]), (0.0, 1.0)).all():
+            both = np.concatenate([column.a, column.b])
+            if ((both >= 0.0) & (both <= 1.0)).all():
                 times = (switching_times(column.time, active) for active in (column.a, column.b))
                 found[topic.mount] = paired_switchings(*times, topic.period, topic.mount)
-    return found  # what is no switch is compared as any other signal
+    return found  # what is no switch is compared as any other signal, an opening as both
+
+
+def _only_on_or_off(topic: MatchedTopic) -> bool:
+    column = topic.column(_ACTIVE)
+    return bool(np.isin(np.concatenate([column.a, column.b]), (0.0, 1.0)).all())
 
 
 def _in_time(switchings: Iterable[list[SwitchingChange]]) -> tuple[SwitchingChange, ...]:

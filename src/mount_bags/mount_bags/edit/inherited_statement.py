@@ -12,6 +12,7 @@ import yaml
 from mount_bags.bag.recording import Recording
 from mount_bags.bag.statement import Reception, excerpt_statement, read_statement
 from mount_bags.container.stored import RECORDER_RECORD
+from mount_models.plain_yaml import plain_yaml
 
 SOURCES = 'sources'  # key in the record of the recorder
 
@@ -63,12 +64,12 @@ def _record(recording: Recording) -> Mapping[str, str]:
 
 def _inherited(record: Mapping[str, str]) -> Sources:
     try:
-        rows = yaml.safe_load(record[SOURCES])
+        rows = plain_yaml(record[SOURCES])
         return {
             str(identity): {str(name): Reception(*map(int, counts)) for name, counts in topics.items()}
             for identity, topics in rows.items()
         }
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         return {}
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from enum import Enum
 from typing import Any
 
+from mount_bags.events.switching_changes import PAUSE
 from mount_bags.messages.stamps import StampWatch
 from mount_ros.messages.event import Mark
 
@@ -57,21 +58,20 @@ class AutomaticMarks:
 
 
 class SwitchOnWatch:
-    """Marks where `damping_active` leaves 0."""
+    """Marks where `damping_active` leaves 0 after a pause that is long enough to be one."""
 
     def __init__(self, marks: AutomaticMarks):
         self._marks = marks
-        self._active = False
+        self._last: int | None = None  # stamp of the last step with damping on
 
     def add(self, stamp: int, active: float, magnitude: float) -> None:
         """Take one control step; `magnitude` is the band displacement that decided, m, NaN where none did."""
-        if (active > 0.0) == self._active:
+        if not active > 0.0:
             return
-        self._active = active > 0.0
-        if self._active:
+        if self._last is None or not 0 <= stamp - self._last <= PAUSE * 1e9:
             level = '' if math.isnan(magnitude) else f' at {1e3 * magnitude:.2f} mm in the band'
-            text = f'damping on{level}'
-            self._marks.mark(MarkKind.SWITCH_ON, stamp, text)
+            self._marks.mark(MarkKind.SWITCH_ON, stamp, f'damping on{level}')
+        self._last = stamp
 
 
 class FaultWatch:

@@ -7,6 +7,7 @@ import numpy as np
 
 from mount_bags.bag.recording import Recording
 from mount_bags.events.event_marks import Mark, read_marks
+from mount_bags.events.switching_changes import switching_places
 from mount_bags.messages.series import Series, SeriesError, registered_topic
 from mount_bags.messages.time_axis import TimeAxis
 from mount_ros.topics import CONTROL_TRACE, EVENT
@@ -92,14 +93,13 @@ def _switching(recording: Recording) -> list[RecordedEvent]:
 
 def _changes(trace: Series) -> list[RecordedEvent]:
     order = np.argsort(trace.receive_times, kind='stable')
-    change = np.diff((trace['damping_active'][order] > 0.5).astype(int), prepend=0)
+    stamps = trace.stamps[order]
+    seconds = (stamps - stamps[:1]) / 1e9
+    switched = switching_places(seconds, trace['damping_active'][order])
     return [
-        RecordedEvent(
-            int(trace.receive_times[order[place]]),
-            int(trace.stamps[order[place]]),
-            SWITCH_ON if change[place] > 0 else SWITCH_OFF,
-        )
-        for place in np.flatnonzero(change).tolist()
+        RecordedEvent(int(trace.receive_times[order[place]]), int(stamps[place]), kind)
+        for kind, places in zip((SWITCH_ON, SWITCH_OFF), switched, strict=True)
+        for place in places.tolist()
     ]
 
 

@@ -7,6 +7,11 @@ from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
 
+Places = NDArray[np.intp]
+
+PAUSE = 0.04
+"""Seconds (chosen) for which damping must be off to count as switched off: an opening that flutters about its
+smallest is one. What switches by periods of 20 Hz or less is never off for less."""
 _REACH = 0.5  # s, chosen: switchings further apart are not the same one moved
 
 
@@ -47,8 +52,19 @@ class SwitchingChange:
 
 def switching_times(time: Signal, active: Signal) -> tuple[Signal, Signal]:
     """Return when damping went on and off; active at the first sample counts as switched on there."""
-    change = np.diff((active > 0.5).astype(int), prepend=0)
-    return time[change > 0], time[change < 0]
+    on, off = switching_places(time, active)
+    return time[on], time[off]
+
+
+def switching_places(time: Signal, active: Signal) -> tuple[Places, Places]:
+    """Return at which samples damping went on and off: where it is active, an opening of any width.
+
+    So it counts as on where the coil carries current. A pause shorter than `PAUSE` is none.
+    """
+    change = np.diff((active > 0.0).astype(int), prepend=0)
+    on, off = np.flatnonzero(change > 0), np.flatnonzero(change < 0)
+    pauses = time[on[1:]] - time[off[: len(on) - 1]] >= PAUSE if len(on) else np.zeros(0, bool)
+    return on[np.append(True, pauses)[: len(on)]], off[np.append(pauses, True)[: len(off)]]
 
 
 def paired_switchings(

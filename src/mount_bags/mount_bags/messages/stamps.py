@@ -7,6 +7,8 @@ is kept the expected number is round((last - first) * rate) + 1.
 Stamps that jitter, as a phone's do, have no such steps. Each sample then has a place on the grid of the rate,
 which follows the stamps slowly, and one that shares a place because its stamp is late or early takes the
 empty one near it. Only equal stamps, or more samples than places, are samples twice.
+
+A stamp far from those of the samples around it is no time of a sample: misdated, and counted as that alone.
 """
 
 import itertools
@@ -24,6 +26,11 @@ _JITTER = 0.25  # periods, chosen: steps so far from whole ones are no clock's d
 _FOLLOWS = 0.05  # chosen: share of a stamp's distance by which the grid follows it
 _NEAR = 3  # periods, chosen: a stamp farther off than that is no late one
 _MOST = 0.7  # share, chosen: a topic that lost more than that has no rate to speak of
+FARTHEST = 10 * _NANOSECONDS
+"""ns, chosen: a stamp farther from the samples that came around it is misdated."""
+LONGEST_PAUSE = 3600 * _NANOSECONDS
+"""ns, chosen: of the parts of a recording that are farther apart, all but the longest are misdated."""
+_AROUND = 5  # samples, chosen: before and behind; so many stamps in a row may be misdated
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,30 @@ def stamp_statistics(stamps: NDArray[np.int64], rate: float) -> StampStatistics:
         out_of_order=int(np.count_nonzero(stamps[1:] < latest[:-1])),
         longest_gap=float(differences.max()) / _NANOSECONDS if differences.size else math.nan,
     )
+
+
+def misdated(stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which of `stamps` (ns, in the order of arrival) cannot be the times of their samples."""
+    wrong = np.zeros(len(stamps), bool)
+    if stamps.size < 3 or not (np.abs(np.diff(stamps)) > FARTHEST).any():
+        return wrong
+    edges = np.pad(stamps, _AROUND, mode='reflect' if stamps.size > _AROUND else 'edge')
+    around = np.lib.stride_tricks.sliding_window_view(edges, 2 * _AROUND + 1)
+    wrong = np.abs(stamps - np.sort(around, axis=1)[:, _AROUND]) > FARTHEST
+    ordered = np.sort(stamps[~wrong])
+    borders = np.flatnonzero(np.diff(ordered) > LONGEST_PAUSE) + 1
+    longest = max(np.split(ordered, borders), key=len)
+    return wrong | (stamps < longest[0]) | (stamps > longest[-1]) if longest.size else wrong
+
+
+def redated(stamps: NDArray[np.int64], wrong: NDArray[np.bool_], rate: float) -> NDArray[np.int64]:
+    """Return `stamps` with those that are `wrong` set to where `rate` (Hz) puts their samples."""
+    if not wrong.any() or wrong.all():
+        return stamps
+    known = np.flatnonzero(~wrong)
+    places = np.arange(len(stamps))
+    before = known[np.maximum(np.searchsorted(known, places, side='right') - 1, 0)]
+    return stamps[before] + np.rint((places - before) * (_NANOSECONDS / rate)).astype(np.int64)
 
 
 def missing_samples(streams: Sequence[NDArray[np.int64]], rate: float) -> int:
@@ -148,7 +179,9 @@ class StampWatch:
         self.lost = 0
         self.duplicated = 0
         self.out_of_order = 0
+        self.misdated = 0
         self.last_stamp = 0  # ns, the latest so far
+        self._doubtful: int | None = None  # a stamp far off, until the next tells what it was
         self._period = _NANOSECONDS / rate
 
     def add(self, stamp: int) -> None:
@@ -157,6 +190,9 @@ class StampWatch:
         if self.present == 1:
             self.last_stamp = stamp
             return
+        if abs(stamp - self.last_stamp) > FARTHEST and not self._goes_on(stamp):
+            return
+        self._doubtful = None
         steps = round((stamp - self.last_stamp) / self._period)
         if steps > 0:
             self.lost += steps - 1
@@ -165,6 +201,18 @@ class StampWatch:
             self.duplicated += 1
         else:
             self._add_late()
+
+    def _goes_on(self, stamp: int) -> bool:
+        """Return whether a stamp far off is the second of two that agree; else it counts as misdated."""
+        first, self._doubtful = self._doubtful, stamp
+        if first is None or abs(stamp - first) > FARTHEST:
+            self.misdated += 1
+            return False
+        if 0 < first - self.last_stamp < LONGEST_PAUSE:  # else of another clock
+            self.misdated -= 1
+            self.lost += round((first - self.last_stamp) / self._period) - 1
+        self.last_stamp = first
+        return True
 
     def _add_late(self) -> None:
         # A late sample fills a gap that was counted before; without a gap it repeats a sample.

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.messages.series import SeriesError, Times, registered_topic
+from mount_bags.messages.stamps import misdated
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
 _ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)
@@ -23,6 +24,8 @@ class TimeAxis:
 
     def __init__(self, stamps: Times, received: Times, told: Sequence[int] = ()):
         """Take the samples, at least one, as they came in (ns), and zeros that origins tell of."""
+        sound = ~misdated(stamps)
+        stamps, received = stamps[sound], received[sound]
         order = np.argsort(received, kind='stable')
         highest = np.maximum.accumulate(stamps[order])
         # A late sample moves nothing: its stamp is not above those before it.

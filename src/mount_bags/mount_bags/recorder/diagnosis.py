@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from mount_bags.messages.stamps import StampWatch
+from mount_bags.messages.stamps import FARTHEST, StampWatch
 from mount_bags.recorder.recorder import RecorderFigures, Unobserved
 from mount_bags.recorder.snapshot import SnapshotFigures
 from mount_ros.nodes.diagnostics import Level, Verdict
@@ -74,6 +74,11 @@ def _warnings(state: RecorderState) -> Iterator[str]:
     if missing:
         counts = ', '.join(f'{topic} {count}' for topic, count in missing.items())
         yield f'samples missing between the stamps: {counts}; is the machine overloaded?'
+    misdated = {topic: watch.misdated for topic, watch in state.watches.items() if watch.misdated}
+    if misdated:
+        counts = ', '.join(f'{topic} {count}' for topic, count in misdated.items())
+        limit = f'more than {FARTHEST / 1e9:g} s from the samples around them'
+        yield f'stamps {limit}: {counts}; who else publishes there?'
     if _is_short_of_space(state):
         yield (
             f'{state.free / 1e9:.1f} GB left on the disk of {state.folder} at {state.rate / 1e6:.1f} MB/s; '

@@ -12,6 +12,7 @@ import yaml
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import registered_topic
 from mount_bags.run.versions import versions
+from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_ros.topics import SESSION
 
 
@@ -46,9 +47,9 @@ def session_message(text: str) -> bytes:
 def session_content(text: str) -> dict[str, Any]:
     """Return the content of a session text, {} of an empty one; raises `SessionError`."""
     try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise SessionError(f'session is no YAML ({str(error).splitlines()[0]})') from None
+        content = plain_yaml(text)
+    except YamlError as error:
+        raise SessionError(f'session {error}') from None
     if content is None:
         return {}
     if not isinstance(content, dict):
@@ -66,8 +67,8 @@ def session_parameters(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 def session_values(text: str) -> dict[str, Any]:
     """Return {name: value} of a session text; parameters are named as `--set` names them."""
     try:
-        return _flat(yaml.safe_load(text))
-    except yaml.YAMLError:
+        return _flat(plain_yaml(text))
+    except YamlError:
         return {'text': text}
 
 

@@ -26,7 +26,7 @@ Examples:
 
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
-`engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.damper=viscous_3000`
+`engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.policy=switched_viscous`
 """
 
 

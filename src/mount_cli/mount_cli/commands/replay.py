@@ -149,7 +149,7 @@ def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
     for setting in settings:
         name, equals, text = setting.partition('=')
         if not (equals and name):
-            raise typer.BadParameter(f'--set {setting}: write NAME=VALUE, as in quality=0.7')
+            raise typer.BadParameter(f'--set {setting}: write NAME=VALUE, as in highest_current=2')
         try:
             values[name] = setting_value(setting, text)
         except SettingError as error:

@@ -4,7 +4,9 @@ from mount_control.policy import continuous_viscous, switched_viscous
 from mount_control.policy.contract import Policy
 from mount_models.quantity import ParameterError
 
-DEFAULT = 'switched_viscous'
+DEFAULT = 'continuous_viscous'
+UNPREFIXED = 'switched_viscous'
+"""The first policy: its parameters have no prefix, and recordings that name none were made with it."""
 
 POLICIES: dict[str, Policy] = {
     'switched_viscous': switched_viscous,
@@ -20,5 +22,5 @@ def chosen_policy(name: str) -> Policy:
 
 
 def prefix_of(name: str) -> str:
-    """Return what stands before the names of a policy's parameters; those of the oldest have none."""
-    return '' if name == DEFAULT else name
+    """Return what stands before the names of a policy's parameters; those of the first have none."""
+    return '' if name == UNPREFIXED else name

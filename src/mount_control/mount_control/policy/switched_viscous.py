@@ -7,6 +7,9 @@ velocity in the band, turned ahead by the delay of the loop.
 import math
 from typing import Annotated, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mount_control import band_pass, switching
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
@@ -55,6 +58,20 @@ class Parameters(NamedTuple):
     def period_samples(self) -> int:
         """Samples in one period of the eigenfrequency."""
         return max(1, round(1.0 / (self.eigenfrequency * SAMPLE_TIME)))
+
+
+def levels(parameters: Parameters) -> dict[str, float]:
+    """Return the magnitudes (m) at which damping is switched, for pictures."""
+    return {
+        'switch-on level': parameters.switch_on_level,
+        'switch-off level': parameters.switch_off_level,
+    }
+
+
+def wanted_force(parameters: Parameters, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the force (N) of the characteristic at the true velocity (m/s, (n,)) in the band, undelayed."""
+    band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, SAMPLE_TIME)
+    return damper_curve(parameters.damper).force(band_pass.filtered(band, velocity))
 
 
 SWITCHING = {

@@ -18,7 +18,7 @@ from mount_experiments.bench.evaluation import (
     coulomb_loop,
     loop_of,
 )
-from mount_experiments.harness.closed_loop import driven, mode_of
+from mount_experiments.harness.closed_loop import PAPER, driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -78,10 +78,11 @@ def _own(parameters: BenchParameters, mount: Mapping[str, str]) -> dict[str, dic
             'timeline.duration': math.ceil(1e3 * seconds) * 1e-3,
             'bench.frequency': parameters.frequency,
             'bench.amplitude': parameters.amplitude,
-        }
+        },
+        'mount_control': {'policy': PAPER},
     }
     if 'damper' in mount:
-        own['mount_control'] = {'damper': mount['damper']}
+        own['mount_control']['damper'] = mount['damper']
     return own
 
 

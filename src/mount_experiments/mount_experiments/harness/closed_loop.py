@@ -14,6 +14,9 @@ from mount_experiments.harness.contract import ExperimentError, Order
 from mount_replay.drive.drive import DriveOrder, record_drive
 from mount_report.drive.signals import DriveSignals, load_drive
 
+PAPER = 'switched_viscous'
+"""The policy of the paper, with which its scenes are driven."""
+
 
 def mode_of(order: Order) -> str:
     """Return how an order's runs are driven."""

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.policy import switched_viscous
-from mount_experiments.harness.closed_loop import driven, mode_of
+from mount_experiments.harness.closed_loop import PAPER, driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -83,7 +83,7 @@ def _own(parameters: GapParameters, depth: float, mount: str) -> dict[str, dict[
             'motorway.gap_depth': depth,
             'motorway.gap_time': parameters.gap_time,
         },
-        'mount_control': {'damper': parameters.damper},
+        'mount_control': {'policy': PAPER, 'damper': parameters.damper},
     }
 
 

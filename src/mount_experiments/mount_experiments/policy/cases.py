@@ -20,14 +20,16 @@ POLICIES = (PAPER, CONTINUOUS)
 OFF, HYDRO = 'no current', 'hydromount'
 COMPARED = (*POLICIES, OFF, HYDRO)
 NOMINAL = 8.0  # Hz
+_NOISE, _JITTER = {'electronics.displacement_noise': 1e-5}, {'electronics.sample_jitter': 3e-4}
 DISTURBANCES: dict[str, dict[str, float]] = {
     'nominal': {},
     'pads -15 %': {'friction.scale': 0.85},
     'pads +15 %': {'friction.scale': 1.15},
-    '10 um noise': {'electronics.displacement_noise': 1e-5},
+    '10 um noise': _NOISE,
+    '0.3 ms jitter': _JITTER,
     'coil at 80 degC': {'electronics.coil_temperature': 80.0},
-    'pads -15 %, 10 um': {'friction.scale': 0.85, 'electronics.displacement_noise': 1e-5},
-    'pads +15 %, 10 um': {'friction.scale': 1.15, 'electronics.displacement_noise': 1e-5},
+    'pads -15 %, noise, jitter': {'friction.scale': 0.85, **_NOISE, **_JITTER},
+    'pads +15 %, noise, jitter': {'friction.scale': 1.15, **_NOISE, **_JITTER},
 }
 ABLATIONS: dict[str, dict[str, float]] = {
     'as it is': {},

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.policy import switched_viscous
-from mount_experiments.harness.closed_loop import driven, mode_of
+from mount_experiments.harness.closed_loop import PAPER, driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     ExperimentError,
@@ -104,7 +104,7 @@ def _own(parameters: RecordedDriveParameters, mount: str) -> dict[str, dict[str,
             **{f'recorded.{name}': value for name, value in _scenario(parameters)._asdict().items()},
             'recorded.file': str(Path(parameters.file).absolute()),
         },
-        'mount_control': {'damper': parameters.damper},
+        'mount_control': {'policy': PAPER, 'damper': parameters.damper},
     }
 
 

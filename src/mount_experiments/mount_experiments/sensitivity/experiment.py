@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_experiments.harness.closed_loop import settings_of_run
+from mount_experiments.harness.closed_loop import PAPER, settings_of_run
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -96,7 +96,7 @@ def _jobs(order: Order, parameters: SensitivityParameters, axes: Axes) -> list[J
 
 
 def _job(order: Order, key: tuple[Any, ...], sim: dict[str, Any], damper: Any) -> Job:
-    own = {'mount_sim': sim, 'mount_control': {'damper': damper}}
+    own = {'mount_sim': sim, 'mount_control': {'policy': PAPER, 'damper': damper}}
     return Job(key, settings_of_run(order, own, NAME))
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from mount_control.policy import switched_viscous
-from mount_experiments.harness.closed_loop import driven, mode_of
+from mount_experiments.harness.closed_loop import PAPER, driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -97,7 +97,7 @@ def _own(parameters: SweepParameters, mount: str, idle: float) -> dict[str, dict
             'sweep.rate': RATE,
             'idle.amplitude': idle,
         },
-        'mount_control': {'damper': parameters.damper},
+        'mount_control': {'policy': PAPER, 'damper': parameters.damper},
     }
 
 

@@ -17,6 +17,7 @@ from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSe
 from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_control.diagnosis import fault_sentence
+from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
 from mount_replay.drive.preflight import preflight
 from mount_replay.loop.recording import record_core
@@ -183,4 +184,5 @@ def _together(order: DriveOrder) -> bool:
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
     told = {node: dict(values) for node, values in parameters.items()}
+    told['mount_control'] = {'policy': DEFAULT, **told.get('mount_control', {})}  # none named: an older one
     return session_text(new_session({'scenario': order.scenario, 'mode': order.mode, 'parameters': told}))

@@ -3,6 +3,7 @@
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import Parameters
 from mount_bringup.mount_choice import check_control_of_mount
+from mount_control.settings import check_effect
 from mount_driver.parameters import DriverParameters
 from mount_models.actuator.closing import checked_closing
 from mount_models.quantity import with_flattened
@@ -21,6 +22,7 @@ def preflight(parameters: Parameters) -> Excitation:
     excitation = build_excitation(sim)
     Fault(sim.fault)
     check_control_of_mount(parameters)
+    check_effect(parameters.get('mount_control', {}))
     checked_closing(sim.mechanics, sim.actuator)
     checked_plant(sim.plant, excitation.seat, excitation.step_time)
     with_flattened(DriverParameters(), parameters.get('mount_driver', {}))

@@ -13,7 +13,7 @@ from mount_bags.signals.loading import is_recording, load_signal
 from mount_bags.signals.plausibility import check_size
 from mount_bags.signals.resampling import has_step, resampled
 from mount_bags.signals.signal import SECOND
-from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters, switched_viscous_parameters
+from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters
 from mount_init.parameters import InitParameters
 from mount_models.actuator.closing import ClosingMechanics
 from mount_models.arithmetic.averages import mean
@@ -33,6 +33,7 @@ from mount_replay.given.ramps import MeasuredGap, measured_gaps
 from mount_ros import topics
 from mount_ros.messages.force_table import ForceTable
 from mount_ros.messages.scalars import ScalarsLayout
+from mount_sim.excitation.recorded import LONGEST_GAP
 
 LOWEST_RATE = 100.0  # Hz, chosen: five times the 20 Hz up to which an engine moves on its mounts
 DEFAULT_TABLE = 'default'
@@ -81,13 +82,12 @@ def foreign_order(maps: list[str], scale: float, offset: str) -> ForeignOrder:
 def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: MeasuredGap) -> ReplayInput:
     """Return what a foreign recording gives to replay with the force table of `gap`.
 
-    A gap in the samples may be no longer than one period of the band, because what happened in it cannot be
+    A gap in the samples may be no longer than one period of 8 Hz, because what happened in it cannot be
     interpolated; a longer one, or a rate below `LOWEST_RATE`, is refused. Raises `ReplayError` or
     `SignalError`.
     """
     notes: list[str] = []
-    longest_gap = 1.0 / switched_viscous_parameters(parameters).eigenfrequency
-    signals = {name: _signal(path, place, longest_gap, notes) for name, place in order.fields.items()}
+    signals = {name: _signal(path, place, LONGEST_GAP, notes) for name, place in order.fields.items()}
     stamps, values = _on_one_grid(signals, notes)
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
         stamps = stamps - stamps[0] + SECOND

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Payloads
 from mount_bags.run.session import SessionError, recorded_session, session_content, session_parameters
+from mount_bringup.chosen import with_recorded_policy
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
 from mount_control.settings import policy_parameters
@@ -436,10 +437,10 @@ def _parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str,
     for node in ('mount_control', 'mount_init'):
         values = recorded.get(node, {})
         found[node] = {name: value for name, value in values.items() if name in known[node]}
-        new = [name for name in known[node] if name not in found[node]]
+        new = [name for name in known[node] if name not in found[node] and name != 'policy']
         if new and found[node] and len(new) < len(known[node]) // 2:
             notes.append(f'{node}: {", ".join(new)} is not in the session; the default is taken')
-    return checked_settings(found)
+    return checked_settings(with_recorded_policy(found) if session else found)
 
 
 def recorded_parameters(recording: Recording, notes: Notes) -> dict[str, dict[str, Any]]:

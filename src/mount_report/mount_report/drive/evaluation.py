@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.audit.audit import TopicAudit
 from mount_bags.bag.recording import Recording
-from mount_bags.events.switching_changes import Switching
-from mount_control import band_pass
-from mount_control.policy import switched_viscous
-from mount_models.damper import DamperCurve
+from mount_bags.events.switching_changes import Switching, switching_times
+from mount_control.policy.contract import Policy
 from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.signals import DriveSignals, Seen
 
+ACTS_AFTER = 0.0019
+"""Seconds from a sample to the middle of the effect of its setpoint, see `lead_time` in mount_control."""
 _MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')
 
 
@@ -34,37 +35,44 @@ def samples_at_the_ends(recording: Recording, topics: Mapping[str, TopicAudit], 
     return found
 
 
+def levels_of(policy: Policy, parameters: Any) -> dict[str, float]:
+    """Return the displacements (m) that a policy wants drawn as lines, {} where it names none."""
+    levels = getattr(policy, 'levels', None)
+    return levels(parameters) if levels else {}
+
+
 def switching(seen: Seen) -> Switching:
     """Return the times at which damping was switched."""
-    change = np.diff(seen.damping_active.astype(int), prepend=0)
-    return Switching(tuple(seen.time[change > 0].tolist()), tuple(seen.time[change < 0].tolist()))
+    on, off = switching_times(seen.time, seen.damping_active)
+    return Switching(tuple(on.tolist()), tuple(off.tolist()))
 
 
-def tracking_error(
-    drive: DriveSignals, parameters: switched_viscous.Parameters, damper: DamperCurve
-) -> float:
+def tracking_error(drive: DriveSignals, policy: Policy, parameters: Any) -> float:
     """Return the rms error of the friction force while damping is on, as a share of the peak wanted force.
 
     NaN if damping was never on.
     """
-    wanted, places = wanted_force(drive, parameters, damper)
+    wanted, places = wanted_force(drive, policy, parameters)
     on = places[drive.seen.damping_active]
-    if len(on) == 0:
+    if len(on) == 0 or not wanted[on].any():
         return math.nan
     error = drive.truth.friction_force[on] - wanted[on]
     return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(wanted[on])))
 
 
 def wanted_force(
-    drive: DriveSignals, parameters: switched_viscous.Parameters, damper: DamperCurve
+    drive: DriveSignals, policy: Policy, parameters: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the wanted friction force (N) at the true times, and which of them belongs to each sample.
 
-    Wanted is what the selected damper would do at the true velocity of the mount in the band at that very
-    moment, without any delay; so an error against it holds phase and delay as well as force.
+    Wanted is what the policy says by its `wanted_force`, for the true velocity of the mount at that very
+    moment; so an error against it holds phase and delay as well as force. Of a policy without one it is the
+    force that it asked for, at the time at which its setpoint acts, so an error holds no error of prediction.
     """
-    band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, SAMPLE_TIME)
-    wanted = damper.force(band_pass.filtered(band, drive.truth.velocity))
+    if ideal := getattr(policy, 'wanted_force', None):
+        wanted = ideal(parameters, drive.truth.velocity)
+    else:
+        wanted = np.interp(drive.truth.time, drive.seen.time + ACTS_AFTER, drive.seen.desired_force)
     places = np.clip(
         np.searchsorted(drive.truth.time, drive.seen.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1
     )

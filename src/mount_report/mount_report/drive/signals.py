@@ -12,7 +12,8 @@ from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
 FloatArray = NDArray[np.float64]
 
 _SECOND = 1e9  # ns
-_TRACED = ('damping_active', 'current', 'band_displacement')
+_TRACED = ('damping_active', 'current', 'desired_force')
+_OF_SOME = 'band_displacement'  # of some policies
 _AT_THE_END = ('rest_gap', 'contact_gap')  # what the summary of a drive asks for, read in the same pass
 
 
@@ -20,13 +21,15 @@ _AT_THE_END = ('rest_gap', 'contact_gap')  # what the summary of a drive asks fo
 class Seen:
     """What sensor and control saw at each displacement sample; SI, arrays (n,).
 
-    Where control made no step, damping is off, the current 0 A and the band displacement NaN.
+    Where control made no step, damping is off, current and desired force are 0, and the band displacement is
+    NaN; so it is of a policy without one.
     """
 
     time: FloatArray
     displacement: FloatArray
     damping_active: NDArray[np.bool_]
     current: FloatArray
+    desired_force: FloatArray
     band_displacement: FloatArray
 
 
@@ -95,13 +98,15 @@ def _seen(recording: Recording, zero: int) -> Seen:
     order = np.argsort(displacement.stamps)
     stamps = displacement.stamps[order]
     _, places, of_trace = np.intersect1d(stamps, trace.stamps, return_indices=True)
-    traced = {name: np.full(len(stamps), np.nan) for name in _TRACED}
+    traced = {name: np.full(len(stamps), np.nan) for name in (*_TRACED, _OF_SOME)}
     for name, values in traced.items():
-        values[places] = trace[name][of_trace]
+        if name in trace.names or name != _OF_SOME:
+            values[places] = trace[name][of_trace]
     return Seen(
         time=(stamps - zero) / _SECOND,
         displacement=displacement['mount'][order],
-        damping_active=traced['damping_active'] > 0.5,
+        damping_active=traced['damping_active'] > 0.0,
         current=np.nan_to_num(traced['current']),
+        desired_force=np.nan_to_num(traced['desired_force']),
         band_displacement=traced['band_displacement'],
     )

@@ -15,7 +15,7 @@ from mount_bags.bag.recording import Recording
 from mount_bags.events.switching_changes import switching_times
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.run.screen import Screen, Table
-from mount_bringup.chosen import Parameters, chosen_damper, switched_viscous_parameters
+from mount_bringup.chosen import Parameters, policy_of
 from mount_bringup.mount_choice import seat_of
 from mount_report.drive.evaluation import tracking_error
 from mount_report.drive.signals import DriveSignals, excitation_stamp
@@ -55,6 +55,7 @@ def summarise(
         'asked_samples': found.asked,
         'unanswered_samples': found.unanswered,
         'late_samples': found.late,
+        'misdated_messages': found.misdated,
         'faults': found.as_json()['faults'],
         'real_time_factor': run['real_time_factor'],
         'rest_gap_m': float(gap['rest_gap'][-1]),
@@ -93,7 +94,7 @@ def _friction_figures(
     order = np.argsort(trace.stamps, kind='stable')
     time = (trace.stamps[order] - drive.zero) / 1e9
     on, off = switching_times(time, trace['damping_active'][order])
-    error = tracking_error(drive, switched_viscous_parameters(parameters), chosen_damper(parameters))
+    error = tracking_error(drive, *policy_of(parameters))
     return _FrictionFigures(on.tolist(), off.tolist(), _known(peak_current(recording, audits)), _known(error))
 
 

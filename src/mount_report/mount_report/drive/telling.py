@@ -13,8 +13,8 @@ from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.recorder.snapshot import saved_snapshots
 from mount_bags.run.folder import RunFolder
 from mount_bags.run.screen import Screen
-from mount_bringup.chosen import Parameters, switched_viscous_parameters
-from mount_report.drive.evaluation import samples_at_the_ends
+from mount_bringup.chosen import Parameters, policy_of
+from mount_report.drive.evaluation import levels_of, samples_at_the_ends
 from mount_report.drive.signals import DriveSignals, load_drive
 from mount_report.drive.summary import (
     print_summary,
@@ -79,10 +79,11 @@ def tell_snapshots(
 def _draw(folder: RunFolder, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:
     from mount_report.drive.picture import draw_drive  # after the drive: what draws takes a second to load
 
-    control = switched_viscous_parameters(parameters)
+    policy, own = policy_of(parameters)
+    levels = levels_of(policy, own)
     title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
     begin = figures['excitation_start_s']
-    draw_drive(drive.seen, control.switch_on_level, control.switch_off_level, begin, title, folder.figure)
+    draw_drive(drive.seen, levels, begin, title, folder.figure)
 
 
 def _write_report(folder: RunFolder, recording: Recording, screen: Screen) -> None:

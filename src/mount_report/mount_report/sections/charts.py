@@ -3,8 +3,9 @@
 They take arrays, so no recording is needed.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import cycle
 
 import numpy as np
 
@@ -25,10 +26,9 @@ class Named:
 
 @dataclass(frozen=True)
 class Levels:
-    """Switching levels (m) and limit of the current (A); None where they are not known."""
+    """Levels of displacement (m) by their labels, and limit of the current (A), None: not known."""
 
-    switch_on: float | None = None
-    switch_off: float | None = None
+    displacement: Mapping[str, float] = field(default_factory=dict)
     current_limit: float | None = None
 
 
@@ -41,7 +41,7 @@ def time_traces(
     name: str = 'time_traces',
     limits: tuple[float, float] | None = None,
 ) -> Chart:
-    """Return displacement (m) with both switching levels above current (A), over time (s), as in Fig. 15.
+    """Return displacement (m) with the levels of its policy above current (A), over time (s), as in Fig. 15.
 
     `damping` are the stretches in which damping is on.
     """
@@ -51,7 +51,7 @@ def time_traces(
             Panel(
                 'displacement (mm)',
                 [_curve(series, place, 'displacement', _MM) for place, series in enumerate(displacements)],
-                levels=_switching_levels(levels),
+                levels=_lines(levels),
                 share=1.5,
             )
         )
@@ -116,15 +116,14 @@ def spectra(
 def sweep_bands(
     peaks: Sequence[Named],
     accelerations: Sequence[Named] = (),
-    level: float | None = None,
+    levels: Levels | None = None,
     title: str = 'Sweep',
     name: str = 'sweep',
 ) -> Chart:
     """Return the peak displacement (m) of each band of frequency (Hz), below it the rms acceleration (m/s^2).
 
-    The x of a series are the lower edges of its bands; as in Fig. 14. `level` (m) is that of switching on.
+    The x of a series are the lower edges of its bands; as in Fig. 14.
     """
-    levels = [] if level is None else [Level(f'switch-on level, {_MM * level:g} mm', _MM * level)]
     panels = [
         Panel(
             'peak displacement (mm)',
@@ -132,7 +131,7 @@ def sweep_bands(
                 _curve(_held(series), place, 'displacement', _MM, steps=True)
                 for place, series in enumerate(peaks)
             ],
-            levels=levels,
+            levels=_lines(levels or Levels(), both=False),
         )
     ]
     if accelerations:
@@ -191,14 +190,11 @@ def _curve(
     return Curve(named, x_factor * series.x, factor * series.y, colour, dash, steps)
 
 
-def _switching_levels(levels: Levels) -> list[Level]:
+def _lines(levels: Levels, both: bool = True) -> list[Level]:
+    """Return the levels as lines, by turns dashed and dotted; `both`: to either side of zero."""
     return [
-        Level(f'{name}, {_MM * value:g} mm', _MM * value, dash, both=True)
-        for name, value, dash in (
-            ('switch-on level', levels.switch_on, DASHED),
-            ('switch-off level', levels.switch_off, DOTTED),
-        )
-        if value is not None
+        Level(f'{name}, {_MM * value:g} mm', _MM * value, dash, both)
+        for (name, value), dash in zip(levels.displacement.items(), cycle((DASHED, DOTTED)), strict=False)
     ]
 
 

@@ -67,7 +67,7 @@ def coil(subjects: Sequence[Subject]) -> Section:
 
 
 def tracking(subjects: Sequence[Subject]) -> Section:
-    """Return the true friction force against the one that the chosen damper would have."""
+    """Return the true friction force against the wanted one."""
     wanted, actual, said = [], [], Sentences(subjects)
     damping: list[tuple[float, float]] = []
     for subject in subjects:

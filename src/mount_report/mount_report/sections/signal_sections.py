@@ -48,8 +48,8 @@ def traces(subjects: Sequence[Subject]) -> Section:
     )
     if len(subjects) > 1 and damping:
         words.append(f'Shaded: damping on in {subjects[0].name}.')
-    if levels.switch_on is None:
-        words.append(f'The switching levels are not drawn: {subjects[0].facts.levels_remark}.')
+    if levels == Levels():
+        words.append(f'The levels of the policy are not drawn: {subjects[0].facts.levels_remark}.')
     words += _absent(subjects, (Subject.displacement, 'no displacement'), (_setpoint, 'no current setpoint'))
     chart = None
     if moved or currents:
@@ -200,8 +200,7 @@ def sweep(subjects: Sequence[Subject]) -> Section | None:
             accelerations.append(Named(_name(subjects, subject), *bands))
     if not peaks:
         return None
-    level = subjects[0].facts.levels.switch_on
-    chart = charts.sweep_bands(peaks, accelerations, level)
+    chart = charts.sweep_bands(peaks, accelerations, subjects[0].facts.levels)
     rows = [
         (f'{edge:g} .. {edge + 1:g}', *(_band_cell(series, edge) for series in peaks))
         for edge in sorted(set(chain.from_iterable(series.x.tolist() for series in peaks)))

@@ -5,6 +5,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from mount_models.plain_yaml import YamlError, plain_yaml
+
 BY_HAND = 'mark'  # kind of a mark that a person set
 PARAMETER = 'parameter'  # kind of a mark where parameters of a node at work were changed
 _OF_CHANGE = {'node', 'values'}
@@ -38,7 +40,7 @@ def read_mark(text: str, received: int) -> Mark:
     of them, is kept whole. Only a change of parameters may have more fields.
     """
     # Every word stays the text that it is: `12:30` is no number, and `2026-02-30` no date.
-    content = _content(text, yaml.BaseLoader)
+    content = _content(text, words=True)
     told = {name: content[name] for name in Mark._fields if isinstance(content.get(name), str)}
     known = len(told) + (len(_OF_CHANGE & content.keys()) if told.get('kind') == PARAMETER else 0)
     return Mark(
@@ -62,7 +64,7 @@ def dated(time: int, text: str) -> str:
 
 def read_change(text: str) -> ParametersChanged | None:
     """Return the change of parameters that a message describes, or None."""
-    content = _content(text, yaml.SafeLoader)
+    content = _content(text)
     time, node, values = content.get('time'), content.get('node'), content.get('values')
     if content.get('kind') != PARAMETER or not isinstance(values, dict) or not isinstance(node, str):
         return None
@@ -73,10 +75,10 @@ def _text(content: Mapping[str, Any]) -> str:
     return yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True, width=1 << 20)
 
 
-def _content(text: str, loader: type[yaml.BaseLoader] | type[yaml.SafeLoader]) -> dict[Any, Any]:
+def _content(text: str, *, words: bool = False) -> dict[Any, Any]:
     try:
-        content = yaml.load(text, Loader=loader)
-    except (yaml.YAMLError, ValueError, RecursionError):  # ValueError: a date that is none
+        content = plain_yaml(text, words=words)
+    except YamlError:
         return {}
     return content if isinstance(content, dict) else {}
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import can
 
-from mount_driver.bus import may_have_frames
+from mount_driver.bus import Reception, may_have_frames
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
 from mount_driver.frame import Frame
@@ -41,6 +41,7 @@ class CanEnd:
 
     def __init__(self, bus: can.BusABC):
         self._bus = bus
+        self._reception = Reception()
         self._codec = MountCodec()
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
@@ -91,7 +92,7 @@ class CanEnd:
         end = time.monotonic() + limit
         while True:
             remaining = end - time.monotonic()
-            frame = self._bus.recv(max(0.0, remaining))
+            frame = self._reception.frame(self._bus, max(0.0, remaining))
             received = None if frame is None else self._setpoint_in(frame)
             if received is not None and received.answers(number & _COUNTER_MASK):
                 return received
@@ -101,7 +102,7 @@ class CanEnd:
     def newest(self) -> ReceivedSetpoint | None:
         """Take all frames that have come since the last call and return the last sound setpoint in them."""
         newest = None
-        while may_have_frames(self._bus) and (frame := self._bus.recv(0.0)) is not None:
+        while may_have_frames(self._bus) and (frame := self._reception.frame(self._bus, 0.0)) is not None:
             newest = self._setpoint_in(frame) or newest
         return newest
 

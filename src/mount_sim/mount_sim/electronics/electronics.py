@@ -18,7 +18,7 @@ STATUS_EVERY = 100
 
 
 class ElectronicsParameters(NamedTuple):
-    """The electronics' own numbers; noise figures are standard deviations."""
+    """The electronics' own numbers; noise and jitter are standard deviations."""
 
     current_bandwidth: Annotated[
         float, Quantity('Hz', 'bandwidth of the current loop', 10.0, 2000.0, 'chosen')
@@ -29,6 +29,9 @@ class ElectronicsParameters(NamedTuple):
     displacement_noise: Annotated[
         float, Quantity('m', 'noise of the displacement sensor', 0.0, 1e-3, 'chosen')
     ] = 2e-6
+    sample_jitter: Annotated[
+        float, Quantity('s', 'time of sampling the displacement, against its stamp', 0.0, 5e-4, 'chosen')
+    ] = 0.0
     ripple_noise: Annotated[
         float, Quantity('1', 'noise of one ripple reading of the inductance, relative', 0.0, 0.5, 'chosen')
     ] = 0.01
@@ -54,25 +57,29 @@ class Reading(NamedTuple):
 
 
 class Noise:
-    """Seeded standard normal numbers, four for each sample, drawn in blocks."""
+    """Seeded standard normal numbers, `NUMBERS` for each sample, drawn in blocks."""
 
+    NUMBERS = 5
+    """Displacement, current, the two slopes, time of sampling: the last has a sequence of its own."""
     _BLOCK = 4096
 
     def __init__(self, seed: int):
         self._random = RandomNumbers(seed)
-        self._numbers: NDArray[np.float64] = np.empty((0, 4))
+        self._random_times = RandomNumbers((seed, 1))
+        self._numbers: NDArray[np.float64] = np.empty((0, self.NUMBERS))
         self._place = 0
 
     def next(self) -> NDArray[np.float64]:
-        """Return the four numbers of the next sample."""
+        """Return the numbers of the next sample."""
         numbers = self.ahead(1)[0]
         self.skip(1)
         return numbers
 
     def ahead(self, count: int) -> NDArray[np.float64]:
-        """Return the numbers of the next `count` samples, (count, 4); they remain the next."""
+        """Return the numbers of the next `count` samples, (count, NUMBERS); they remain the next."""
         while len(self._numbers) - self._place < count:
-            drawn = self._random.normal(self._BLOCK, 4)
+            times = self._random_times.normal(self._BLOCK, 1)
+            drawn = np.hstack([self._random.normal(self._BLOCK, self.NUMBERS - 1), times])
             self._numbers = np.concatenate([self._numbers[self._place :], drawn])
             self._place = 0
         return self._numbers[self._place : self._place + count]
@@ -86,14 +93,16 @@ _NO_CURRENT = 1e-9  # A: an exponential decay ends here, before it costs time as
 
 
 @compiled
-def read_sensors(electronics, coil, actuator, displacement, current, gap, noise):
-    """Return (displacement m, current A, di/dt A/s, dB/dt T/s) as measured; `noise` holds four numbers.
+def read_sensors(electronics, coil, actuator, displacement, velocity, current, gap, noise):
+    """Return (displacement m, current A, di/dt A/s, dB/dt T/s) as measured; `noise` as in `Noise`.
 
-    The two slopes share the noise of the ripple reading evenly, so that their ratio has `ripple_noise`.
+    The two slopes share the noise of the ripple reading evenly, so that their ratio has `ripple_noise`. A
+    displacement sampled late has moved on by its `velocity` (m/s).
     """
     share = electronics.ripple_noise * np.sqrt(0.5)
+    sampled = displacement + velocity * (electronics.sample_jitter * noise[4])
     return (
-        displacement + electronics.displacement_noise * noise[0],
+        sampled + electronics.displacement_noise * noise[0],
         current + electronics.current_noise * noise[1],
         current_rate(coil, actuator, current, gap) * (1.0 + share * noise[2]),
         flux_rate(coil, actuator, current) * (1.0 + share * noise[3]),

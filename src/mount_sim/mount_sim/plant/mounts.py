@@ -24,7 +24,7 @@ class SeatedMount(NamedTuple):
 MOUNTS = {
     'friction': 'the semi-active friction mount',
     'friction_off': 'the friction mount whose coil driver opens when the excitation begins: 0 A from then on',
-    'friction_always_on': 'the friction mount, its control told to damp always (`mount_control.switching`)',
+    'friction_always_on': 'the friction mount, its control told to damp always (`mount_control.policy` and `switching`)',
     'hydro': 'the original hydromount; the actuator is there electrically, no rod between its pads',
     'elastomer': 'the elastomer alone; the actuator is there electrically, no rod between its pads',
 }

@@ -155,7 +155,7 @@ class PlantSimulation:
 
 @compiled
 def read(plant, state, truth, noise):
-    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` four numbers.
+    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` as in `Noise`.
 
     The displacement is NaN where anything of the state is no finite number.
     """
@@ -177,7 +177,9 @@ def read(plant, state, truth, noise):
     seen.contact_gap = law.mechanics.contact_gap
     seen.setpoint_latency = np.nan
     displacement = now.displacement if _finite(now) else np.nan
-    return read_sensors(law.electronics, law.coil, law.actuator, displacement, now.current, now.gap, noise)
+    return read_sensors(
+        law.electronics, law.coil, law.actuator, displacement, now.velocity, now.current, now.gap, noise
+    )
 
 
 @compiled

@@ -49,7 +49,7 @@ class Ahead(NamedTuple):
     """What the next n samples are made of.
 
     The plant, excitation and force on the engine, both (n, steps), whether the coil's driver is open, and
-    numbers for the noise (n, 4).
+    numbers for the noise (n, `Noise.NUMBERS`).
     """
 
     memory: Memory
