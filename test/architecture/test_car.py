@@ -13,7 +13,8 @@ from test_imports import CAR
 from mount_bringup.graph.nodes import SIMULATED
 
 LAUNCH_FILES = sorted((SOURCES / 'mount_bringup' / 'launch').glob('*.launch.py'))
-MODULES = [*(f'{node.package}.node' for node in SIMULATED), 'mount_bringup.graph.supervisor']
+SUPERVISORS = ['mount_bringup.graph.supervisor', 'mount_bringup.graph.launched']
+MODULES = [*(f'{node.package}.node' for node in SIMULATED), *SUPERVISORS]
 BEGIN = [*LAUNCH_FILES, *(module_files()[name] for name in MODULES)]
 
 LOAD = """

@@ -22,7 +22,7 @@ from mount_sim.plant.mounts import MOUNTS, seated_mount
 
 
 class LaunchArgument(NamedTuple):
-    """An argument of a launch file: its default, and NODE.NAME of the parameters that it sets if not empty."""
+    """An argument of a launch file, and NODE.NAME of the parameters that it sets if it is not empty."""
 
     name: str
     meaning: str
