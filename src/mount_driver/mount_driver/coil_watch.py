@@ -101,10 +101,10 @@ class CoilWatch:
     def _follow(self, low: float, high: float, now: int) -> None:
         elapsed = 0 if self._judged is None else now - self._judged
         self._judged = now
-        if elapsed > _HOLD:
-            self._low = 0.0
-        share = -math.expm1(-self._bandwidth * elapsed)
-        self._low = min(low, self._low + min(share * (low - self._low), self._rise * elapsed))
+        step = self._bandwidth * elapsed
+        share = step / (1.0 + step)  # less than the exact 1 - exp(-step), which makes the bounds wider
+        risen = self._low + min(share * (low - self._low), self._rise * elapsed)
+        self._low = min(low, risen) if elapsed <= _HOLD else 0.0
         self._high = max(high, self._high - min(share * (self._high - high), self._fall * elapsed))
 
     def _sentence(self, current: float, lasted: int) -> str:

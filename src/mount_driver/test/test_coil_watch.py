@@ -21,7 +21,15 @@ def in_time(k):
 
 
 def watched(
-    setpoints, carried, *, enabled=lambda k: True, way=0, arrival=in_time, catches_up=True, missing=()
+    setpoints,
+    carried,
+    *,
+    limits=LIMITS,
+    enabled=lambda k: True,
+    way=0,
+    arrival=in_time,
+    catches_up=True,
+    missing=(),
 ):
     """Return (sample, sentence) of the first doubt, None if there is none.
 
@@ -29,7 +37,7 @@ def watched(
     arrive late waited for the driver, or `catches_up`: the electronics were late themselves and take up at
     once what is sent meanwhile.
     """
-    watch, current, noted = CoilWatch(LIMITS), 0.0, [(0, 0.0)] * (way + 2)
+    watch, current, noted = CoilWatch(limits), 0.0, [(0, 0.0)] * (way + 2)
     for k, setpoint in enumerate(setpoints):
         if k not in missing:
             measured = current if math.isnan(current) else quantised_coil_current(current)
@@ -87,6 +95,30 @@ def test_samples_that_come_in_heaps_are_no_doubt(name, length, catches_up):
     assert watched(SETPOINTS[name], sound, arrival=arrival, catches_up=catches_up) is None
 
 
+@pytest.mark.parametrize('name', SETPOINTS)
+def test_a_driver_that_is_always_30_ms_late_doubts_nothing(name):
+    assert watched(SETPOINTS[name], sound, arrival=lambda k: (k + 30) * MS, catches_up=False) is None
+
+
+STRICT = LIMITS._replace(duration=0.002)
+
+
+def slowest(_, current, wanted):
+    """A coil at the least supply."""
+    return current + float(np.clip(wanted - current, -0.15, 0.05))
+
+
+def test_the_bounds_move_no_faster_than_the_slowest_coil():
+    assert watched(SETPOINTS['steps'], slowest, limits=STRICT) is None
+
+
+def test_electronics_that_had_gone_to_0_ampere_in_a_pause_may_rise_from_there():
+    def after_a_pause(k, current, wanted):
+        return 0.0 if 500 <= k < 529 else slowest(k, current, wanted)
+
+    assert watched(np.full(SAMPLES, 1.0), after_a_pause, limits=STRICT, missing=range(500, 530)) is None
+
+
 FAULTS = {
     'open': lambda k, current, wanted: 0.0 if k > 1000 else sound(k, current, wanted),
     'too little': lambda k, current, wanted: min(sound(k, current, wanted), 0.39 if k > 1000 else 9.0),
@@ -139,8 +171,8 @@ def test_a_deviation_shorter_than_the_duration_is_no_doubt():
 def test_a_sample_time_that_stands_still_hides_nothing_for_long():
     watch = CoilWatch(LIMITS)
     sentences = []
-    for k in range(300):
+    for k in range(0, 300, 5):
         sentences.append(watch.judge(3.0, True, 0, k * MS))
-        watch.note_sent(0.0, k * MS)
-    assert not any(sentences[:20])
-    assert all(sentences[60:])
+        watch.note_sent(3.0 if k < 10 else 0.0, k * MS)
+    assert not any(sentences[:10])
+    assert all(sentences[24:])
