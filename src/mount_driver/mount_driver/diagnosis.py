@@ -115,8 +115,8 @@ def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, loc
         *_quality_findings(now, earlier, parameters),
         *_setpoint_findings(now, earlier, parameters),
     ):
-        return Verdict(level, sentence, _figures(now, lockstep))
-    return Verdict(Level.OK, 'link to the electronics is up', _figures(now, lockstep))
+        return Verdict(level, sentence, _figures(now))
+    return Verdict(Level.OK, 'link to the electronics is up', _figures(now))
 
 
 Findings = list[tuple[Level, str]]
@@ -213,7 +213,7 @@ def _setpoint_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParam
     return found
 
 
-def _figures(now: Snapshot, lockstep: bool) -> dict[str, object]:
+def _figures(now: Snapshot) -> dict[str, object]:
     figures: dict[str, object] = {
         'last_stamp': now.latest_stamp,
         'frame_age_s': round(now.frame_age, 4),
@@ -235,7 +235,7 @@ def _figures(now: Snapshot, lockstep: bool) -> dict[str, object]:
         'recoveries': now.recoveries,
         'error_frames': now.error_frames,
         'switched_off': bool(now.fault),
-        'fatal': lockstep and bool(now.fault),  # the sample that waits will never be answered
+        'fatal': bool(now.fault),  # a supervisor ends the graph: only a new initialisation helps
     }
     if now.status is not None:
         figures['supply_voltage'] = now.status.supply_voltage
