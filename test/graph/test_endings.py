@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import re
 import signal
 import subprocess
 import threading
@@ -163,6 +164,26 @@ def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
     assert 'was not answered within 2 s' in result.output
     assert 'mount_driver does not answer' in result.output
     assert len(mount_bags.open(result.folder / 'recording')['displacement']) == 4000
+
+
+@pytest.mark.parametrize(
+    ('fault', 'sentence'),
+    [
+        ('coil_half', r'coil switched off: coil current \(0\.\d+ A\) must lie within .* about its setpoint'),
+        ('hot_coil', r'coil temperature \(250\.0 degC\) must not exceed 180 degC: let the coil cool down'),
+    ],
+)
+def test_a_coil_at_fault_is_switched_off_and_ends_a_run_in_lock_step(command, fault, sentence):
+    result = command.drive(
+        '--lockstep', '--scenario', 'bench', '--duration', '3',
+        '--set', f'mount_sim.fault.kind={fault}',
+        '--set', 'mount_sim.fault.start=5.2',
+        '--set', 'mount_sim.fault.duration=100.0',
+    )  # fmt: skip
+    assert result.code == 1
+    assert re.search(rf'mount_driver: .*{sentence}', result.output)
+    sent = mount_bags.open(result.folder / 'recording')['current_setpoint']
+    assert 5200 < len(sent) < 5400
 
 
 def _interrupt(process) -> None:

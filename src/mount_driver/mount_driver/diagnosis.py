@@ -12,7 +12,6 @@ from mount_models.sampling import HIGHEST_CURRENT
 from mount_ros.nodes.diagnostics import Level, Verdict
 
 _PERIOD = 1.0  # s: rates are taken over this long
-_SERIOUS_FAULTS = ('over_temperature', 'over_current', 'under_voltage', 'displacement_sensor')
 
 
 class Snapshot(NamedTuple):
@@ -47,6 +46,8 @@ class Snapshot(NamedTuple):
     bus_off: bool = False
     trouble: str = ''
     failure: str = ''
+    fault: str = ''  # keeps the coil off until the next activation
+    held: str = ''  # keeps it at 0 A at present
     status: Status | None = None
     setpoint_errors: int = 0  # statuses that report setpoint frames with a failed check
 
@@ -86,6 +87,8 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         bus_off=exchange.bus_off,
         trouble=exchange.trouble,
         failure=exchange.failure,
+        fault=link.fault,
+        held=link.held,
         status=link.status,
         setpoint_errors=link.setpoint_errors,
     )
@@ -110,6 +113,7 @@ def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, loc
     where = f'{parameters.interface} {parameters.channel}'
     for level, sentence in (
         *_bus_findings(now, where, parameters),
+        *_safety_findings(now),
         *(() if lockstep else _silence_findings(now, where, parameters)),
         *_fault_findings(now, earlier, parameters),
         *_quality_findings(now, earlier, parameters),
@@ -134,6 +138,13 @@ def _bus_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Fi
     return []
 
 
+def _safety_findings(now: Snapshot) -> Findings:
+    if now.fault:
+        again = 'then activate mount_driver, mount_init and mount_control again'
+        return [(Level.ERROR, f'coil switched off: {now.fault}, {again}')]
+    return [(Level.ERROR, f'coil at 0 A while this lasts: {now.held}')] if now.held else []
+
+
 def _silence_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Findings:
     if now.frame_age <= parameters.frame_timeout:
         return []
@@ -148,11 +159,7 @@ def _fault_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParamete
     status = now.status
     if status is None:
         return []
-    figures = f'{status.coil_temperature_celsius:.1f} degC, {status.supply_voltage:.2f} V'
     found: Findings = []
-    serious = [fault for fault in status.faults if fault in _SERIOUS_FAULTS]
-    if serious:
-        found.append((Level.ERROR, f'the electronics report {", ".join(serious)} ({figures})'))
     if now.setpoint_errors > earlier.setpoint_errors:
         text = 'the electronics report setpoint frames that were damaged, repeated or of wrong sequence'
         found.append((Level.WARN, f'{text}; they do not use them: check the bus, does another node send?'))
@@ -178,6 +185,9 @@ def _quality_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParame
         found.append((Level.WARN, f'{text}; check the displacement sensor'))
     if now.restarts > earlier.restarts:
         found.append((Level.WARN, 'the electronics have restarted; activate the graph again'))
+    if now.gaps > earlier.gaps:
+        text = 'the electronics sent no samples for more than 1 s'
+        found.append((Level.WARN, f'{text}; check their supply and the bus, activate the graph again'))
     repeated, disordered = now.repeated - earlier.repeated, now.wrong_sequence - earlier.wrong_sequence
     if repeated or disordered:
         text = f'{repeated} frames repeated and {disordered} of wrong sequence in the last second, not used'
@@ -233,6 +243,8 @@ def _figures(now: Snapshot) -> dict[str, object]:
         'recoveries': now.recoveries,
         'error_frames': now.error_frames,
         'unreadable': now.unreadable,
+        'switched_off': bool(now.fault),
+        'fatal': bool(now.fault),  # a supervisor ends the graph: only a new initialisation helps
     }
     if now.status is not None:
         figures['supply_voltage'] = now.status.supply_voltage

@@ -15,10 +15,12 @@ import can
 from mount_driver.bus import CanLinkError, Reception, may_have_frames, open_bus
 from mount_driver.clock import Clock
 from mount_driver.codec import MountCodec, Setpoint
+from mount_driver.coil_watch import CoilWatch
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.frame import Frame
 from mount_driver.link import Arrival, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
+from mount_driver.status_watch import StatusWatch
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
 _REOPEN_PERIOD = 0.2  # s, chosen
@@ -66,6 +68,8 @@ class Exchange:
         self._temperature_stamp: int | None = None  # of the temperature told last
         self._clock = clock
         self._steady = steady
+        self._coil = CoilWatch(parameters.coil)
+        self._health = StatusWatch(parameters.status)
         self._ids = (codec.measurement.frame_id, codec.status.frame_id)
         self._bus: can.BusABC | None = None
         self._alive = AliveCounter()
@@ -169,18 +173,33 @@ class Exchange:
         if stamped is not None:
             self.bus_off = False
             self.last_received = received
+            self._watch_coil(stamped, received)
             self._on_sample(stamped)
         elif self.link.arrival is Arrival.RESENT:
             self._answer_again()
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
+        if status is not None:
+            self._switch_off(self._health.judge(status, self._now()))
         if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
             return
         # The frame has no time of its own. A second one without a sample between has none at all.
         if latest.stamp != self._temperature_stamp:
             self._temperature_stamp = latest.stamp
             self._on_temperature(latest.stamp, status.coil_temperature_celsius)
+
+    def _watch_coil(self, stamped: Stamped, received: int) -> None:
+        sample, now = stamped.sample, self._clock.now(received)
+        self.link.held = self._health.hold(now)
+        taken = self._clock.taken(received)
+        self._switch_off(self._coil.judge(sample.coil_current, sample.enabled, taken, now))
+
+    def _switch_off(self, fault: str) -> None:
+        """Send 0 A and let no setpoint pass any more if there is a first fault."""
+        if fault and not self.link.fault:
+            with self._sending:
+                self._send(self.link.switch_off(fault))
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
@@ -206,6 +225,7 @@ class Exchange:
             self.unsent_reason = self.trouble
             return False
         try:
+            self._coil.note_sent(setpoint.current, self._now())
             self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
             bus.send(self._frame)
         except Exception as error:

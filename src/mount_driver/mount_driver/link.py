@@ -13,11 +13,14 @@ from typing import NamedTuple
 from mount_driver.clock import Clock
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import E2EReceiver, Outcome
+from mount_models.sampling import SAMPLE_TIME_NS
 
 _REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 20 ms are refused anyway
 _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFF_FFFF
-_LATE_US = 1_000_000  # chosen: a sample that is older than this is no late one but a restart
+_LATE_US = 1_000_000  # chosen: beyond it a step of the clock back is a restart, forward a pause
+_SAMPLE_TIME_US = SAMPLE_TIME_NS // 1000
+_SLACK = 2  # samples, chosen: more may have been taken in a time than fit in by the clock's steps
 
 
 class Arrival(IntEnum):
@@ -41,6 +44,7 @@ class Refusal(Enum):
     NOT_LOWER = 'its sample is already answered, and an answer may only be lowered'
     MALFORMED = 'the message lacks the coil current'
     BUS_LOST = 'the CAN bus is not there'
+    SWITCHED_OFF = 'a fault keeps the coil at 0 A until mount_driver is activated again'
 
 
 class Stamped(NamedTuple):
@@ -69,6 +73,10 @@ class Link:
         self.setpoint_errors = 0
         """Statuses that report setpoint frames which failed their check."""
 
+        self.fault = ''
+        """Why the coil is off for as long as this link lasts; empty while it may be on."""
+        self.held = ''
+        """Why every answer is lowered to 0 A at present; empty while none is."""
         self.setpoints = 0
         """Setpoints that were let through."""
         self.limited = 0
@@ -135,6 +143,8 @@ class Link:
         if current > self._highest_current:
             self.limited += 1
             current = self._highest_current
+        if self.held:
+            current = 0.0
         self.setpoints += 1
         self._answered_stamp = stamp
         self._off_at = arrival + self._timeout
@@ -145,6 +155,11 @@ class Link:
         """Count a setpoint that is not sent."""
         self.refusals[reason] += 1
         self.last_refusal = reason
+
+    def switch_off(self, fault: str) -> Setpoint:
+        """Refuse all setpoints from now on; return the one that switches the coil off."""
+        self.fault = fault
+        return self.off()
 
     def answer_again(self, sample_counter: int, now: int) -> Setpoint | None:
         """Return the last setpoint if it holds and answered this sample: the electronics did not get it."""
@@ -181,6 +196,8 @@ class Link:
         return self._last_setpoint.enable
 
     def _objection(self, stamp: int, current: float, age: int) -> Refusal | None:
+        if self.fault:
+            return Refusal.SWITCHED_OFF
         if current != current:
             return Refusal.NOT_A_NUMBER
         if current < 0.0:
@@ -210,6 +227,8 @@ class Link:
         back_us = _MICROSECOND_MASK + 1 - step_us
         if back_us < _LATE_US and _COUNTER_MASK + 1 - step <= _REMEMBERED:
             return Arrival.LATE
-        if step > 1 and step_us <= _MICROSECOND_MASK // 2:  # else a restart, whose counters say nothing
+        # Behind a restart or a pause the counters say nothing: the clock counts it, once. Nor were more
+        # samples taken than there was time for.
+        if step > 1 and (step - _SLACK) * _SAMPLE_TIME_US <= step_us < _LATE_US:
             self.lost += step - 1
         return Arrival.NEW

@@ -17,6 +17,8 @@ from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
 
+_BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
+
 
 class MountDriver(SafeLifecycleNode):
     """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
@@ -29,6 +31,7 @@ class MountDriver(SafeLifecycleNode):
         self._exchange: Exchange | None = None
         self._watch = LinkWatch()
         self._started_ns = 0
+        self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
         self._ripple_layout = ScalarsLayout(COIL_RIPPLE)
         self._temperature_layout = temperature_layout()
@@ -47,6 +50,7 @@ class MountDriver(SafeLifecycleNode):
 
     def activate(self) -> None:
         assert self._codec is not None
+        self.ending.wait(max(0.0, self._not_before - time.monotonic()))
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
@@ -69,6 +73,8 @@ class MountDriver(SafeLifecycleNode):
                 self._path.leave_work()
             finally:
                 exchange.stop()
+                if exchange.link.fault:
+                    self._not_before = time.monotonic() + _BREAK
 
     def cleanup(self) -> None:
         self._codec = None

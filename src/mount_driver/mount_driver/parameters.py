@@ -3,6 +3,8 @@
 from typing import Annotated, NamedTuple
 
 from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
+from mount_driver.coil_watch import CoilWatchParameters
+from mount_driver.status_watch import StatusLimits
 from mount_models.quantity import Quantity
 from mount_models.sampling import SETPOINT_TIMEOUT
 
@@ -42,3 +44,5 @@ class DriverParameters(NamedTuple):
     temperature_warning_celsius: Annotated[
         float, Quantity('degC', 'coil temperature that is warned of', -60.0, 250.0)
     ] = 120.0
+    coil: CoilWatchParameters = CoilWatchParameters()
+    status: StatusLimits = StatusLimits()

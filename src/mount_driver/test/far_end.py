@@ -17,7 +17,7 @@ def sample(index: int, **changes) -> Measurement:
     """Return sample number `index`, taken at `index` ms."""
     values = {
         'displacement': 1e-6 * (index % 1000),
-        'coil_current': 0.5,
+        'coil_current': 0.0,
         'current_rate': 250.0,
         'flux_rate': 80.0,
     }
@@ -63,12 +63,14 @@ class FarEnd:
         return self.bus.recv(seconds) is None
 
     def stream(self, first: int = 0) -> None:
-        """Send samples at about 1 kHz in a thread until `close`."""
+        """Send samples of a coil at 0 A, at about 1 kHz in a thread, and statuses at 10 Hz, until `close`."""
 
         def send_all():
             index, begin = first, time.monotonic()
             while not self._streaming.wait(max(0.0, begin + (index - first) * 1e-3 - time.monotonic())):
                 self.send(sample(index))
+                if index % 100 == 0:
+                    self.send_status(Status(14.0, 20.0))
                 index += 1
 
         self._thread = threading.Thread(target=send_all, daemon=True)

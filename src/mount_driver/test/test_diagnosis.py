@@ -35,13 +35,19 @@ def test_a_sound_link_is_ok_with_its_figures():
         ({'bus_off': True}, Level.ERROR, 'socketcan can0 is bus off'),
         ({'frame_age': 0.15}, Level.ERROR, 'no frames .* more than 100 ms; .*powered, is socketcan can0 up'),
         ({'frame_age': 7.6}, Level.ERROR, 'no frames from the electronics for 7 s'),
-        ({'status': Status(13.8, 150.0, over_temperature=True)}, Level.ERROR, r'over_temperature \(150'),
-        ({'status': Status(8.9, 40.0, under_voltage=True)}, Level.ERROR, r'under_voltage .*8\.90 V'),
+        (
+            {'fault': 'too hot'},
+            Level.ERROR,
+            'switched off: too hot, then activate mount_driver, mount_init',
+        ),
+        ({'held': 'no sensor'}, Level.ERROR, 'coil at 0 A while this lasts: no sensor'),
+        ({'fault': 'too hot', 'refused': 9, 'frame_age': 9.0, 'driving': False}, Level.ERROR, 'too hot'),
         ({'setpoint_errors': 1}, Level.WARN, 'damaged, repeated or of wrong sequence; they do not use'),
         ({'status': Status(13.8, 120.1)}, Level.WARN, r'120\.1 degC\) is above 120 degC; lower'),
         ({'lost': 2}, Level.WARN, r'2 samples lost and 0 frames corrupt .*0\.20 %, limit 0\.1 %'),
         ({'corrupt': 5}, Level.WARN, '0 samples lost and 5 frames corrupt'),
         ({'invalid_displacements': 3}, Level.WARN, 'not valid in 3 samples'),
+        ({'gaps': 1}, Level.WARN, 'no samples for more than 1 s; check their supply .* activate the graph'),
         ({'restarts': 1}, Level.WARN, 'have restarted'),
         ({'repeated': 7}, Level.WARN, '7 frames repeated and 0 of wrong sequence'),
         ({'wrong_sequence': 1}, Level.WARN, '1 of wrong sequence .* not used; did the electronics restart'),
@@ -65,6 +71,13 @@ def test_a_finding_has_its_level_and_sentence(changes, level, sentence):
 @pytest.mark.parametrize('changes', [{'lost': 1}, {'frame_age': 0.09}, {'status': Status(13.8, 119.9)}])
 def test_what_lies_within_the_limits_is_ok(changes):
     assert verdict(**changes).level == Level.OK
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_a_fault_of_the_coil_ends_a_supervised_run(lockstep):
+    figures = verdict(fault='too hot', lockstep=lockstep).figures
+    assert (figures['switched_off'], figures['fatal']) == (True, True)
+    assert not verdict(lockstep=True).figures['fatal']
 
 
 def test_setpoints_that_do_not_reach_the_electronics_are_noticed():

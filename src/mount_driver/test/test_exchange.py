@@ -161,9 +161,9 @@ def test_when_setpoints_stop_0_ampere_is_sent_while_samples_go_on(make, samples)
     exchange, far = make(lockstep=False)
     far.stream()
     samples.wait_for(1)
-    wait_until(lambda: exchange.send_setpoint(samples[-1][0], 2.0), 'a setpoint in time')
+    wait_until(lambda: exchange.send_setpoint(samples[-1][0], 0.05), 'a setpoint in time')
     answered = far.setpoint_where(lambda setpoint: setpoint.enable)
-    assert answered.current == 2.0
+    assert answered.current == 0.05
     off = far.setpoint_where(lambda setpoint: not setpoint.enable)
     assert (off.current, off.answered_counter) == (0.0, answered.answered_counter)
     assert exchange.link.timeouts == 1

@@ -1,13 +1,14 @@
 """How long a current stands on the bus: time is told by the test, so no machine is too slow for it."""
 
 import itertools
+import re
 
 import pytest
 from far_end import CODEC, FarEnd, sample
 
 from mount_driver import exchange as exchange_module
 from mount_driver.clock import ElectronicsClock
-from mount_driver.codec import Setpoint
+from mount_driver.codec import Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.exchange import Exchange
 from mount_driver.frame import Frame
@@ -53,7 +54,9 @@ class Car:
             self.now -= 1
 
     def send_sample(self, index):
-        self.far.send(sample(index))
+        self.far.send(sample(index, coil_current=self.on_bus().current if self.sent else 0.0))
+        if index % 100 == 0:
+            self.far.send_status(Status(14.0, 20.0))
 
     def answer(self):
         """Answer the newest sample with 3 A."""
@@ -152,6 +155,73 @@ def test_a_node_that_comes_to_itself_is_obeyed_again(car):
     assert not car.on_bus().enable
     car.drive(1, car.answer)
     assert car.on_bus() == Setpoint(3.0, GOOD + 101, True)
+
+
+def stuck(car):
+    """Electronics whose coil carries 3 A, whatever is wanted."""
+    return lambda index: car.far.send(sample(index, coil_current=3.0))
+
+
+def test_a_coil_that_does_not_follow_is_switched_off_in_time_and_stays_so(car):
+    """The setpoint falls from 3 A to 1 A: 14 ms for the slowest coil and the way, 20 ms of deviation."""
+    car.drive(3000, lambda: car.exchange.send_setpoint(car.stamps[-1], 1.0), electronics=stuck(car))
+    last = [time for time, setpoint in car.sent if setpoint.enable][-1]
+    assert GOOD + 20 <= last // MS <= GOOD + 40
+    assert {setpoint for time, setpoint in car.sent if time > last} == {
+        Setpoint(0.0, car.on_bus().answered_counter, False)
+    }
+    assert car.exchange.link.last_refusal is Refusal.SWITCHED_OFF
+    told = r'coil current \(3\.000 A\) must lie within .* it has not for 20 ms: check coil'
+    assert re.match(told, car.exchange.link.fault)
+
+
+def test_a_coil_that_comes_to_itself_stays_off(car):
+    car.drive(100, lambda: car.exchange.send_setpoint(car.stamps[-1], 1.0), electronics=stuck(car))
+    fault = car.exchange.link.fault
+    car.drive(3000, car.answer)
+    assert car.on_bus() == Setpoint(0.0, car.on_bus().answered_counter, False)
+    assert car.exchange.link.fault == fault != ''
+
+
+def test_an_answer_sent_again_does_not_outlast_the_fault(car):
+    car.drive(100, lambda: car.exchange.send_setpoint(car.stamps[-1], 1.0), electronics=stuck(car))
+    before = len(car.sent)
+    car.drive(15, nothing, electronics=lambda _: car.far.send(sample(GOOD + 100, coil_current=3.0)))
+    assert not any(setpoint.enable for _, setpoint in car.sent[before:])
+
+
+@pytest.mark.parametrize('bit', ['over_current', 'over_temperature', 'under_voltage'])
+def test_a_fault_that_the_electronics_report_switches_off_at_once_and_for_good(car, bit):
+    car.far.send_status(Status(14.0, 20.0, **{bit: True}))
+    car.drive(1000, car.answer)
+    assert car.went_off() == MS
+    assert bit in car.exchange.link.fault
+
+
+@pytest.mark.parametrize('status', [Status(5.0, 20.0), Status(24.0, 20.0), Status(14.0, 250.0)])
+def test_a_value_beyond_its_limit_does_so_too(car, status):
+    car.far.send_status(status)
+    car.drive(1000, car.answer)
+    assert car.went_off() == MS
+
+
+def test_a_displacement_sensor_at_fault_gives_0_ampere_until_it_is_well(car):
+    car.far.send_status(Status(14.0, 20.0, displacement_sensor=True))
+    car.drive(99, car.answer)
+    assert {setpoint.current for _, setpoint in car.sent[GOOD + 1 :]} == {0.0}
+    car.drive(2, car.answer)  # with a sound status
+    assert car.on_bus().current == 3.0
+
+
+def test_without_a_status_for_1_s_there_are_0_ampere(car):
+    def measuring_alone(index):
+        car.far.send(sample(index, coil_current=car.on_bus().current))
+
+    car.drive(1000, car.answer, electronics=measuring_alone)
+    assert car.on_bus().current == 3.0
+    car.drive(3, car.answer, electronics=measuring_alone)
+    assert car.on_bus().current == 0.0
+    assert 'no status' in car.exchange.link.held
 
 
 class SilentBus:

@@ -97,6 +97,24 @@ def test_a_restart_of_the_electronics_loses_nothing_and_goes_on(link):
     assert link.lost == 0
 
 
+@pytest.mark.parametrize(
+    ('before', 'after'),
+    [
+        (2**31 // 1000 + 30_000, 5),  # after 36 min: half the counter's range and more
+        (65_000, 65_400),  # of other numbers, soon after
+        (1_000, 371_345),  # a pause of 370 s
+    ],
+)
+def test_a_restart_or_a_pause_is_counted_once_and_not_as_lost_samples(link, before, after):
+    feed(link, range(before, before + 10))
+    counter = (after + 40_000) % 65536 if after == 65_400 else after
+    for alive in range(10, 20):
+        number = after + alive
+        link.take(frame(number, alive, sample_counter=(counter + alive) % 65536), number * MS)
+    assert link.lost == 0
+    assert link.clock.restarts + link.clock.gaps == (after != 65_400)
+
+
 def test_a_corrupt_frame_is_counted_and_not_handed_on(link):
     data = frame(0, 0)
     data[12] ^= 4

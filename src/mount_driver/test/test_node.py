@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_driver.codec import Setpoint, Status
-from mount_driver.link import Arrival
+from mount_driver.link import Arrival, Refusal
 from mount_driver.node import MountDriver
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
@@ -172,14 +172,34 @@ def test_when_setpoints_stop_the_0_ampere_frame_is_sent(active, controller, far)
     controller.wait_for(1)
 
     def accepted():
-        controller.setpoint(controller.received[DISPLACEMENT][-1][0], 1.5)
+        controller.setpoint(controller.received[DISPLACEMENT][-1][0], 0.05)
         return driver._exchange.link.setpoints > 0
 
     wait_until(accepted, 'an accepted setpoint')
-    assert far.setpoint_where(lambda setpoint: setpoint.enable).current == 1.5
+    assert far.setpoint_where(lambda setpoint: setpoint.enable).current == 0.05
     off = far.setpoint_where(lambda setpoint: not setpoint.enable)
     assert off.current == 0.0
     wait_until(lambda: 'no setpoint for 20 ms' in driver.judge().sentence, 'the verdict')
+
+
+def test_after_a_fault_of_the_coil_an_activation_leaves_the_hole_that_makes_the_old_table_invalid(
+    active, controller, far
+):
+    driver = active()
+    for index in range(120):
+        far.send(sample(index, coil_current=3.0))
+        controller.wait_for(index + 1)
+    wait_until(lambda: driver._exchange.link.fault, 'a fault')
+    verdict = driver.judge()
+    assert verdict.level == Level.ERROR
+    assert verdict.sentence.startswith('coil switched off: coil current (3.000 A)')
+    controller.setpoint(119 * MS, 1.0)
+    wait_until(lambda: driver._exchange.link.refusals[Refusal.SWITCHED_OFF], 'a refusal')
+    assert driver.trigger_deactivate() == SUCCESS
+    ended = time.monotonic()
+    assert driver.trigger_activate() == SUCCESS
+    assert time.monotonic() - ended > 1.0
+    assert driver._exchange.link.fault == ''
 
 
 def test_a_corrupt_frame_is_not_published_and_counted(active, controller, far):

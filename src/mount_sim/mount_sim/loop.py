@@ -116,16 +116,16 @@ class ElectronicsLoop:
         taken = self._valid(received, now)
         reading = self._fault.reading(now, mount.measure())
         frame = self._can_end.measurement_frame(
-            number, number * SAMPLE_TIME_NS // _NS, reading, mount.enabled
+            number, number * SAMPLE_TIME_NS // _NS, reading, mount.driver_on
         )
         arriving = self._fault.frame(now, number, frame)
         self._sent_at[number % _REMEMBERED] = time.time()
         if arriving is not None:
             self._can_end.send_frame(arriving)
         if number % STATUS_EVERY == 0:
-            self._can_end.send_status(self._status())
+            self._can_end.send_status(self._fault.status(now, self._status()))
         self._publish(number)
-        mount.advance(*taken)
+        mount.advance(*taken, lambda wanted: self._fault.driven(now, wanted))
         self.figures.samples += 1
 
     def _valid(self, received: ReceivedSetpoint | None, now: float) -> tuple[float | None, int]:

@@ -5,7 +5,7 @@ import math
 import can
 import pytest
 
-from mount_driver.codec import MountCodec
+from mount_driver.codec import MountCodec, Status
 from mount_models.quantity import ParameterError
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import Reading
@@ -104,3 +104,45 @@ def test_what_arrives_of_the_frames(frame, kind, arriving):
 def test_a_damaged_frame_still_arrives_and_a_lost_one_does_not(frame):
     assert _fault('wrong_crc').frame(2.25, 3, frame(3)) is not None
     assert _fault('lost_frames').frame(2.25, 3, frame(3)) is None
+
+
+@pytest.mark.parametrize(
+    ('kind', 'carried'),
+    [
+        ('none', [1.0, 1.0, 2.0, 0.0, 1.0]),
+        ('over_current', [1.0, 1.0, 2.0, 0.0, 1.0]),
+        ('coil_open', [1.0, 0.0, 0.0, 0.0, 1.0]),
+        ('coil_half', [1.0, 0.5, 1.0, 0.0, 1.0]),
+        ('coil_stuck', [1.0, 3.0, 3.0, 3.0, 1.0]),
+        ('coil_stuck_on', [1.0, 1.0, 1.0, 1.0, 1.0]),
+    ],
+)
+def test_what_the_coil_carries(kind, carried):
+    fault = _fault(kind)
+    wanted = (1.0, 1.0, 2.0, 0.0, 1.0)
+    assert [fault.driven(time, current) for time, current in zip(TIMES, wanted, strict=True)] == carried
+
+
+def test_a_stuck_coil_carries_what_it_is_told_to():
+    assert Fault(FaultParameters('coil_stuck', BEGIN, DURATION, 0.75)).driven(BEGIN, 2.0) == 0.75
+
+
+@pytest.mark.parametrize(
+    ('kind', 'told'),
+    [
+        ('none', {}),
+        ('coil_open', {}),
+        ('over_current', {'over_current': True}),
+        ('over_temperature', {'over_temperature': True}),
+        ('under_voltage', {'under_voltage': True}),
+        ('displacement_sensor', {'displacement_sensor': True}),
+        ('hot_coil', {'coil_temperature_celsius': 250.0}),
+        ('low_supply', {'supply_voltage': 5.0}),
+        ('high_supply', {'supply_voltage': 24.0}),
+    ],
+)
+def test_what_the_status_says(kind, told):
+    sound = Status(14.0, 20.0, e2e_error=True)
+    faulty = sound._replace(**told)
+    said = [_fault(kind).status(time, sound) for time in TIMES]
+    assert said == [faulty if present else sound for present in PRESENT]

@@ -71,6 +71,25 @@ def test_without_setpoints_the_electronics_go_to_0_ampere_on_their_own(make_moun
     assert enabled == [number < last + 1 + samples for number in range(300)]
 
 
+def test_a_driver_that_opens_says_that_it_is_off(make_mount):
+    mount = make_mount(mount='friction_off', timeline__start=0.05)
+    on = []
+    while mount.sample < mount.run.excitation_start + 3:
+        mount.measure()
+        on.append(mount.driver_on)
+        assert mount.enabled
+        mount.advance(0.0)
+    assert on == [True] * 50 + [False] * 3
+
+
+def test_a_faulty_driver_gives_what_it_likes(make_mount):
+    mount = make_mount()
+    for _ in range(100):
+        mount.advance(1.0, driven=lambda wanted: 0.5 * wanted)
+    mount.measure()
+    assert mount.truth['coil_current'] == pytest.approx(0.5, abs=1e-3)
+
+
 def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
     mount, currents = make_mount(), []
     for number in range(60):

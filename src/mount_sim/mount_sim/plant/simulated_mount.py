@@ -1,6 +1,7 @@
 """Electronics and plant together, sample by sample, without bus or clock."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -93,8 +94,13 @@ class SimulatedMount:
 
     @property
     def enabled(self) -> bool:
-        """Whether the coil driver is on: setpoints come in time."""
+        """Whether setpoints come in time."""
         return self._silent < self.patience
+
+    @property
+    def driver_on(self) -> bool:
+        """Whether the coil's driver gives what is wanted: setpoints come in time, and it is not open."""
+        return self.enabled and not self._driver_open
 
     @property
     def truth(self) -> np.void:
@@ -113,17 +119,21 @@ class SimulatedMount:
             self._doubt(reading.displacement)
         return reading
 
-    def advance(self, setpoint: float | None, late: int = 0) -> None:
+    def advance(
+        self, setpoint: float | None, late: int = 0, driven: Callable[[float], float] | None = None
+    ) -> None:
         """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
 
-        `late` is the number of samples since it was due. Behind the end of the run nothing shakes the mount
-        any more.
+        `late` is the number of samples since it was due; `driven` returns what a faulty driver gives where a
+        current (A) is wanted. Behind the end of the run nothing shakes the mount any more.
         """
         if setpoint is None:
             self._silent += 1
         else:
             self._silent, self._current = late, setpoint
-        current = self._current if self.enabled and not self._driver_open else 0.0
+        current = self._current if self.driver_on else 0.0
+        if driven is not None:
+            current = driven(current)
         values, forces = self._shaking.at(self.sample)
         self._plant.advance(values, forces, current)
         self.sample += 1

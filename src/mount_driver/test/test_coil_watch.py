@@ -1,0 +1,178 @@
+"""The coil's current is believed where the loop can have brought it, and doubted in time where not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mount_driver.coil_watch import CoilWatch, CoilWatchParameters
+from mount_driver.quantisation import quantised_coil_current
+
+MS = 1_000_000
+LIMITS = CoilWatchParameters()
+SAMPLES = 2000
+TIME = np.arange(SAMPLES) * 1e-3
+DAMPING = np.where(TIME % 0.5 < 0.3, 0.47 + 0.56 * np.abs(np.sin(50.0 * TIME)), 0.0)  # on and off
+
+
+def in_time(k):
+    """Samples arrive when they are taken."""
+    return k * MS
+
+
+def watched(
+    setpoints,
+    carried,
+    *,
+    limits=LIMITS,
+    enabled=lambda k: True,
+    way=0,
+    arrival=in_time,
+    catches_up=True,
+    missing=(),
+):
+    """Return (sample, sentence) of the first doubt, None if there is none.
+
+    `carried(k, current, wanted)` follows each setpoint from `way` samples after it was due. Samples that
+    arrive late waited for the driver, or `catches_up`: the electronics were late themselves and take up at
+    once what is sent meanwhile.
+    """
+    watch, current, noted = CoilWatch(limits), 0.0, [(0, 0.0)] * (way + 2)
+    for k, setpoint in enumerate(setpoints):
+        if k not in missing:
+            measured = current if math.isnan(current) else quantised_coil_current(current)
+            if sentence := watch.judge(measured, enabled(k), k * MS, arrival(k)):
+                return k, sentence
+        watch.note_sent(setpoint, arrival(k))
+        noted.append((arrival(k), setpoint))
+        known = [sent for time, sent in noted[-64 : -1 - way] if time <= k * MS or catches_up]
+        current = carried(k, current, known[-1])
+    return None
+
+
+def sound(_, current, wanted):
+    """A working coil: 400 Hz, and no faster than 14 V allow."""
+    return current + float(np.clip((1.0 - math.exp(-0.8 * math.pi)) * (wanted - current), -0.2, 0.13))
+
+
+def ideal(_, current, wanted):
+    """A coil without lag."""
+    return wanted
+
+
+def noise():
+    return np.random.default_rng(3).uniform(0.0, 3.0, SAMPLES)
+
+
+SETPOINTS = {
+    'damping': DAMPING,
+    'ramp': np.interp(TIME, [0.0, 1.0, 2.0], [0.0, 3.0, 0.0]),
+    'steps': np.where(TIME % 0.1 < 0.05, 3.0, 0.0),
+    'sine': 1.5 + 1.5 * np.sin(100.0 * TIME),
+    'noise': noise(),
+}
+
+
+@pytest.mark.parametrize('name', SETPOINTS)
+@pytest.mark.parametrize('coil', [sound, ideal])
+@pytest.mark.parametrize('way', [0, 1])
+def test_a_working_coil_is_not_doubted(name, coil, way):
+    assert watched(SETPOINTS[name], coil, way=way) is None
+
+
+def test_missing_samples_are_no_doubt():
+    random = np.random.default_rng(5)
+    assert watched(DAMPING, sound, missing=set(np.flatnonzero(random.uniform(size=SAMPLES) < 0.3))) is None
+
+
+@pytest.mark.parametrize('length', [5, 15, 40, 64])
+@pytest.mark.parametrize('catches_up', [True, False])
+@pytest.mark.parametrize('name', SETPOINTS)
+def test_samples_that_come_in_heaps_are_no_doubt(name, length, catches_up):
+    def arrival(k):
+        return (k + length - 1 - k % length) * MS + 20_000 * (k % length)
+
+    assert watched(SETPOINTS[name], sound, arrival=arrival, catches_up=catches_up) is None
+
+
+@pytest.mark.parametrize('name', SETPOINTS)
+def test_a_driver_that_is_always_30_ms_late_doubts_nothing(name):
+    assert watched(SETPOINTS[name], sound, arrival=lambda k: (k + 30) * MS, catches_up=False) is None
+
+
+STRICT = LIMITS._replace(duration=0.002)
+
+
+def slowest(_, current, wanted):
+    """A coil at the least supply."""
+    return current + float(np.clip(wanted - current, -0.15, 0.05))
+
+
+def test_the_bounds_move_no_faster_than_the_slowest_coil():
+    assert watched(SETPOINTS['steps'], slowest, limits=STRICT) is None
+
+
+def test_electronics_that_had_gone_to_0_ampere_in_a_pause_may_rise_from_there():
+    def after_a_pause(k, current, wanted):
+        return 0.0 if 500 <= k < 529 else slowest(k, current, wanted)
+
+    assert watched(np.full(SAMPLES, 1.0), after_a_pause, limits=STRICT, missing=range(500, 530)) is None
+
+
+FAULTS = {
+    'open': lambda k, current, wanted: 0.0 if k > 1000 else sound(k, current, wanted),
+    'too little': lambda k, current, wanted: min(sound(k, current, wanted), 0.39 if k > 1000 else 9.0),
+    'half': lambda k, current, wanted: 0.5 * wanted if k > 1000 else sound(k, current, wanted),
+    'stuck at 3 A': lambda k, current, wanted: 3.0 if k > 1000 else sound(k, current, wanted),
+    'not valid': lambda k, current, wanted: math.nan if k > 1000 else wanted,
+    'frozen': lambda k, current, wanted: current if k > 1000 else sound(k, current, wanted),
+}
+
+
+@pytest.mark.parametrize('fault', FAULTS)
+def test_a_coil_that_does_not_follow_is_doubted(fault):
+    """Within its duration and, where the setpoint itself must first leave the bounds, a swing of 63 ms."""
+    sample, sentence = watched(DAMPING, FAULTS[fault])
+    assert 1000 + 20 <= sample <= 1000 + 20 + 63
+    assert 'must lie within' in sentence
+    assert '0.1 A about its setpoint; it has not for' in sentence
+    assert 'check coil, cable and power stage' in sentence
+
+
+@pytest.mark.parametrize('enabled', [True, False])
+def test_a_current_that_flows_at_0_ampere_is_doubted_whether_or_not_the_electronics_say_to_be_on(enabled):
+    stuck_on = watched(
+        np.where(TIME < 1.0, 1.0, 0.0),
+        lambda k, current, wanted: 1.0 if k > 900 else sound(k, current, wanted),
+        enabled=lambda k: enabled or k < 1000,
+    )
+    assert 1020 <= stuck_on[0] <= 1040
+    assert stuck_on[1].startswith('coil current (1.000 A) must lie within 0.000 .. ')
+
+
+def test_electronics_that_say_to_be_off_and_carry_nothing_are_safe():
+    off = watched(np.full(SAMPLES, 1.0), lambda k, current, wanted: 0.0, enabled=lambda k: False)
+    assert off is None
+
+
+def test_a_current_that_nobody_sent_is_doubted():
+    assert watched(np.zeros(SAMPLES), lambda k, current, wanted: 3.0)[0] <= 41
+
+
+def test_a_current_that_is_not_valid_at_0_ampere_is_no_doubt():
+    assert watched(np.zeros(SAMPLES), lambda k, current, wanted: math.nan) is None
+
+
+def test_a_deviation_shorter_than_the_duration_is_no_doubt():
+    glitches = watched(DAMPING, lambda k, current, wanted: 3.0 if k % 40 < 15 else wanted)
+    assert glitches is None
+
+
+def test_a_sample_time_that_stands_still_hides_nothing_for_long():
+    watch = CoilWatch(LIMITS)
+    sentences = []
+    for k in range(0, 300, 5):
+        sentences.append(watch.judge(3.0, True, 0, k * MS))
+        watch.note_sent(3.0 if k < 10 else 0.0, k * MS)
+    assert not any(sentences[:10])
+    assert all(sentences[24:])
