@@ -147,7 +147,7 @@ class _Composition:
             raise _refused(event, f'a number of {len(event.value)} characters; at most {_LONGEST_NUMBER}')
         try:
             value = _LOADER.yaml_constructors[tag](self._loader, yaml.ScalarNode(tag, event.value))
-        except (ValueError, KeyError, AttributeError) as error:  # a date that is none; `!!int x`, `!!bool x`
+        except (ValueError, LookupError) as error:  # a date that is none; `!!int x`, `!!int ''`
             raise _refused(event, f'{_told(event.value)} is no value ({error}); put it in quotes') from error
         if isinstance(value, int) and not -_WHOLE_NUMBERS <= value < _WHOLE_NUMBERS:
             raise _refused(event, f'{_told(event.value)} does not fit into 64 bits; write 1.0e+30 for 1e30')

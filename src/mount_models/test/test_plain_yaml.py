@@ -48,6 +48,7 @@ REFUSED = {
     'a tag of Python': ('!!python/object/apply:os.getcwd []', 'not known here'),
     'a set': ('!!set {a, b}', 'not known here'),
     'a wrong tag': ('!!int x', "'x' is no value"),
+    'a tag of nothing': ("!!int ''", "'' is no value"),
     'several documents': ('a: 1\n---\nb: 2\n', 'has 2 documents; leave the first alone'),
     'an open bracket': ('a: [1, 2\nb: 3\n', 'is not valid YAML in line 2: did not find expected'),
     'a control character': ('a: \0', 'is not valid YAML: .*control characters'),

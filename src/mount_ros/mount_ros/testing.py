@@ -9,6 +9,7 @@ tests of a process live in one context, one after the other.
 import contextlib
 import fcntl
 import os
+import random
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -47,6 +48,29 @@ def free_domain() -> Iterator[int]:
             os.close(handle)
         return
     raise OSError(f'all {_HIGHEST_DOMAIN} ROS domains are held by other tests')
+
+
+def mutated(content: bytes, seed: int) -> bytes:
+    """Return `content` with one to five bits, bytes or stretches changed, moved or cut, as `seed` decides."""
+    draw = random.Random(seed)
+    made = bytearray(content)
+    for _ in range(draw.choice((1, 1, 1, 2, 5))):
+        first, other, length = draw.randrange(len(made)), draw.randrange(len(made)), draw.randrange(1, 100)
+        match draw.randrange(7):
+            case 0 | 1:
+                made[first] ^= 1 << draw.randrange(8)
+            case 2:
+                made[first] = draw.randrange(256)
+            case 3:
+                made[first], made[other] = made[other], made[first]
+            case 4:
+                made[first : first + length] = made[other : other + length]
+            case 5:
+                made[first : first + 8] = draw.choice((bytes(8), b'\xff' * 8, bytes(7) + b'\x80'))
+            case 6:
+                del made[first : draw.choice((first + length, len(made)))]
+        made = made or bytearray(1)
+    return bytes(made)
 
 
 def wait_until(condition: Callable[[], Found], what: str, limit: float = LIMIT) -> Found:

@@ -29,7 +29,8 @@ def setpoint_latency(stamps: Times, receive_times: Times) -> Latency | None:
     if stamps.size < 2:
         return None
     latencies = receive_times - stamps
-    stamped, received = int(stamps.max() - stamps.min()), int(receive_times.max() - receive_times.min())
+    stamped = int(stamps.max()) - int(stamps.min())
+    received = int(receive_times.max()) - int(receive_times.min())
     if np.abs(np.median(latencies)) > _SAME_CLOCK:
         return None
     if stamped > 1_000_000_000 and abs(received / stamped - 1.0) > _SAME_PACE:

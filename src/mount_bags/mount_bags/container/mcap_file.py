@@ -101,8 +101,9 @@ class McapFile:
 
     @property
     def damaged(self) -> bool:
-        """Whether messages are known to be lost inside of it, not only at a cut-off end."""
-        return bool(self.undeclared) or any(chunk.damaged for chunk in self.chunks)
+        """Whether messages are known to be lost or may be wrong inside of it, not only at a cut-off end."""
+        doubtful = self._data_proof is Proof.WRONG and self._unprotected
+        return doubtful or bool(self.undeclared) or any(chunk.damaged for chunk in self.chunks)
 
     def message_counts(self) -> dict[int, int]:
         """Return the number of messages by topic: as written where that is proven, else as readable."""
@@ -150,10 +151,17 @@ class McapFile:
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
         if self._data_proof is None:
-            self._data_proof = data_proof(self._data, self._summary)
+            end = self._summary.begin if self.proven else self._data_end
+            self._data_proof = data_proof(self._data, end)
             if self._data_proof is Proof.WRONG:
-                self._warn('the checksum of its data section is wrong: some byte of the file is damaged')
+                values = ', and numbers in it may be wrong' if self._unprotected else ''
+                self._warn(f'the checksum of its data section is wrong: some byte is damaged{values}')
         return self._data_proof
+
+    @property
+    def _unprotected(self) -> bool:
+        """Whether it has messages that no checksum of a chunk covers."""
+        return bool(self._loose) or any(chunk.size and not chunk.crc for chunk in self.chunks)
 
     # A file with a sound summary.
 

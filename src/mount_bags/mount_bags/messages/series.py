@@ -114,7 +114,7 @@ class Series:
         layout, rows = self.layout, self.payloads.rows
         if layout is None or rows is None:
             return np.array([self._stamp(message) for message in self._decoded], np.int64)
-        if _SECONDS not in layout.numbers:
+        if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
             raise self._without_stamp()
         seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
         return seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows)
@@ -252,7 +252,9 @@ class Series:
             return np.empty(0)
         if layout is None or rows is None:
             return np.array([_joint_number(message, name, part) for message in self._decoded])
-        numbers = layout.numbers[part]
+        numbers = layout.numbers.get(part)
+        if numbers is None:
+            raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}')
         if numbers.count != len(self.names):
             return np.full(len(self), math.nan)
         return numbers.column(rows, self.names.index(name))

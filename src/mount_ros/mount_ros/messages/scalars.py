@@ -37,8 +37,11 @@ class ScalarsError(ValueError):
 
 
 def stamp_of(raw: bytes) -> int:
-    """Return the header stamp of any serialised stamped message, ns."""
-    seconds, nanoseconds = _STAMP.unpack_from(raw, _STAMP_OFFSET)
+    """Return the header stamp of any serialised stamped message, ns; raises `ScalarsError` if it is cut."""
+    try:
+        seconds, nanoseconds = _STAMP.unpack_from(raw, _STAMP_OFFSET)
+    except struct.error:
+        raise ScalarsError(f'a message of {len(raw)} bytes has no stamp') from None
     return seconds * _NANOSECONDS + nanoseconds
 
 
@@ -97,7 +100,7 @@ class ScalarsLayout:
         return stamp_of(raw), positions, velocities
 
     def _unpack_foreign(self, raw: bytes) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
-        message = deserialize_message(raw, JointState)
+        message = _decoded(raw)
         missing = [name for name in self.names if name not in message.name]
         if missing or len(message.position) != len(message.name):
             raise ScalarsError(
@@ -135,7 +138,7 @@ class ScalarsReader:
         return stamp_of(raw), numbers
 
     def _learn(self, raw: bytes) -> None:
-        message = deserialize_message(raw, JointState)
+        message = _decoded(raw)
         names = list(message.name)
         if len(message.position) != len(names):
             raise ScalarsError(f'a message with {len(names)} names has {len(message.position)} positions')
@@ -172,6 +175,13 @@ class OneNumberLayout:
         rows = _stamped_rows(self._template, stamps)
         _put_numbers(rows, self._offset, np.reshape(numbers, (-1, 1)))
         return rows
+
+
+def _decoded(raw: bytes) -> JointState:
+    try:
+        return deserialize_message(raw, JointState)
+    except (RuntimeError, ValueError) as error:  # of the middleware; of a name that is no UTF-8
+        raise ScalarsError(f'a message of {len(raw)} bytes is no JointState ({error})') from None
 
 
 def _stamped_rows(template: bytearray, stamps: NDArray[np.int64]) -> Rows:

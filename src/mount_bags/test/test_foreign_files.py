@@ -1,0 +1,128 @@
+"""A file of a recording with any bytes changed: no value that was not written passes for sound.
+
+What a checksum covers is read as it was written or not at all. A value under none may be wrong; where the
+file as a whole has a checksum, the recording is then not whole, which is an error of the audit.
+"""
+
+import contextlib
+import shutil
+from collections import Counter
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from recorded_drive import write_drive
+from test_other_storages import written
+
+import mount_bags
+from mount_bags import ReadingError
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import losses
+from mount_bags.bag.metadata import MetadataError, read_metadata
+from mount_bags.messages.series import SeriesError
+from mount_ros.testing import mutated
+
+SEEDS = st.integers(0, 1 << 62)
+ONE_FILE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+WRITERS = {
+    'chunks with checksums': {},
+    'chunks without': {'enable_crcs': False, 'enable_data_crcs': True, 'compression': CompressionType.NONE},
+    'no chunks': {'use_chunking': False, 'enable_data_crcs': True},
+    'no summary': {'use_statistics': False, 'repeat_channels': False, 'repeat_schemas': False},
+}
+
+
+def rewritten(source, target, options):
+    """Write the messages of one MCAP file as another program does."""
+    with source.open('rb') as old, target.open('wb') as new:
+        writer = Writer(new, chunk_size=2500, **options)
+        writer.start('ros2', 'another')
+        numbers = {}
+        for schema, channel, message in make_reader(old).iter_messages():
+            if channel.topic not in numbers:
+                known = writer.register_schema(schema.name, schema.encoding, schema.data)
+                numbers[channel.topic] = writer.register_channel(
+                    channel.topic, channel.message_encoding, known, channel.metadata
+                )
+            number = numbers[channel.topic]
+            times = message.log_time, message.publish_time, message.sequence
+            writer.add_message(number, times[0], message.data, *times[1:])
+        writer.finish()
+
+
+@pytest.fixture(scope='module', params=['ours', *WRITERS])
+def intact(request, tmp_path_factory):
+    """Return the file of a recording and its content, by several writers."""
+    folder = write_drive(tmp_path_factory.mktemp('intact') / 'bag', 20, chunk_size=2500)
+    file = folder / 'bag_0.mcap'
+    if request.param != 'ours':
+        rewritten(file, folder / 'other.mcap', WRITERS[request.param])
+        (folder / 'other.mcap').replace(file)
+    return file, file.read_bytes(), contents(mount_bags.open(folder))
+
+
+def contents(recording):
+    """Return how often each message with its times and numbers is in a recording."""
+    found = Counter()
+    for name in recording:
+        series = recording[name]
+        numbers = [(0.0,)] * len(series)
+        with contextlib.suppress(SeriesError):
+            columns = [series[column] for column in series.names]
+            numbers = list(zip(series.stamps.tolist(), *columns, strict=True))
+        times = zip(series.receive_times.tolist(), series.publish_times.tolist(), strict=True)
+        for raw, time, row in zip(series.payloads, times, numbers, strict=True):
+            found[(name, bytes(raw), time, repr(row) if len(row) > 1 else '')] += 1
+    return found
+
+
+def judged(path):
+    """Return what is read of a recording and whether the audit finds it sound."""
+    recording = mount_bags.open(path)
+    found = contents(recording)
+    return found, losses(recording, audit(recording)).sound
+
+
+@ONE_FILE
+@given(SEEDS, st.booleans())
+def test_what_is_read_of_a_mutated_file_is_what_was_written_or_not_sound(intact, seed, alone):
+    file, content, original = intact
+    file.write_bytes(mutated(content, seed))
+    with contextlib.suppress(ReadingError):
+        found, sound = judged(file if alone else file.parent)
+        assert found <= original or not sound
+
+
+@pytest.fixture(scope='module')
+def database(tmp_path_factory):
+    """Return the file of a recording in sqlite3 and its bytes."""
+    file = written(tmp_path_factory.mktemp('database') / 'bag', 20) / 'bag.db3'
+    return file, file.read_bytes()
+
+
+@ONE_FILE
+@given(SEEDS, st.booleans())
+def test_a_mutated_database_is_read_as_far_as_it_is_one(database, seed, alone):
+    file, content = database
+    file.write_bytes(mutated(content, seed))
+    with contextlib.suppress(ReadingError):
+        judged(file if alone else file.parent)
+
+
+@given(SEEDS)
+def test_a_mutated_description_is_understood_or_refused(described, seed):
+    text = mutated(described, seed).decode(errors='surrogateescape')
+    with contextlib.suppress(MetadataError):
+        information = read_metadata(text)
+        assert information.message_count >= 0
+        assert all(isinstance(topic.name, str) for topic in information.topics)
+
+
+@pytest.fixture(scope='module')
+def described(tmp_path_factory):
+    folder = write_drive(tmp_path_factory.mktemp('described') / 'bag', 3)
+    content = (folder / 'metadata.yaml').read_bytes()
+    shutil.rmtree(folder)
+    return content
