@@ -45,7 +45,7 @@ STATE = record_type(
         (name, 'f8')
         for name in (
             *('first_z1', 'first_z2', 'second_z1', 'second_z2'),
-            *('real', 'imaginary', 'double_real', 'double_imaginary'),
+            *('cosine_part', 'sine_part', 'double_real', 'double_imaginary'),
             *('turns', 'amplitude'),
         )
     ]
@@ -79,8 +79,8 @@ def rest(line, state, displacement):
     state.first_z2 = line.gain * displacement
     state.second_z1 = 0.0
     state.second_z2 = 0.0
-    state.real = 0.0
-    state.imaginary = 0.0
+    state.cosine_part = 0.0
+    state.sine_part = 0.0
     state.double_real = 0.0
     state.double_imaginary = 0.0
     state.turns = line.first
@@ -96,7 +96,7 @@ def step(line, state, displacement):
     turns = state.turns
     sine, cosine = sine_and_cosine(turns)
     double_sine, double_cosine = 2.0 * sine * cosine, cosine * cosine - sine * sine
-    real, imaginary = _turned(state.real, state.imaginary, cosine, sine)
+    real, imaginary = _turned(state.cosine_part, state.sine_part, cosine, sine)
     double_real, double_imaginary = _turned(
         state.double_real, state.double_imaginary, double_cosine, double_sine
     )
@@ -105,10 +105,10 @@ def step(line, state, displacement):
     surprise = min(max(seen - real - double_real, -limit), limit)
     pull = _PULLING * imaginary * surprise / (square + _SMALLEST_LINE * _SMALLEST_LINE)
     state.turns = min(max(turns - pull, line.lowest), line.highest)
-    state.real, state.imaginary = real + _FOLLOWING * surprise, imaginary
+    state.cosine_part, state.sine_part = real + _FOLLOWING * surprise, imaginary
     state.double_real, state.double_imaginary = double_real + _FOLLOWING * surprise, double_imaginary
 
-    real, imaginary = _unfiltered(line, state.real, imaginary, cosine, sine)
+    real, imaginary = _unfiltered(line, state.cosine_part, imaginary, cosine, sine)
     double_real, double_imaginary = _unfiltered(
         line, state.double_real, double_imaginary, double_cosine, double_sine
     )
