@@ -35,7 +35,7 @@ def test_the_shipped_files_order_the_graph_and_its_bus_has_the_port_of_domain_an
     parameters = sim(namespace='/left').settings.parameters
     assert parameters['mount_sim']['port'] == parameters['mount_driver']['port'] == can_port(7, 'left')
     assert parameters['mount_recorder'] == {'uri': 'bags/first'}
-    assert parameters['mount_control'] == {'eigenfrequency': 8.0}
+    assert parameters['mount_control'] == {'continuous_viscous.eigenfrequency': 8.0}
     car = vehicle().settings.parameters
     assert car['mount_driver']['interface'] == 'socketcan'
     assert 'mount_sim' not in car
@@ -90,7 +90,9 @@ def test_the_supervisor_is_told_what_it_supervises():
         ({'policy': 'best'}, "policy 'best' is unknown"),
         ({'mount': 'rubber'}, "mount 'rubber' is unknown"),
         ({'scenario': 'race'}, "scenario 'race' is unknown"),
-        ({'damper': 'soft'}, "'soft'"),
+        ({'damper': 'soft', 'policy': 'switched_viscous'}, "'soft'"),
+        ({'damper': 'viscous_2000', 'policy': 'continuous_viscous'}, 'add policy:=switched_viscous'),
+        ({'port': '['}, r'^port:=\[ is not valid YAML'),
         ({'duration': 'long'}, 'timeline.duration must be a float'),
         ({'port': '80'}, r'port \(80 1\) must lie within 1024'),
         ({'priority': '-1'}, r'priority:=-1 must be a number within 0 \.\. 99'),

@@ -5,15 +5,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mount_bags.recorder.parameters import RecorderParameters
-from mount_bringup.chosen import chosen_control
+from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
 from mount_bringup.graph.nodes import DRIVER, INIT, RECORDER, SIM, GraphNode, GraphSettings
 from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.parameter_file import settings_of_file
-from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes, setting_value
+from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
 from mount_control.policy.registry import POLICIES
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
+from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import with_flattened
 from mount_ros.topics import TOPICS
 from mount_sim.excitation.scenario import build_excitation
@@ -47,6 +48,7 @@ class LaunchOrder(NamedTuple):
     log_level: str
 
 
+_POLICY_OF_DAMPER = 'switched_viscous'  # the others compute their force without a given damper
 _ANY = (
     LaunchArgument('namespace', 'where the graph lives, such as mount_right; empty: /'),
     LaunchArgument('record', 'whether the graph records', default='true', choices=('true', 'false')),
@@ -56,7 +58,9 @@ _ANY = (
         ('mount_recorder.uri',),
     ),
     LaunchArgument('policy', f'how forces are chosen: {", ".join(POLICIES)}', ('mount_control.policy',)),
-    LaunchArgument('damper', 'damper characteristic, such as viscous_2000', ('mount_control.damper',)),
+    LaunchArgument(
+        'damper', f'damper of policy {_POLICY_OF_DAMPER}, such as viscous_2000', ('mount_control.damper',)
+    ),
     LaunchArgument(
         'parameters_file',
         'specimen file of this actuator; empty: as in the config file, else the shipped one',
@@ -118,6 +122,7 @@ def launch_order(
         for name, values in layer.items():
             settings.setdefault(name, {}).update(values)
     settings = with_control_of_mount(checked_settings(settings, known))
+    _check_damper(given['damper'], settings)
     _check(settings)
     return LaunchOrder(
         nodes=chosen,
@@ -150,9 +155,25 @@ def _of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str])
         for target in argument.sets if text else ():
             node, _, name = target.partition('.')
             is_text = isinstance(_known()[node][name], str)
-            value = text if is_text else setting_value(f'{argument.name}:={text}', text)
+            value = text if is_text else _value(argument.name, text)
             settings.setdefault(node, {})[name] = value
     return settings
+
+
+def _value(name: str, text: str) -> Any:
+    try:
+        return plain_yaml(text)
+    except YamlError as error:
+        raise SettingError(f'{name}:={text} {error}') from None
+
+
+def _check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> None:
+    policy = control_parameters(settings).policy
+    if damper and policy != _POLICY_OF_DAMPER:
+        raise SettingError(
+            f'damper:={damper} is for policy {_POLICY_OF_DAMPER}; instead received {policy}: '
+            f'add policy:={_POLICY_OF_DAMPER}'
+        )
 
 
 def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
