@@ -41,7 +41,7 @@ def changed(text, seed):
     for _ in range(draw.choice((1, 1, 2, 5))):
         first, length = draw.randrange(len(text)), draw.randrange(60)
         piece = draw.choice((*PIECES, text[draw.randrange(len(text)) :][: draw.randrange(60)]))
-        text = text[:first] + piece + text[first + draw.choice((0, length)) :]
+        text = text[:first] + piece + text[first + draw.choice((0, length)) :] or ' '
     return text
 
 

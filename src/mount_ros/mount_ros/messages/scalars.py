@@ -144,6 +144,8 @@ class ScalarsReader:
             raise ScalarsError(f'a message with {len(names)} names has {len(message.position)} positions')
         message.position = _marks(len(names), 0)
         marked = bytearray(serialised(message))
+        if len(marked) > len(raw):
+            raise ScalarsError(f'a message of {len(raw)} bytes is cut; its content takes {len(marked)}')
         self._begin = _offset_of(marked, _marks(len(names), 0)) if names else _STAMP_END
         self._head, self._size = raw[_STAMP_END : self._begin], len(raw)
         self._places = [
