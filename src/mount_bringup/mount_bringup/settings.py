@@ -46,8 +46,9 @@ def setting_value(option: str, text: str) -> Any:
     try:
         return plain_yaml(text)
     except YamlError as error:
+        reason = str(error).removesuffix('; put it in quotes')
         raise SettingError(
-            f'--set {option}: the value {text!r:.60} {error}; put it in quotes of its own, as in '
+            f'--set {option}: the value {text!r:.60} {reason}; put it in quotes of its own, as in '
             f'\'{option.removesuffix(text)}"{text}"\''
         ) from None
 
