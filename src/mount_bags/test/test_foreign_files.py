@@ -9,7 +9,7 @@ import shutil
 from collections import Counter
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
@@ -104,6 +104,8 @@ def database(tmp_path_factory):
 
 @ONE_FILE
 @given(SEEDS, st.booleans())
+@example(1_000_000_062, False)  # the name of a column is no text
+@example(1_000_012_127, True)  # a definition without a stamp
 def test_a_mutated_database_is_read_as_far_as_it_is_one(database, seed, alone):
     file, content = database
     file.write_bytes(mutated(content, seed))

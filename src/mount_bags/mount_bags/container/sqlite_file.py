@@ -18,6 +18,8 @@ from mount_bags.container.message_compression import plain
 from mount_bags.container.stored import HEAD, StorageError, StoredMessages, StoredTopic, stored_messages
 
 _AT_ONCE = 1000  # rows
+# A column may hold any type, whatever was declared; a name or a text that is no UTF-8 is a `ValueError`.
+_UNREADABLE = (sqlite3.Error, ValueError, TypeError, KeyError, OverflowError)
 _LOGS = ('-wal', '-journal')  # behind the name of the database
 
 
@@ -42,7 +44,7 @@ class SqliteFile:
         try:
             self._base = self._connected()
             self._read_topics()
-        except sqlite3.Error as error:
+        except _UNREADABLE as error:
             raise StorageError(f'{path} is no readable sqlite3 bag: {error}') from None
         if self._logs:
             names = ', '.join(log.name for log in self._logs)
@@ -75,7 +77,7 @@ class SqliteFile:
             cursor = self._base.execute(query)
             while rows := cursor.fetchmany(_AT_ONCE):
                 yield plain(_messages(rows))
-        except sqlite3.Error as error:
+        except _UNREADABLE as error:
             self.damaged = True
             self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
 
@@ -127,8 +129,9 @@ class SqliteFile:
         """Return {type: (encoding, text)}; older bags have none."""
         query = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
         try:
-            return {row[0]: (row[1], row[2]) for row in self._base.execute(query).fetchall()}
-        except sqlite3.Error:
+            rows = self._base.execute(query).fetchall()
+            return {str(kind): (str(encoding), str(text)) for kind, encoding, text in rows}
+        except _UNREADABLE:
             return {}
 
 

@@ -209,9 +209,10 @@ class Series:
         return (self.message(index) for index in range(len(self)))
 
     def _stamp(self, message: Any) -> int:
-        if not hasattr(message, 'header'):
-            raise self._without_stamp()
-        return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        try:
+            return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        except AttributeError:  # of another type, or of a definition that is damaged
+            raise self._without_stamp() from None
 
     def _without_stamp(self) -> SeriesError:
         return SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
