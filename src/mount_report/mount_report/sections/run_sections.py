@@ -86,7 +86,9 @@ def tracking(subjects: Sequence[Subject]) -> Section:
         )
         said.say(subject, error)
         said.say(subject, subject.facts.tracking_remark)
-    chart = charts.tracking(wanted, actual, damping, _around(damping)) if wanted and damping else None
+    chart = (
+        charts.tracking(wanted, actual, damping, _around_largest(wanted[0])) if wanted and damping else None
+    )
     return Section('tracking', 'Tracking error against the truth', said.told(), chart)
 
 
@@ -296,9 +298,10 @@ def _digits(value: float, digits: int) -> str:
     return 'not known' if math.isnan(value) else f'{value:.{digits}f}'
 
 
-def _around(damping: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-    """Return limits that show the first time with damping on."""
-    return (damping[0][0] - 0.2, min(damping[0][1], damping[0][0] + 1.0) + 0.2) if damping else None
+def _around_largest(force: Named) -> tuple[float, float]:
+    """Return limits (s) that show the time when the force is largest."""
+    moment = float(force.x[np.nanargmax(np.abs(force.y))])
+    return moment - 0.4, moment + 0.6
 
 
 def _count(value: int | None) -> str:
