@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control.force_to_current import ForceTableError
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME_NS
 
 _NANOSECONDS = 1e9
-_PERIOD = round(SAMPLE_TIME * _NANOSECONDS)
 _STREAM_BREAK = 1_000_000_000  # ns, chosen: a longer silence may have been a loss of power
 
 INTERRUPTED = (
@@ -121,20 +120,20 @@ class SampleWatch:
         if elapsed > self._longest_bridge:
             self.counts.restarts += 1
             return Judgement.RESTART, 0
-        missing = max(0, (elapsed + _PERIOD // 2) // _PERIOD - 1)
+        missing = max(0, (elapsed + SAMPLE_TIME_NS // 2) // SAMPLE_TIME_NS - 1)
         self.counts.bridged += missing
         return Judgement.USE, missing
 
     def expects(self, stamp: int) -> bool:
         """Whether a believable sample of time `stamp` (ns) just goes on where the last one used ended."""
-        return self._used == stamp - _PERIOD
+        return self._used == stamp - SAMPLE_TIME_NS
 
     def following(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which of the samples (n,) are believable and one period after the one before."""
         valid = np.abs(displacement) <= self._range  # not so for NaN
         follows = np.zeros(len(stamps), bool)
         steps = np.diff(stamps)
-        follows[1:] = valid[1:] & (steps > 0) & (steps < _PERIOD + _PERIOD // 2)
+        follows[1:] = valid[1:] & (steps > 0) & (steps < SAMPLE_TIME_NS + SAMPLE_TIME_NS // 2)
         return follows
 
     def follow(self, last_stamp: int, count: int) -> None:

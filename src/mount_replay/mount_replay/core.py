@@ -12,7 +12,7 @@ from mount_control.answering import Answering
 from mount_control.sample_watch import SampleCounts
 from mount_control.settings import ControlSettings
 from mount_init.errors import InitialisationError
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME_NS
 from mount_replay.given.input import Column, ControlRun, ReplayError, ReplayInput, Times
 from mount_replay.given.parameter_changes import changed
 from mount_replay.given.ramps import MeasuredGap, Ramp, initialisation
@@ -21,7 +21,6 @@ from mount_ros.messages.event import ParametersChanged
 from mount_ros.messages.force_table import ForceTable
 
 OFF = 0.0  # A
-_PERIOD = round(SAMPLE_TIME * 1e9)  # ns
 
 Progress = Callable[[float], None]
 
@@ -124,7 +123,7 @@ def activation_before(run: ControlRun) -> int:
     The recording may begin long after the activation; the controller asks whether the measurements went on
     from there without a break.
     """
-    return int(run.stamps[0]) - _PERIOD
+    return int(run.stamps[0]) - SAMPLE_TIME_NS
 
 
 def answering_from(gap: MeasuredGap, parameters: Parameters, activation: int) -> Answering:

@@ -19,7 +19,7 @@ from mount_models.actuator.closing import ClosingMechanics
 from mount_models.arithmetic.averages import mean
 from mount_models.force_table import contact_force, current_force_table, offset_current
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_replay.given.input import (
     Column,
     ControlRun,
@@ -39,7 +39,6 @@ LOWEST_RATE = 100.0  # Hz, chosen: five times the 20 Hz up to which an engine mo
 DEFAULT_TABLE = 'default'
 _DISPLACEMENT = 'displacement'
 _ENGINE, _CHASSIS = 'engine_displacement', 'chassis_displacement'
-_PERIOD = round(SAMPLE_TIME * SECOND)
 _SHORTEST = 0.5  # s, chosen: four periods of the band
 
 
@@ -107,7 +106,7 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
         'this sample a fault to cut or repair?',
     )  # fmt: skip
     notes.append(f'largest displacement {1e3 * float(np.max(np.abs(displacement))):.3f} mm')
-    run = ControlRun(stamps, displacement, dated(gap, int(stamps[0]) - _PERIOD))
+    run = ControlRun(stamps, displacement, dated(gap, int(stamps[0]) - SAMPLE_TIME_NS))
     layout = ScalarsLayout(topics.DISPLACEMENT)
     pairs = zip(stamps.tolist(), displacement.tolist(), strict=True)
     messages = Messages('/' + _DISPLACEMENT, [layout.pack(stamp, (value,)) for stamp, value in pairs], stamps)
@@ -173,7 +172,7 @@ def _on_one_grid(signals: dict[str, EvenSignal], notes: list[str]) -> tuple[Time
     """Return stamps of 1 kHz and the displacement on them, not scaled."""
     begin = max(even.begin for even in signals.values())
     end = min(even.begin + round(even.length * SECOND) for even in signals.values())
-    count = round((end - begin) / _PERIOD) + 1
+    count = round((end - begin) / SAMPLE_TIME_NS) + 1
     if count * SAMPLE_TIME < _SHORTEST:
         spans = '; '.join(
             f'{even.name}: {even.begin / 1e9:.3f} .. {even.begin / 1e9 + even.length:.3f} s'
@@ -189,7 +188,7 @@ def _on_one_grid(signals: dict[str, EvenSignal], notes: list[str]) -> tuple[Time
         for even in signals.values()
         if not has_step(even, SAMPLE_TIME)
     ]
-    stamps = begin + _PERIOD * np.arange(count, dtype=np.int64)
+    stamps = begin + SAMPLE_TIME_NS * np.arange(count, dtype=np.int64)
     if _DISPLACEMENT in columns:
         return stamps, columns[_DISPLACEMENT]
     return stamps, columns[_ENGINE] - columns[_CHASSIS]

@@ -19,7 +19,7 @@ from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
 from mount_control.settings import policy_parameters
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_replay.given.parameter_changes import recorded_changes
 from mount_replay.given.ramps import MeasuredGap, Ramp, measured_gaps, ramps_of
 from mount_ros import topics
@@ -31,7 +31,6 @@ Times = NDArray[np.int64]
 Column = NDArray[np.float64]
 
 SECOND = 1_000_000_000  # ns
-_PERIOD = round(SAMPLE_TIME * SECOND)
 _INPUTS = (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.COIL_TEMPERATURE)
 _READ = (
     *_INPUTS,
@@ -139,7 +138,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     parameters = _parameters_of(session, notes)
     gaps = measured_gaps(recording)
     if gap is not None and not gaps:
-        gaps = [dated(gap, int(displacement[0][0]) - _PERIOD)]
+        gaps = [dated(gap, int(displacement[0][0]) - SAMPLE_TIME_NS)]
     if not gaps:
         raise ReplayError(
             f'{recording.path} holds no air_gap with its current_force_table, so no current can be told; '
@@ -266,7 +265,8 @@ def _without_foreign(answered: Times, answers: RecordedAnswers, notes: Notes) ->
     odd = ~traced & (currents != 0.0)  # every answer without a trace has a setpoint
     places = np.searchsorted(answers.trace_stamps, answered[odd])
     bounds = np.concatenate([[-(1 << 62)], answers.trace_stamps, [1 << 62]])
-    near = bounds[places + 1] - bounds[places] <= 20 * _PERIOD  # a hole in the traces, not another speaker
+    # nearer is a hole in the traces, not another speaker
+    near = bounds[places + 1] - bounds[places] <= 20 * SAMPLE_TIME_NS
     foreign = answered[odd][~near]
     if foreign.size:
         span = f'{notes.at(int(foreign[0]))} to {notes.at(int(foreign[-1]))}'
@@ -281,13 +281,13 @@ def _taken_without_answer(stamps: Times, answered: Times, answers: RecordedAnswe
     """Return the samples whose answers were not recorded although the next step did not bridge them."""
     found: list[Times] = []
     bridged = answers.traces.get('bridged_samples', np.empty(0))
-    for place in np.flatnonzero(np.diff(answered) > 1.5 * _PERIOD):
+    for place in np.flatnonzero(np.diff(answered) > 1.5 * SAMPLE_TIME_NS):
         before, after = int(answered[place]), int(answered[place + 1])
         step = int(np.searchsorted(answers.trace_stamps, after))
         traced = step < len(answers.trace_stamps) and answers.trace_stamps[step] == after
         if not traced or _starts_afresh(answers, step):
             continue
-        last_taken = after - (bridged[step] + 0.5) * _PERIOD
+        last_taken = after - (bridged[step] + 0.5) * SAMPLE_TIME_NS
         found.append(stamps[(stamps > before) & (stamps < last_taken)])
     silent = np.concatenate(found) if found else np.empty(0, np.int64)
     if silent.size:
@@ -363,7 +363,7 @@ def _split_into_runs(
 ) -> list[ControlRun]:
     if not len(stamps):
         return []
-    steps = set((np.flatnonzero(np.diff(stamps) > 1.5 * _PERIOD) + 1).tolist())
+    steps = set((np.flatnonzero(np.diff(stamps) > 1.5 * SAMPLE_TIME_NS) + 1).tolist())
     if answers is not None:  # in lock-step an activation takes no time
         steps |= set(np.searchsorted(stamps, answers.trace_stamps[_moved_then_afresh(answers)]).tolist())
     begins = [0]
