@@ -90,4 +90,4 @@ def test_frequency_in_band_is_that_of_a_sine():
 def test_band_rms_of_a_sine_is_its_amplitude_over_root_two():
     time = SAMPLE_TIME * np.arange(4000)
     both = 3.0 * np.sin(2.0 * np.pi * 25.0 * time) + 5.0 * np.sin(2.0 * np.pi * 8.0 * time)
-    assert runs.band_rms(both, (20.0, 200.0)) == pytest.approx(3.0 / np.sqrt(2.0), rel=1e-3)
+    assert runs.rms_in_bands(both, [(20.0, 200.0)])[0] == pytest.approx(3.0 / np.sqrt(2.0), rel=1e-3)

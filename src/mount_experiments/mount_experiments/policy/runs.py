@@ -8,15 +8,9 @@ import numpy as np
 
 from mount_experiments.policy.excitations import on_recorded_road, tip_in
 from mount_experiments.policy.learnable import frequency_in_band, friction_scale
+from mount_experiments.recorded_drive.evaluation import rms_in_bands
 from mount_experiments.sensitivity.grid import TruthOnly
-from mount_experiments.sweep.evaluation import (
-    BELOW_ISOLATION,
-    FIRST_FREQUENCY,
-    ISOLATION_BANDS,
-    RATE,
-    peak_in,
-    rms_in,
-)
+from mount_experiments.sweep.evaluation import BELOW_ISOLATION, peak_and_rms
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.loop.run import run_core_into
@@ -34,6 +28,7 @@ _FIELDS = (
     'chassis_acceleration',
     'coil_current',
 )
+_ONE_HERTZ = [(float(low), low + 1.0) for low in range(100)]  # Hz: bands of the shown spectrum
 _SETTLING = 1.0  # s, chosen: a road fades in for so long
 _PERIODS, _ORDERS = 8, 8
 _CLEAR = 0.3  # chosen: a turning point of so much of the largest one counts as the first
@@ -74,11 +69,7 @@ def run_policy_job(job: PolicyJob) -> tuple[tuple[Any, ...], dict[str, Any]]:
 
 
 def _of_sweep(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
-    frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(signals['displacement'].size)
-    return {
-        'peak_m': peak_in(frequency, signals['displacement'], BELOW_ISOLATION),
-        'rms': [rms_in(frequency, signals['chassis_acceleration'], band) for band in ISOLATION_BANDS],
-    }
+    return peak_and_rms(signals['displacement'], signals['chassis_acceleration'])
 
 
 def _of_gap(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
@@ -118,29 +109,17 @@ def _of_rack(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob)
 def _of_road(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
     part = slice(round(_SETTLING / SAMPLE_TIME), None)
     moved = {name: values[part] for name, values in signals.items()}
+    acceleration = moved['chassis_acceleration'] - moved['chassis_acceleration'].mean()
     power = np.abs(moved['friction_force'] * moved['velocity'])
     return {
-        'acceleration': band_rms(moved['chassis_acceleration'], ACOUSTIC),
+        'acceleration': rms_in_bands(acceleration, [ACOUSTIC])[0],
         'peak_m': float(np.abs(moved['displacement']).max()),
-        'rms_m': band_rms(moved['displacement'], BELOW_ISOLATION),
+        'rms_m': rms_in_bands(moved['displacement'], [BELOW_ISOLATION])[0],
         'power_w': float(np.mean(power)),
         'frequency_hz': frequency_in_band(moved['displacement']),
         'heat_w': sim.coil.resistance * float(np.mean(moved['coil_current'] ** 2)),
-        'spectrum': None if not job.kept else one_hertz(moved['chassis_acceleration']),
+        'spectrum': rms_in_bands(acceleration, _ONE_HERTZ) if job.kept else None,
     }
-
-
-def band_rms(values: FloatArray, band: tuple[float, float]) -> float:
-    """Return the rms of what lies within a band (Hz) of values at 1 kHz."""
-    spectrum = np.abs(np.fft.rfft(values - values.mean()))
-    frequency = np.fft.rfftfreq(values.size, SAMPLE_TIME)
-    within = (frequency >= band[0]) & (frequency < band[1])
-    return float(np.sqrt(2.0 * np.sum(spectrum[within] ** 2)) / values.size)
-
-
-def one_hertz(values: FloatArray) -> list[float]:
-    """Return the rms in bands of 1 Hz from 0 to 100 Hz."""
-    return [band_rms(values, (float(low), low + 1.0)) for low in range(100)]
 
 
 _FIGURES = {'sweep': _of_sweep, 'gap': _of_gap, 'rack': _of_rack, 'road': _of_road, 'tip_in': _of_road}

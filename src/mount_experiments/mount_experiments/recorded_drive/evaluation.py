@@ -1,5 +1,6 @@
 """What a recorded drive does to a mount: amplitude densities, rms in bands, friction mount against others."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,14 +36,14 @@ def spectra_of(drive: DriveSignals) -> Spectra:
     return Spectra(frequency, np.sqrt(displacement), np.sqrt(force))
 
 
-def rms_in_bands(values: FloatArray) -> list[float]:
-    """Return the rms of what `values` (n,) at 1 kHz hold in each of `BANDS`, in their unit.
+def rms_in_bands(values: FloatArray, bands: Sequence[tuple[float, float]] = BANDS) -> list[float]:
+    """Return the rms of what `values` (n,) at 1 kHz hold in each band (Hz), in their unit.
 
     From one spectrum of all of it: every moment counts the same, as it does not with windows.
     """
     amplitude = np.abs(np.fft.rfft(values)) / len(values)
     frequency = np.fft.rfftfreq(len(values), SAMPLE_TIME)
-    inside = [(frequency >= low) & (frequency < high) for low, high in BANDS]
+    inside = [(frequency >= low) & (frequency < high) for low, high in bands]
     return [float(np.sqrt(2.0 * np.sum(amplitude[band] ** 2))) for band in inside]
 
 

@@ -11,14 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_bringup.chosen import Parameters
-from mount_experiments.sweep.evaluation import (
-    BELOW_ISOLATION,
-    FIRST_FREQUENCY,
-    ISOLATION_BANDS,
-    RATE,
-    peak_in,
-    rms_in,
-)
+from mount_experiments.sweep.evaluation import peak_and_rms
 from mount_init.initialisation import InitialisationResult
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.loop.messages import Samples
@@ -99,11 +92,7 @@ def run_job(job: Job) -> tuple[tuple[Any, ...], dict[str, Any]]:
     displacement, force, acceleration = truth.signals(outcome.excitation_start)
     if job.parameters['mount_sim']['scenario'] == 'bench':
         return job.key, _of_bench(force, job.parameters)
-    frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(displacement.size)
-    return job.key, {
-        'peak_m': peak_in(frequency, displacement, BELOW_ISOLATION),
-        'rms': [rms_in(frequency, acceleration, band) for band in ISOLATION_BANDS],
-    }
+    return job.key, peak_and_rms(displacement, acceleration)
 
 
 def _of_bench(force: FloatArray, parameters: Parameters) -> dict[str, Any]:

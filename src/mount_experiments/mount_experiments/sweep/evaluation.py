@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.evaluation import switching
 from mount_report.drive.signals import DriveSignals, FloatArray
 from mount_report.sections.sweep import peak_per_band, rms_per_band
@@ -41,6 +42,18 @@ def rms_in(frequency: FloatArray, acceleration: FloatArray, band: Band) -> float
     within = (frequency >= band[0]) & (frequency < band[1])
     whole = frequency[-1] >= band[1] - 0.01
     return float(np.sqrt(np.mean(acceleration[within] ** 2))) if whole and within.any() else None
+
+
+def peak_and_rms(displacement: FloatArray, acceleration: FloatArray) -> dict[str, Any]:
+    """Return the largest displacement (m) below the isolation bands and the rms (m/s^2) in each of them.
+
+    Both (n,) at 1 kHz from the begin of the sweep.
+    """
+    frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(displacement.size)
+    return {
+        'peak_m': peak_in(frequency, displacement, BELOW_ISOLATION),
+        'rms': [rms_in(frequency, acceleration, band) for band in ISOLATION_BANDS],
+    }
 
 
 def defined_peak(edges: list[float], peaks: list[float], level: float) -> Band | None:
