@@ -3,9 +3,9 @@
     .venv/bin/python test/fuzz/fuzz.py --inputs 1000000 [--only frames] [--first 0]
     .venv/bin/python test/fuzz/fuzz.py --guided 600 --only frames
 
-The inputs are numbered: a failure names the number, which as an `@example` of its test is a regression test. One
-that takes longer than 2 s is a failure too. With `--guided` and the package `atheris` in the environment, code
-coverage chooses the inputs for so many seconds.
+The inputs are numbered: a failure names the number, which as an `@example` of its test is a regression test.
+One that takes longer than 2 s is a failure too. With `--guided` and the package `atheris` in the environment,
+code coverage chooses the inputs for so many seconds.
 """
 
 import argparse
