@@ -11,7 +11,8 @@ from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.
 
-The graphs run in real time: a machine with other work makes them late, and a fault that was not as required is tried once more.
+The graphs run in real time, and a machine with other work makes them late: what was not as required is
+tried once more in a fresh graph.
 
 Examples:
 
@@ -33,7 +34,9 @@ def faults(
         Path | None,
         typer.Option(metavar='FOLDER', help='runs of the graphs; default: a new one in bags'),
     ] = None,
-    json_file: Annotated[Path | None, typer.Option('--json', metavar='FILE', help='write the outcomes')] = None,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', metavar='FILE', help='write the outcomes')
+    ] = None,
     page: Annotated[Path | None, typer.Option(metavar='FILE', help='write the page')] = None,
     priority: Annotated[
         int, typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none')

@@ -17,7 +17,13 @@ from rclpy.node import Node
 from mount_bringup.graph.domain import can_port
 from mount_bringup.graph.nodes import CONTROL, DRIVER, SIMULATED
 from mount_replay.faults.observers import Observers, since
-from mount_replay.faults.processes import SHARED_MEMORY, Process, descendants, process_of
+from mount_replay.faults.processes import (
+    SHARED_MEMORY,
+    Process,
+    descendants,
+    process_of,
+    shared_memory_of_others,
+)
 from mount_ros.nodes.diagnostics import Level
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
@@ -117,7 +123,7 @@ class GraphUnderTest:
         }
 
     def damping(self) -> bool:
-        """Whether control is active, and the coil has been made to carry current without a break for a while."""
+        """Whether control is active, and has made the coil carry current without a break for a while."""
         if CONTROL.name not in self.observed.active:
             return False
         now = time.monotonic()
@@ -189,8 +195,10 @@ class GraphUnderTest:
 
     def _left_behind(self) -> list[str]:
         left = [f'process {each.pid}: {each.command:.80}' for each in self._alive()]
-        files = [SHARED_MEMORY / name for name in sorted(self._shared - self._of_others)]
-        left += [str(file) for file in files if file.exists()]
+        files = {name for name in self._shared - self._of_others if (SHARED_MEMORY / name).exists()}
+        if files:  # the middleware of other graphs takes up what one has left
+            files -= shared_memory_of_others(os.getpid())
+        left += [str(SHARED_MEMORY / name) for name in sorted(files)]
         lock = Path(tempfile.gettempdir()) / f'engine_mount_port_{self.port}.lock'
         if lock.exists():
             with lock.open() as file:

@@ -76,12 +76,13 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Killed(_Momentary):
-    """The process of a node, or the supervisor's, is ended by SIGKILL."""
+    """The process of a node, or the supervisor's, gets a signal that ends it."""
 
     node: str
+    signal: int = signal.SIGKILL
 
     def begin(self, graph: GraphUnderTest) -> None:
-        os.kill(_pid(graph, self.node), signal.SIGKILL)
+        os.kill(_pid(graph, self.node), self.signal)
 
 
 @dataclass(frozen=True)

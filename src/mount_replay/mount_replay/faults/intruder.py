@@ -5,6 +5,7 @@ It says `ready` when it knows the graph, sends from the first line of its input 
 
 import math
 import select
+import socket
 import sys
 import threading
 import time
@@ -32,10 +33,10 @@ from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.nodes.hosting import ros_context
 from mount_ros.nodes.leaving import end_process
 
-Step = Callable[[], None]
+Step = Callable[[], object]
 """Sends what is due in one period."""
 
-_ACTIVE = 20  # services called in a row
+_EVENTS = 20  # of a flood, in each period
 
 
 @contextmanager
@@ -82,14 +83,12 @@ def _can_electronics(domain: int, namespace: str) -> Iterator[Step]:
 @contextmanager
 def _can_garbage(domain: int, namespace: str) -> Iterator[Step]:
     """Another program sends datagrams to the group and port of the bus that are no frames."""
-    import socket
-
     draw = np.random.default_rng(1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton('127.0.0.1'))
         place = (MULTICAST_GROUP, can_port(domain, namespace))
-        yield lambda: sender.sendto(draw.bytes(int(draw.integers(0, 200))), place) and None
+        yield lambda: sender.sendto(draw.bytes(int(draw.integers(0, 200))), place)
 
 
 @contextmanager
@@ -169,7 +168,7 @@ def _flood_topic(domain: int, namespace: str) -> Iterator[Step]:
     with _path(domain, namespace) as path:
         send = path.sender(topics.EVENT)
         text = serialised(String(data='flood ' + 'x' * 100))
-        yield lambda: [send(text) for _ in range(_ACTIVE)] and None
+        yield lambda: [send(text) for _ in range(_EVENTS)]
 
 
 @contextmanager
@@ -179,7 +178,7 @@ def _flood_service(domain: int, namespace: str) -> Iterator[Step]:
         node = Node('intruder', namespace=namespace, context=context, start_parameter_services=False)
         client = node.create_client(GetParameters, 'mount_control/get_parameters')
         client.wait_for_service(10.0)
-        yield lambda: client.call_async(GetParameters.Request(names=['damper'])) and None
+        yield lambda: client.call_async(GetParameters.Request(names=['damper']))
         node.destroy_node()
 
 

@@ -1,5 +1,8 @@
 """The requirements: every fault with what the graph must do about it."""
 
+import math
+from signal import SIGINT
+
 from lifecycle_msgs.msg import Transition
 
 from mount_replay.faults.fault import FaultCase, Reaction
@@ -46,6 +49,27 @@ def _at_start(name: str, words: str, **options) -> FaultCase:
 def _off(name: str, words: str, **options) -> FaultCase:
     """A fault of the coil or its supply: the drive ends."""
     return _simulated(name, _INITIALISE, words, ends_drive=True, **options)
+
+
+def _sender(name: str, meaning: str, kind: str, **options) -> FaultCase:
+    """Somebody sends what only one may send."""
+    return FaultCase(name, meaning, Intruder(kind), _WHILE, _ANOTHER, lasts=1.0, **options)
+
+
+def _flood(name: str, meaning: str, kind: str) -> FaultCase:
+    return FaultCase(name, meaning, Intruder(kind), _TOLERATED, lasts=1.0)
+
+
+def _stopped(node: str, name: str, lasts: float, reaction: Reaction, words: str = '', **options) -> FaultCase:
+    """A process stands still for a while (SIGSTOP)."""
+    meaning, injection = f'mount_{node} stands still for {lasts:g} s', Stopped(f'mount_{node}')
+    return FaultCase(f'stop_{node}_{name}', meaning, injection, reaction, words, lasts, **options)
+
+
+def _killed(node: str, **options) -> FaultCase:
+    """A process that the drive cannot go on without ends by SIGKILL."""
+    name, told = f'mount_{node}', {**options, 'ends_drive': True}
+    return FaultCase(f'kill_{node}', f'SIGKILL of {name}', Killed(name), _INITIALISE, name, **told)
 
 
 BUS = (
@@ -122,116 +146,56 @@ COIL = (
     _at_start('gap_blocked', 'gap|contact|closed'),
 )
 SENDERS = (
-    FaultCase(
-        'second_host',
-        'a second CAN host asks for 3 A',
-        Intruder('can_host'),
-        _WHILE,
-        'another|second|wrong sequence',
-        in_electronics=True,
-        lasts=1.0,
-        third=True,
+    _sender('second_host', 'a second CAN host asks for 3 A', 'can_host', third=True, in_electronics=True),
+    _sender('second_electronics', 'second electronics send samples at rest', 'can_electronics'),
+    _sender(
+        'second_setpoint', 'a second node publishes 3 A on current_setpoint', 'current_setpoint', third=True
     ),
-    FaultCase(
-        'second_electronics',
-        'second electronics send samples at rest',
-        Intruder('can_electronics'),
-        _WHILE,
-        'another|second|wrong sequence',
-        lasts=1.0,
-    ),
-    FaultCase(
-        'foreign_datagrams',
-        'datagrams on the bus that are no frames',
-        Intruder('can_garbage'),
-        _TOLERATED,
-        lasts=1.0,
-    ),
-    FaultCase(
-        'second_setpoint',
-        'a second node publishes 3 A on current_setpoint',
-        Intruder('current_setpoint'),
-        _WHILE,
-        _ANOTHER,
-        lasts=1.0,
-        third=True,
-    ),
-    FaultCase(
-        'second_displacement',
-        'a second node publishes on displacement',
-        Intruder('displacement'),
-        _WHILE,
-        _ANOTHER,
-        lasts=1.0,
-    ),
-    FaultCase(
-        'second_air_gap',
-        'a second node publishes on air_gap',
-        Intruder('air_gap'),
-        _WHILE,
-        _ANOTHER,
-        lasts=1.0,
-    ),
-    FaultCase(
-        'second_table',
-        'a second node publishes on current_force_table',
-        Intruder('table'),
-        _WHILE,
-        _ANOTHER,
-        lasts=1.0,
-    ),
-    FaultCase(
-        'table_old',
-        'a second node publishes a table of an older activation',
-        Intruder('table_old'),
-        _WHILE,
-        f'{_ANOTHER}|table',
-        lasts=1.0,
-    ),
-    FaultCase(
-        'table_not_monotone',
-        'a second node publishes a table that falls',
-        Intruder('table_not_monotone'),
-        _WHILE,
-        f'{_ANOTHER}|table',
-        lasts=1.0,
-    ),
-    FaultCase('flood_topic', '20 000 events a second', Intruder('flood_topic'), _TOLERATED, lasts=1.0),
-    FaultCase(
-        'flood_service',
-        'mount_control is asked for parameters 1000 times a second',
-        Intruder('flood_service'),
-        _TOLERATED,
-        lasts=1.0,
-    ),
+    _sender('second_displacement', 'a second node publishes on displacement', 'displacement'),
+    _sender('second_air_gap', 'a second node publishes on air_gap', 'air_gap'),
+    _sender('second_table', 'a second node publishes on current_force_table', 'table'),
+    _sender('table_old', 'the same, a table of an older activation', 'table_old'),
+    _sender('table_not_monotone', 'the same, a table that falls', 'table_not_monotone'),
+    _flood('flood_bus', '1000 datagrams a second on the bus that are no frames', 'can_garbage'),
+    _flood('flood_topic', '20 000 events a second', 'flood_topic'),
+    _flood('flood_service', 'mount_control is asked for parameters 1000 times a second', 'flood_service'),
 )
 PROCESSES = (
-    *(
-        FaultCase(f'stop_{node}_{name}', f'mount_{node} stands still for {lasts:g} s', Stopped(f'mount_{node}'), reaction, words, lasts, **options)
-        for node, name, lasts, reaction, words, options in (
-            ('control', '200_ms', 0.2, _WHILE, 'no setpoint', {'silent': True, 'third': True}),
-            ('control', '2_s', 2.0, _INITIALISE, 'no setpoint', {'silent': True}),
-            ('driver', '200_ms', 0.2, _WHILE, 'no displacement|do not take|no setpoint|older', {'silent': True, 'in_electronics': True}),
-            ('driver', '2_s', 2.0, _INITIALISE, 'no displacement|no samples|interrupted', {'silent': True, 'in_electronics': True}),
-            ('recorder', '200_ms', 0.2, _TOLERATED, '', {}),
-            ('recorder', '2_s', 2.0, _TOLERATED, '', {'third': True}),
-            ('sim', '200_ms', 0.2, _WHILE, 'no frames|no displacement|no setpoint', {'silent': True}),
-            ('sim', '2_s', 2.0, _WHILE, 'no frames|no displacement|no setpoint', {'silent': True}),
-        )
+    _stopped('control', '200_ms', 0.2, _WHILE, 'no setpoint', silent=True, third=True),
+    _stopped('control', '2_s', 2.0, _INITIALISE, 'no setpoint', silent=True),
+    _stopped('driver', '200_ms', 0.2, _WHILE, 'no displacement|no setpoint|not take', in_electronics=True),
+    _stopped('driver', '2_s', 2.0, _INITIALISE, 'no displacement|no samples', in_electronics=True),
+    _stopped('recorder', '200_ms', 0.2, _TOLERATED),
+    _stopped('recorder', '2_s', 2.0, _TOLERATED, third=True),
+    _stopped('sim', '200_ms', 0.2, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
+    _stopped('sim', '2_s', 2.0, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
+    _killed('control', silent=True),
+    _killed('driver', silent=True, in_electronics=True, third=True),
+    _killed('init'),
+    _killed('sim', silent=True),
+    FaultCase(
+        'kill_recorder', 'SIGKILL of mount_recorder', Killed('mount_recorder'), _TOLD, 'mount_recorder',
+        loses_samples=True,
     ),
+    FaultCase(
+        'kill_supervisor', 'SIGKILL of the supervisor', Killed('supervisor'), _INITIALISE,
+        'started this one has ended', ends_drive=True,
+    ),
+    FaultCase(
+        'interrupt', 'Ctrl-C amid damping', Killed('supervisor', SIGINT), _INITIALISE, 'interrupted',
+        ends_drive=True,
+    ),
+)  # fmt: skip
+OPERATION = (
     FaultCase(
         'deactivate', 'mount_control is deactivated amid damping',
         Transitioned((('mount_control', DEACTIVATE),), (('mount_control', ACTIVATE),)),
         _WHILE, 'no setpoint|inactive', silent=True, third=True,
     ),
     FaultCase(
-        'nonsense_parameters', 'parameters of all nodes are set to what makes no sense',
-        ParametersSet((
-            ('mount_control', 'damper', 'viscous_-3'), ('mount_control', 'damper', 'nonsense'),
-            ('mount_driver', 'setpoint_timeout', 5.0), ('mount_init', 'silence_timeout', -1.0),
-            ('mount_sim', 'inject', 'nonsense'), ('mount_recorder', 'uri', '/'),
-        )),
-        Reaction.REFUSED, third=True,
+        'shutdown', 'mount_control is shut down amid damping',
+        Transitioned((('mount_control', Transition.TRANSITION_ACTIVE_SHUTDOWN),)),
+        _INITIALISE, 'no setpoint|shut', silent=True, ends_drive=True,
     ),
     FaultCase(
         'table_missing', 'mount_control is activated without a table',
@@ -243,22 +207,18 @@ PROCESSES = (
         _INITIALISE, 'no setpoint|table', ends_drive=True,
     ),
     FaultCase(
-        'shutdown', 'mount_control is shut down amid damping',
-        Transitioned((('mount_control', Transition.TRANSITION_ACTIVE_SHUTDOWN),)),
-        _INITIALISE, 'no setpoint|shut', silent=True, ends_drive=True,
-    ),
-    FaultCase('kill_recorder', 'SIGKILL of mount_recorder', Killed('mount_recorder'), _TOLD, 'mount_recorder', loses_samples=True),
-    *(
-        FaultCase(
-            f'kill_{node}', f'SIGKILL of mount_{node}', Killed(f'mount_{node}'), _INITIALISE, f'mount_{node}',
-            silent=True, ends_drive=True, in_electronics=node == 'driver', third=node == 'driver',
-        )
-        for node in ('control', 'driver', 'init', 'sim')
-    ),
-    FaultCase(
-        'kill_supervisor', 'SIGKILL of the supervisor', Killed('supervisor'), _INITIALISE, 'started this one has ended',
-        ends_drive=True,
+        'nonsense_parameters', 'parameters of all nodes are set to what makes no sense',
+        ParametersSet((
+            ('mount_control', 'continuous_viscous.damping_coefficient', -3.0),
+            ('mount_control', 'continuous_viscous.damping_coefficient', math.nan),
+            ('mount_control', 'damper', 'nonsense'),
+            ('mount_driver', 'setpoint_timeout', 5.0),
+            ('mount_init', 'silence_timeout', -1.0),
+            ('mount_sim', 'inject', 'nonsense'),
+            ('mount_recorder', 'uri', '/'),
+        )),
+        Reaction.REFUSED, third=True,
     ),
 )  # fmt: skip
-MATRIX = {case.name: case for case in (*BUS, *CLOCKS, *SENSORS, *COIL, *SENDERS, *PROCESSES)}
+MATRIX = {case.name: case for case in (*BUS, *CLOCKS, *SENSORS, *COIL, *SENDERS, *PROCESSES, *OPERATION)}
 """{name: fault}."""

@@ -2,14 +2,13 @@
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
 from mount_models.sampling import HIGHEST_CURRENT, SETPOINT_TIMEOUT
 from mount_replay.faults.fault import SAFE, FaultCase, Reaction
-from mount_replay.faults.observers import Heard, Observers, Seen, Told, since
+from mount_replay.faults.observers import Observers, Told, since
 from mount_ros.nodes.diagnostics import Level
 
 AFTER_DETECTION = 0.020  # s: 0 A on the bus, from the first sign that the fault was detected

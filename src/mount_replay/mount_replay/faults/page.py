@@ -4,24 +4,26 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mount_bags.run.screen import Table
-from mount_replay.faults.fault import FaultCase, Reaction
+from mount_replay.faults.fault import SAFE, FaultCase, Reaction
 from mount_replay.faults.outcome import AFTER_DETECTION, AFTER_OCCURRENCE, Outcome
 
 Rows = Mapping[FaultCase, Outcome]
 
 HEADS = ('fault', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recovery')
-_INTRODUCTION = f"""# Faults
+_INTRODUCTION = """# Faults
 
-What the graph does about each fault, measured. `engine-mount faults --page` writes this page (`make faults`); what each command line
-says stands in [mount_cli](../../src/mount_cli/README.md#faults).
+What the graph does about each fault, measured. `engine-mount faults --page FILE` writes this page, `make faults` does it
+for all of them ([mount_cli](../../src/mount_cli/README.md#faults)); figures of time are those of the machine that did.
 
-Each fault is brought into a graph that damps (`engine-mount drive --scenario bench`: real processes, CAN over UDP, real time), and
-observed from outside: a listener on the bus, one on `/diagnostics`, one on `sim/truth`, on the steady clock. Times run from when
-the fault began. *Detected*: what came first of a sentence and 0 A. *0 A*: the first setpoint of 0 A (or `Enable` 0) on the bus;
-where frames do not reach the electronics, or others send too, what the electronics follow. *Coil*: its true current at the end of the fault.
+Each fault is brought into a graph that damps (`engine-mount drive --scenario bench`: real processes, CAN over UDP, real
+time) and observed from outside: by a listener on the bus, one on `/diagnostics` and one on `sim/truth`, all on the steady
+clock. Times run from the beginning of the fault. *Detected*: the first sentence or the first 0 A, what came first.
+*0 A*: the first setpoint of 0 A (or with `Enable` 0) on the bus; where frames do not reach the electronics, or others
+send frames too, what the electronics follow. *Coil*: its true current at the end of the fault.
 
-Required of all: at most 3 A; no traceback; no sample missing in the recording; when the graph ends, no process, shared memory or lock is
-left. And by its group:
+Required of every fault: at most 3 A on the bus; no traceback; no sample missing in the recording, but for what the fault
+itself takes from it; no process, file of shared memory or held lock left behind. A sentence has a value, its limit and a
+remedy. And by its group:
 
 | group | required |
 |---|---|
@@ -50,7 +52,9 @@ def _section(reaction: Reaction, rows: Rows) -> str:
     lines = []
     for case, outcome in rows.items():
         name, *cells = _cells(case, outcome)
-        lines.append('| ' + ' | '.join(_escaped(cell) for cell in (f'`{name}`', case.meaning, *cells)) + ' |\n')
+        lines.append(
+            '| ' + ' | '.join(_escaped(cell) for cell in (f'`{name}`', case.meaning, *cells)) + ' |\n'
+        )
     return f'## {_title(reaction)}\n\n{heads}{"".join(lines)}'
 
 
@@ -59,9 +63,9 @@ def _title(reaction: Reaction) -> str:
 
 
 def _required(reaction: Reaction) -> str:
-    limits = f'0 A {1e3 * AFTER_DETECTION:g} ms after detection, {1e3 * AFTER_OCCURRENCE:g} ms after the beginning of silence'
-    safe = reaction in (Reaction.SAFE_WHILE, Reaction.SAFE_UNTIL_INITIALISED)
-    return f'{reaction.value}; {limits}' if safe else reaction.value
+    detected, silent = 1e3 * AFTER_DETECTION, 1e3 * AFTER_OCCURRENCE
+    limits = f'0 A within {detected:g} ms of detection, {silent:g} ms of the beginning of silence'
+    return f'{reaction.value}; {limits}' if reaction in SAFE else reaction.value
 
 
 def _cells(case: FaultCase, outcome: Outcome) -> list[str]:

@@ -51,6 +51,12 @@ def process_of(pid: int) -> Process:
     return Process(pid, int(fields[_BEGIN]) if fields else 0)
 
 
+def shared_memory_of_others(pid: int) -> set[str]:
+    """Return the names of the files of shared memory that any process but `pid` has mapped."""
+    others = (Process(int(path.name), 0) for path in Path('/proc').glob('[0-9]*') if int(path.name) != pid)
+    return set().union(*(each.shared_memory() for each in others))
+
+
 def _fields(pid: int) -> list[str]:
     """Return the fields of `stat` behind the name, which may hold anything; none when it has ended."""
     return _read(pid, 'stat').rpartition(') ')[2].split()

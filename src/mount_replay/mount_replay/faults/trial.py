@@ -6,8 +6,8 @@ import time
 from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.graph import GraphUnderTest
 from mount_replay.faults.injections import take_through
-from mount_replay.faults.observers import Told
 from mount_replay.faults.matrix import ACTIVATE, DEACTIVATE
+from mount_replay.faults.observers import Told
 from mount_replay.faults.outcome import Course, Outcome, judged
 from mount_ros.nodes.diagnostics import Level
 

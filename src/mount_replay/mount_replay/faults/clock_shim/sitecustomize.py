@@ -39,7 +39,8 @@ class _ClockFinder(importlib.abc.MetaPathFinder):
         if name != _CLOCK:
             return None
         spec = importlib.machinery.PathFinder.find_spec(name, path)
-        spec.loader = _ClockLoader(spec.name, spec.origin, self._step)
+        if spec is not None and spec.origin is not None:
+            spec.loader = _ClockLoader(spec.name, spec.origin, self._step)
         return spec
 
 
