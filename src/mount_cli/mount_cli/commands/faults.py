@@ -12,7 +12,7 @@ from mount_cli.terminal import note, terminal
 EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.
 
 The graphs run in real time, and a machine with other work makes them late: what was not as required is
-tried once more in a fresh graph.
+tried once more.
 
 Examples:
 
@@ -69,7 +69,10 @@ def faults(
     folder = make_run_folder(out, 'faults').path.absolute()
     screen = TerminalScreen(console)
     with screen.bar('faults', transient=True) as bar:
-        outcomes = run_faults(chosen, Place(_DRIVE, chosen_domain(domain), folder, priority), bar)
+        place = Place(_DRIVE, chosen_domain(domain), folder, priority)
+        outcomes = run_faults(
+            chosen, place, bar, lambda case, outcome: screen.say(f'{case.name}: {outcome.wrong or "ok"}')
+        )
     rows = {MATRIX[name]: outcome for name, outcome in outcomes.items()}
     screen.table(table(rows))
     if json_file is not None:

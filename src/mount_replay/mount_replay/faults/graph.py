@@ -27,7 +27,7 @@ from mount_replay.faults.processes import (
 from mount_ros.nodes.diagnostics import Level
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
-_START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws
+START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws
 _SETTLED = 0.3  # s, chosen: of current without a break counts as damping
 _LOOK_PERIOD = 0.005  # s
 _TRACEBACK = 'Traceback (most recent call last)'
@@ -146,10 +146,10 @@ class GraphUnderTest:
             time.sleep(_LOOK_PERIOD)
         return True
 
-    def wait_for_damping(self) -> None:
-        """Return when it damps and nothing is wrong; raises `GraphUnderTestError`."""
-        if not self.wait_until(lambda: self.damping() and self.quiet(), _START_PATIENCE):
-            what = 'has ended' if self.ended else f'does not damp within {_START_PATIENCE:g} s'
+    def wait_for_damping(self, limit: float = START_PATIENCE) -> None:
+        """Return when it damps and nothing is wrong; raises `GraphUnderTestError` after `limit` s."""
+        if not self.wait_until(lambda: self.damping() and self.quiet(), limit):
+            what = 'has ended' if self.ended else f'does not damp within {limit:g} s'
             raise GraphUnderTestError(f'the graph {what}: {" ".join(self.output[-300:].split())}')
         self.note_what_it_holds()
 

@@ -12,18 +12,20 @@ Rows = Mapping[FaultCase, Outcome]
 HEADS = ('fault', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recovery')
 _INTRODUCTION = """# Faults
 
-What the graph does about each fault, measured. `engine-mount faults --page FILE` writes this page, `make faults` does it
-for all of them ([mount_cli](../../src/mount_cli/README.md#faults)); figures of time are those of the machine that did.
+What the graph does about each fault, measured. `engine-mount faults --page FILE` writes this page, `make
+faults` does it for all of them ([mount_cli](../../src/mount_cli/README.md#faults)); times are those of
+the machine that did.
 
-Each fault is brought into a graph that damps (`engine-mount drive --scenario bench`: real processes, CAN over UDP, real
-time) and observed from outside: by a listener on the bus, one on `/diagnostics` and one on `sim/truth`, all on the steady
-clock. Times run from the beginning of the fault. *Detected*: the first sentence or the first 0 A, what came first.
-*0 A*: the first setpoint of 0 A (or with `Enable` 0) on the bus; where frames do not reach the electronics, or others
-send frames too, what the electronics follow. *Coil*: its true current at the end of the fault.
+Each fault is brought into a graph that damps (`engine-mount drive --scenario bench`: real processes, CAN
+over UDP, real time) and observed from outside: by a listener on the bus, one on `/diagnostics` and one
+on `sim/truth`, all on the steady clock. Times run from the beginning of the fault. *Detected*: the first
+sentence or the first 0 A, what came first. *0 A*: the first setpoint of 0 A (or with `Enable` 0) on the
+bus; where frames do not reach the electronics, or others send frames too, what the electronics follow.
+*Coil*: its true current at the end of the fault.
 
-Required of every fault: at most 3 A on the bus; no traceback; no sample missing in the recording, but for what the fault
-itself takes from it; no process, file of shared memory or held lock left behind. A sentence has a value, its limit and a
-remedy. And by its group:
+Required of every fault: at most 3 A on the bus; no traceback; no sample missing in the recording, but
+for what the fault itself takes from it; no process, file of shared memory or held lock left behind. A
+sentence has a value, its limit and a remedy. And by its group:
 
 | group | required |
 |---|---|

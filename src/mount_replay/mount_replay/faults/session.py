@@ -21,15 +21,22 @@ from mount_replay.faults.trial import tried
 from mount_ros.nodes.hosting import ros_context
 
 _TRIALS = 2  # chosen: a machine with other work is late now and then
+_PATIENCE = 6.0  # s, chosen: for damping in a graph that has seen faults
 _CODES = (0, 1, 130)  # of `drive`: nothing wrong, something wrong, interrupted
 
 Progress = Callable[[float, str], None]
+Tell = Callable[[FaultCase, Outcome], None]
 Kind = tuple[bool, tuple[str, ...]]
 """What a graph is started with: clocks that can be stepped, options."""
 
 
-def run_faults(cases: Sequence[FaultCase], place: Place, progress: Progress) -> dict[str, Outcome]:
-    """Return {fault: outcome}; `progress` takes the share that is done and the fault that is next."""
+def run_faults(
+    cases: Sequence[FaultCase], place: Place, progress: Progress, tell: Tell
+) -> dict[str, Outcome]:
+    """Return {fault: outcome}; what the end of a graph shows is added to those that it has seen.
+
+    `progress` takes the share that is done and the fault that is next, `tell` each outcome as it comes.
+    """
     outcomes: dict[str, Outcome] = {}
     with ros_context(place.domain) as context:
         session = _Session(place, context)
@@ -37,6 +44,7 @@ def run_faults(cases: Sequence[FaultCase], place: Place, progress: Progress) -> 
             for number, case in enumerate(_in_order(cases)):
                 progress(number / len(cases), case.name)
                 outcomes[case.name] = session.outcome(case)
+                tell(case, outcomes[case.name])
         finally:
             session.end_graph()
     return {case.name: outcomes[case.name] for case in cases}
@@ -71,12 +79,11 @@ class _Session:
         self._running: _Running | None = None
 
     def outcome(self, case: FaultCase) -> Outcome:
-        """Try a fault; once more, in a fresh graph, if it was not as required."""
+        """Try a fault; once more, if it was not as required."""
         outcome = self._trial(case)
         for _ in range(1, _TRIALS):
             if outcome.ok:
                 break
-            self.end_graph()
             later = self._trial(case)
             if outcome.seen and not later.seen:
                 outcome.earlier.append(later.wrong)
@@ -104,9 +111,15 @@ class _Session:
     def _prepared(self, case: FaultCase) -> _Running:
         """Return a graph that damps without complaint, or that starts where the fault is one of the start."""
         running = self._running
-        if running is not None and running.kind != _kind(case):
+        if running is not None:
+            try:
+                if running.kind == _kind(case):
+                    running.graph.wait_for_damping(_PATIENCE)
+                    return running
+            except GraphUnderTestError:
+                pass  # what came before has spoiled it
             self.end_graph()
-        running = self._running = self._running or self._started(case)
+        running = self._running = self._started(case)
         if case.reaction is not Reaction.NOT_STARTED:
             running.graph.wait_for_damping()
         return running
