@@ -9,6 +9,7 @@ import socket
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -127,13 +128,13 @@ def _displacement(domain: int, namespace: str) -> Iterator[Step]:
     with _path(domain, namespace) as path:
         send = path.sender(topics.DISPLACEMENT)
 
-        def beside(raw: bytes) -> None:
-            if sending.is_set() and stamp_of(raw) % SAMPLE_TIME_NS != beside_of[0]:
-                stamp = stamp_of(raw) + SAMPLE_TIME_NS // 2
-                beside_of[0] = stamp % SAMPLE_TIME_NS
-                send(layout.pack(stamp, (0.003,)))
+        own: deque[int] = deque(maxlen=1000)  # its stamps, for it receives them too
 
-        beside_of = [-1]
+        def beside(raw: bytes) -> None:
+            if sending.is_set() and stamp_of(raw) not in own:
+                own.append(stamp_of(raw) + SAMPLE_TIME_NS // 2)
+                send(layout.pack(own[-1], (0.003,)))
+
         path.subscribe(topics.DISPLACEMENT, beside)
         path.start()
         _wait_for_matches(path)

@@ -22,7 +22,7 @@ _TOLERATED, _TOLD = Reaction.TOLERATED, Reaction.TOLD
 _WHILE, _INITIALISE = Reaction.SAFE_WHILE, Reaction.SAFE_UNTIL_INITIALISED
 _CONFIGURE, _CLEANUP = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_CLEANUP
 ACTIVATE, DEACTIVATE = Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE
-_ANOTHER = 'another|second|publisher|writer'  # words that name who sends what only one may send
+_ANOTHER = 'another|a second |publisher|writer'  # words that name who sends what only one may send
 _HOUR = 3600.0  # s
 
 

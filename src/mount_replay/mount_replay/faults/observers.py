@@ -15,13 +15,12 @@ from typing import NamedTuple, TypeVar
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
+from rclpy.serialization import deserialize_message
 
 from mount_driver.bus import MULTICAST_GROUP, Reception, open_bus
 from mount_driver.codec import MountCodec, WrongCrcError, WrongLengthError
-from mount_ros.data_thread import DataThread
+from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.qos import recording_qos
 from mount_ros.topics import DIAGNOSTICS, SIM_TRUTH
 
 _LOOK_PERIOD = 0.1  # s: how often a listener looks whether it shall end
@@ -94,10 +93,10 @@ class Observers:
         coil, followed = self._places
         self.seen.append(Seen(time.monotonic(), numbers[coil], numbers[followed]))
 
-    def take_diagnostics(self, message: DiagnosticArray) -> None:
+    def take_diagnostics(self, raw: bytes) -> None:
         """Note the verdicts of this graph; `/diagnostics` belongs to all."""
         now = time.monotonic()
-        for status in message.status:
+        for status in deserialize_message(raw, DiagnosticArray).status:
             space, _, node = status.name.rpartition('/')
             if space == self._namespace:
                 self.told.append(Told(now, node, status.level[0], status.message))
@@ -110,11 +109,10 @@ def observers(context: Context, namespace: str, port: int) -> Iterator[Observers
     """Observe the graph of a namespace whose CAN bus has a UDP port, while the context lasts."""
     observed = Observers(namespace)
     node = Node('observer', namespace=namespace, context=context, start_parameter_services=False)
-    truth, diagnostics = recording_qos(SIM_TRUTH), recording_qos(DIAGNOSTICS)
-    node.create_subscription(JointState, SIM_TRUTH.name, observed.take_truth, truth, raw=True)
-    node.create_subscription(DiagnosticArray, DIAGNOSTICS.name, observed.take_diagnostics, diagnostics)
-    thread = DataThread(context)
-    thread.add(node)
+    path = DataPath(node)
+    path.subscribe(SIM_TRUTH, observed.take_truth)
+    path.subscribe(DIAGNOSTICS, observed.take_diagnostics)
+    path.start()
     ending = threading.Event()
     listener = threading.Thread(target=_listen, args=(observed, port, ending), name='bus', daemon=True)
     listener.start()
@@ -123,7 +121,7 @@ def observers(context: Context, namespace: str, port: int) -> Iterator[Observers
     finally:
         ending.set()
         listener.join()
-        thread.remove(node)
+        path.stop()
         node.destroy_node()
 
 
