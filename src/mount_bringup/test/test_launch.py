@@ -1,6 +1,7 @@
 """What the launch files hand to `launch`, which is not needed here: the test stands in for it."""
 
 import importlib
+import os
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -50,13 +51,13 @@ class Launched:
 
 
 @pytest.fixture
-def launch(monkeypatch, tmp_path):
+def launch(monkeypatch):
     for name in MODULES:
         monkeypatch.setitem(sys.modules, name, MagicMock())
     monkeypatch.delitem(sys.modules, 'mount_bringup.graph.launch', raising=False)
     module = importlib.import_module('mount_bringup.graph.launch')
     monkeypatch.setattr(module, 'get_package_share_directory', lambda _: str(PACKAGE))
-    monkeypatch.setattr(domain.tempfile, 'gettempdir', lambda: str(tmp_path))
+    monkeypatch.setattr(domain, '_PLACE', f'\0engine_mount_test_{os.getpid()}')
     monkeypatch.setenv('ROS_DOMAIN_ID', '5')
     yield module
     sys.modules.pop('mount_bringup.graph.launch')
