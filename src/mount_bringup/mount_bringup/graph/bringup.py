@@ -129,6 +129,7 @@ class Bringup:
             before = self._pace()
             try:
                 self.transition(node, Transition.TRANSITION_ACTIVATE)
+                self.verdicts.note_active(node)
                 return
             except GraphError as error:
                 self.serve_for(_FRESH_DIAGNOSTICS)

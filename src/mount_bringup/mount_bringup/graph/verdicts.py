@@ -40,6 +40,10 @@ class Verdicts:
         """Return what a node told last: its figures, `level` and `sentence`; empty if nothing came."""
         return self._figures.get(node.name, {})
 
+    def note_active(self, node: GraphNode) -> None:
+        """Note that a node was activated, which it tells only with its next diagnostics."""
+        self._figures.setdefault(node.name, {'level': '0', 'sentence': ''})['state'] = 'active'
+
     def forget(self, node: GraphNode) -> None:
         """Forget what a node has told: it holds no more."""
         self._figures.pop(node.name, None)
