@@ -31,6 +31,9 @@ from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 
+_OF_SPECIMEN = ('mount_driver', 'mount_init', 'mount_control')
+"""The nodes that load the specimen file."""
+
 
 class LaunchArgument(NamedTuple):
     """An argument of a launch file, and NODE.NAME of the parameters that it sets if it is not empty."""
@@ -74,12 +77,12 @@ _ANY = (
     LaunchArgument(
         'parameters_file',
         'specimen file of this actuator; empty: as in the config file, else the shipped one',
-        ('mount_init.parameters_file', 'mount_control.parameters_file'),
+        tuple(f'{node}.parameters_file' for node in _OF_SPECIMEN),
     ),
     LaunchArgument(
         'specimen',
         'name that the specimen file must bear; empty: as in the config file, else any',
-        ('mount_init.specimen', 'mount_control.specimen'),
+        tuple(f'{node}.specimen' for node in _OF_SPECIMEN),
     ),
     LaunchArgument(
         'priority',
