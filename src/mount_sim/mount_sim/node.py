@@ -15,6 +15,7 @@ from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import Beats
 from mount_sim.diagnosis import verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults import Fault
@@ -28,6 +29,8 @@ _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
 
 class MountSim(SafeLifecycleNode):
     """Stands in for the hardware: everything behind the CAN connector."""
+
+    real_time_threads = frozenset({'electronics'})
 
     def __init__(self, **arguments):
         super().__init__('mount_sim', **arguments)
@@ -92,6 +95,10 @@ class MountSim(SafeLifecycleNode):
     def judge(self) -> Verdict:
         assert self._loop is not None
         return verdict(self._loop.figures, self._mount.run, lockstep=self.lockstep)
+
+    def beats(self) -> Beats:
+        loop = self._loop
+        return Beats() if loop is None else Beats(loop.figures.samples, loop.figures.overruns)
 
     def _prepare_mount(self) -> None:
         self._mount = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
