@@ -25,6 +25,8 @@ _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses
 class MountDriver(SafeLifecycleNode):
     """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
 
+    real_time_threads = frozenset({'data', 'can_receive'})
+
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
         declare(self, DriverParameters())

@@ -1,10 +1,8 @@
 """The graph under test: the command `engine-mount drive` as a process, and what it leaves behind."""
 
-import fcntl
 import os
 import signal
 import subprocess
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +12,7 @@ from typing import Any
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from mount_bringup.graph.domain import can_port
+from mount_bringup.graph.domain import DomainError, can_port, domain_lock
 from mount_bringup.graph.nodes import CONTROL, DRIVER, SIMULATED
 from mount_replay.faults.observers import Observers, since
 from mount_replay.faults.processes import (
@@ -199,13 +197,11 @@ class GraphUnderTest:
         if files:  # the middleware of other graphs takes up what one has left
             files -= shared_memory_of_others(os.getpid())
         left += [str(SHARED_MEMORY / name) for name in sorted(files)]
-        lock = Path(tempfile.gettempdir()) / f'engine_mount_port_{self.port}.lock'
-        if lock.exists():
-            with lock.open() as file:
-                try:
-                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except OSError:
-                    left.append(f'{lock}, held')
+        try:
+            with domain_lock(self.domain, self.namespace):
+                pass
+        except DomainError as error:
+            left.append(str(error))
         return left
 
     def _tracebacks(self) -> list[str]:

@@ -3,6 +3,7 @@
 It says `ready` when it knows the graph, sends from the first line of its input on, and ends with its input.
 """
 
+import itertools
 import math
 import select
 import socket
@@ -37,7 +38,7 @@ from mount_ros.nodes.leaving import end_process
 Step = Callable[[], object]
 """Sends what is due in one period."""
 
-_EVENTS = 20  # of a flood, in each period
+_EVENTS = 5  # of a flood, in each period
 
 
 @contextmanager
@@ -165,7 +166,7 @@ def _table(stamp: Callable[[], int], currents: tuple[float, ...], forces: tuple[
 
 @contextmanager
 def _flood_topic(domain: int, namespace: str) -> Iterator[Step]:
-    """Somebody sends twenty events each millisecond."""
+    """Somebody sends many events."""
     with _path(domain, namespace) as path:
         send = path.sender(topics.EVENT)
         text = serialised(String(data='flood ' + 'x' * 100))
@@ -174,12 +175,13 @@ def _flood_topic(domain: int, namespace: str) -> Iterator[Step]:
 
 @contextmanager
 def _flood_service(domain: int, namespace: str) -> Iterator[Step]:
-    """Somebody asks mount_control for its parameters, a thousand times a second."""
+    """Somebody asks mount_control for its parameters, every second millisecond."""
     with ros_context(domain) as context:
         node = Node('intruder', namespace=namespace, context=context, start_parameter_services=False)
         client = node.create_client(GetParameters, 'mount_control/get_parameters')
         client.wait_for_service(10.0)
-        yield lambda: client.call_async(GetParameters.Request(names=['damper']))
+        turns = itertools.cycle((True, False))
+        yield lambda: next(turns) and client.call_async(GetParameters.Request(names=['damper']))
         node.destroy_node()
 
 

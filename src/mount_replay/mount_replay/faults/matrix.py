@@ -22,7 +22,7 @@ _TOLERATED, _TOLD = Reaction.TOLERATED, Reaction.TOLD
 _WHILE, _INITIALISE = Reaction.SAFE_WHILE, Reaction.SAFE_UNTIL_INITIALISED
 _CONFIGURE, _CLEANUP = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_CLEANUP
 ACTIVATE, DEACTIVATE = Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE
-_ANOTHER = 'another|a second |publisher|writer'  # words that name who sends what only one may send
+_ANOTHER = 'another|a second |second sender|publisher|writer'  # words that name who sends what only one may send
 _HOUR = 3600.0  # s
 
 
@@ -51,9 +51,11 @@ def _off(name: str, words: str, **options) -> FaultCase:
     return _simulated(name, _INITIALISE, words, ends_drive=True, **options)
 
 
-def _sender(name: str, meaning: str, kind: str, **options) -> FaultCase:
+def _sender(
+    name: str, meaning: str, kind: str, reaction: Reaction = _WHILE, **options
+) -> FaultCase:
     """Somebody sends what only one may send."""
-    return FaultCase(name, meaning, Intruder(kind), _WHILE, _ANOTHER, lasts=1.0, **options)
+    return FaultCase(name, meaning, Intruder(kind), reaction, _ANOTHER, lasts=1.0, **options)
 
 
 def _flood(name: str, meaning: str, kind: str) -> FaultCase:
@@ -66,10 +68,10 @@ def _stopped(node: str, name: str, lasts: float, reaction: Reaction, words: str 
     return FaultCase(f'stop_{node}_{name}', meaning, injection, reaction, words, lasts, **options)
 
 
-def _killed(node: str, **options) -> FaultCase:
-    """A process that the drive cannot go on without ends by SIGKILL."""
-    name, told = f'mount_{node}', {**options, 'ends_drive': True}
-    return FaultCase(f'kill_{node}', f'SIGKILL of {name}', Killed(name), _INITIALISE, name, **told)
+def _lost(node: str, reaction: Reaction, **options) -> FaultCase:
+    """A process ends by SIGKILL."""
+    name = f'mount_{node}'
+    return FaultCase(f'kill_{node}', f'SIGKILL of {name}', Killed(name), reaction, name, **options)
 
 
 BUS = (
@@ -85,12 +87,12 @@ BUS = (
     _simulated('frozen_counter', _WHILE, 'repeated|no frames|no displacement', silent=True, third=True),
     _simulated('wrong_crc', _TOLD, 'corrupt', lasts=1.0, third=True),
     _simulated('wrong_length', _TOLD, 'corrupt', lasts=1.0),
-    _simulated('replayed', _WHILE, 'repeated|wrong sequence', silent=True),
+    _off('replayed', 'another|second sender', third=True),
     _simulated('babbling', _TOLERATED, third=True),
     _simulated('deaf', _WHILE, 'do not take the setpoints', in_electronics=True, lasts=1.5),
 )
 CLOCKS = (
-    _simulated('clock_jump', _INITIALISE, 'restarted|no samples|interrupted'),
+    _simulated('clock_jump', _INITIALISE, 'restart|clock|initialis'),
     _simulated('clock_drift', _TOLERATED, lasts=2.0),
     FaultCase(
         'counter_wrap',
@@ -100,7 +102,7 @@ CLOCKS = (
         lasts=3.5,
         options=('--set', 'mount_sim.faults=["counter_wrap@6"]'),
     ),
-    _simulated('electronics_reset', _INITIALISE, 'restarted|interrupted', silent=True, third=True),
+    _simulated('electronics_reset', _INITIALISE, 'restart|initialis', silent=True, third=True),
     FaultCase(
         'clock_forward', 'the system clock goes an hour ahead', ClockStep(_HOUR), _TOLERATED, clock=True
     ),
@@ -146,8 +148,8 @@ COIL = (
     _at_start('gap_blocked', 'gap|contact|closed'),
 )
 SENDERS = (
-    _sender('second_host', 'a second CAN host asks for 3 A', 'can_host', third=True, in_electronics=True),
-    _sender('second_electronics', 'second electronics send samples at rest', 'can_electronics'),
+    _sender('second_host', 'a second CAN host asks for 3 A', 'can_host', _INITIALISE, third=True, ends_drive=True, in_electronics=True),
+    _sender('second_electronics', 'second electronics send samples at rest', 'can_electronics', _INITIALISE, ends_drive=True),
     _sender(
         'second_setpoint', 'a second node publishes 3 A on current_setpoint', 'current_setpoint', third=True
     ),
@@ -157,8 +159,8 @@ SENDERS = (
     _sender('table_old', 'the same, a table of an older activation', 'table_old'),
     _sender('table_not_monotone', 'the same, a table that falls', 'table_not_monotone'),
     _flood('flood_bus', '1000 datagrams a second on the bus that are no frames', 'can_garbage'),
-    _flood('flood_topic', '20 000 events a second', 'flood_topic'),
-    _flood('flood_service', 'mount_control is asked for parameters 1000 times a second', 'flood_service'),
+    _flood('flood_topic', '5000 events a second', 'flood_topic'),
+    _flood('flood_service', 'mount_control is asked for parameters 500 times a second', 'flood_service'),
 )
 PROCESSES = (
     _stopped('control', '200_ms', 0.2, _WHILE, 'no setpoint', silent=True, third=True),
@@ -169,14 +171,11 @@ PROCESSES = (
     _stopped('recorder', '2_s', 2.0, _TOLERATED, third=True),
     _stopped('sim', '200_ms', 0.2, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
     _stopped('sim', '2_s', 2.0, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
-    _killed('control', silent=True),
-    _killed('driver', silent=True, in_electronics=True, third=True),
-    _killed('init'),
-    _killed('sim', silent=True),
-    FaultCase(
-        'kill_recorder', 'SIGKILL of mount_recorder', Killed('mount_recorder'), _TOLD, 'mount_recorder',
-        loses_samples=True,
-    ),
+    _lost('control', _WHILE, silent=True),
+    _lost('driver', _INITIALISE, silent=True, in_electronics=True, third=True),
+    _lost('init', _TOLD),
+    _lost('recorder', _TOLD, loses_samples=True),
+    _lost('sim', _INITIALISE, silent=True, ends_drive=True),
     FaultCase(
         'kill_supervisor', 'SIGKILL of the supervisor', Killed('supervisor'), _INITIALISE,
         'started this one has ended', ends_drive=True,
