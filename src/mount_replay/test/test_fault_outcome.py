@@ -77,6 +77,14 @@ def test_a_drive_that_has_ended_has_not_recovered_and_may_only_where_that_is_req
     assert 'does not damp again' in judged(case(Reaction.SAFE_WHILE), course, seen).wrong
 
 
+def test_damping_without_a_new_initialisation_where_one_is_required_is_said():
+    seen = observed(10.02, told=(told(10.1),))
+    fault = case(Reaction.SAFE_UNTIL_INITIALISED)
+    assert 'without a new initialisation' in judged(fault, COURSE, seen).wrong
+    seen.initialised.append(10.9)
+    assert judged(fault, COURSE, seen).ok
+
+
 def test_more_than_3_ampere_is_never_as_required():
     seen = observed(None)
     seen.heard.insert(1100, Heard(seen.heard[1100].time, 3.01))

@@ -22,7 +22,9 @@ _TOLERATED, _TOLD = Reaction.TOLERATED, Reaction.TOLD
 _WHILE, _INITIALISE = Reaction.SAFE_WHILE, Reaction.SAFE_UNTIL_INITIALISED
 _CONFIGURE, _CLEANUP = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_CLEANUP
 ACTIVATE, DEACTIVATE = Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE
-_ANOTHER = 'another|a second |second sender|publisher|writer'  # words that name who sends what only one may send
+_ANOTHER = (
+    'another|a second |second sender|publisher|writer'  # words that name who sends what only one may send
+)
 _HOUR = 3600.0  # s
 
 
@@ -51,9 +53,7 @@ def _off(name: str, words: str, **options) -> FaultCase:
     return _simulated(name, _INITIALISE, words, ends_drive=True, **options)
 
 
-def _sender(
-    name: str, meaning: str, kind: str, reaction: Reaction = _WHILE, **options
-) -> FaultCase:
+def _sender(name: str, meaning: str, kind: str, reaction: Reaction = _WHILE, **options) -> FaultCase:
     """Somebody sends what only one may send."""
     return FaultCase(name, meaning, Intruder(kind), reaction, _ANOTHER, lasts=1.0, **options)
 
@@ -80,14 +80,14 @@ BUS = (
     _simulated('lost_1', _TOLERATED, 'samples lost'),
     _simulated('lost_5', _TOLD, 'samples lost', lasts=1.5, third=True),
     _simulated('lost_50', _TOLD, 'samples lost', lasts=1.5),
-    _simulated('delayed', _TOLERATED),
+    _simulated('delayed', _TOLERATED, third=True),
     _simulated('delayed_50', _WHILE, 'do not take|late|old', in_electronics=True, lasts=1.5),
-    _simulated('duplicated', _TOLERATED, 'repeated', lasts=1.0),
+    _simulated('duplicated', _TOLERATED, 'repeated', lasts=1.0, third=True),
     _simulated('reordered', _TOLD, 'wrong sequence|samples lost', lasts=1.0),
     _simulated('frozen_counter', _WHILE, 'repeated|no frames|no displacement', silent=True, third=True),
     _simulated('wrong_crc', _TOLD, 'corrupt', lasts=1.0, third=True),
     _simulated('wrong_length', _TOLD, 'corrupt', lasts=1.0),
-    _off('replayed', 'another|second sender', third=True),
+    _off('replayed', 'another|second sender'),
     _simulated('babbling', _TOLERATED, third=True),
     _simulated('deaf', _WHILE, 'do not take the setpoints', in_electronics=True, lasts=1.5),
 )
@@ -114,11 +114,11 @@ SENSORS = (
     _simulated('displacement_invalid', _WHILE, 'displacement', third=True),
     _simulated('displacement_stuck', _WHILE, 'displacement', lasts=1.5),
     _simulated('displacement_step', _TOLERATED),
-    _simulated('displacement_out_of_range', _WHILE, 'displacement|invalid'),
+    _simulated('displacement_out_of_range', _WHILE, 'displacement|invalid', third=True),
     _simulated('displacement_noisy', _TOLERATED),
-    _simulated('displacement_inverted', _TOLERATED),
-    _simulated('displacement_drifting', _TOLERATED, lasts=1.5),
-    _simulated('displacement_sensor', _WHILE, 'displacement sensor'),
+    _simulated('displacement_inverted', _TOLERATED, third=True),
+    _simulated('displacement_drifting', _TOLERATED, lasts=1.5, third=True),
+    _simulated('displacement_sensor', _WHILE, 'displacement sensor', third=True),
     _simulated('ripple_missing', _TOLERATED),
     _simulated('ripple_noisy', _TOLERATED),
     _simulated('ripple_scale', _TOLERATED),
@@ -136,7 +136,7 @@ COIL = (
     _off('supply_0', 'supply'),
     _off('supply_5', 'supply', third=True),
     _simulated('supply_9', _TOLERATED),
-    _simulated('supply_16', _TOLERATED),
+    _simulated('supply_16', _TOLERATED, third=True),
     _off('supply_24', 'supply'),
     _off('over_current', 'over-current|OverCurrent'),
     _off('over_temperature', 'over-temperature|OverTemperature|too hot'),
@@ -145,15 +145,29 @@ COIL = (
     _at_start('coil_shorted', 'resistance|ohm|coil'),
     _at_start('pads_worn', 'gap|pads'),
     _at_start('pads_missing', 'gap|pads|contact'),
-    _at_start('gap_blocked', 'gap|contact|closed'),
+    _at_start('gap_blocked', 'gap|contact|closed', third=True),
 )
 SENDERS = (
-    _sender('second_host', 'a second CAN host asks for 3 A', 'can_host', _INITIALISE, third=True, ends_drive=True, in_electronics=True),
-    _sender('second_electronics', 'second electronics send samples at rest', 'can_electronics', _INITIALISE, ends_drive=True),
+    _sender(
+        'second_host',
+        'a second CAN host asks for 3 A',
+        'can_host',
+        _INITIALISE,
+        third=True,
+        ends_drive=True,
+        in_electronics=True,
+    ),
+    _sender(
+        'second_electronics',
+        'second electronics send samples at rest',
+        'can_electronics',
+        _INITIALISE,
+        ends_drive=True,
+    ),
     _sender(
         'second_setpoint', 'a second node publishes 3 A on current_setpoint', 'current_setpoint', third=True
     ),
-    _sender('second_displacement', 'a second node publishes on displacement', 'displacement'),
+    _sender('second_displacement', 'a second node publishes on displacement', 'displacement', third=True),
     _sender('second_air_gap', 'a second node publishes on air_gap', 'air_gap'),
     _sender('second_table', 'a second node publishes on current_force_table', 'table'),
     _sender('table_old', 'the same, a table of an older activation', 'table_old'),
@@ -171,7 +185,7 @@ PROCESSES = (
     _stopped('recorder', '2_s', 2.0, _TOLERATED, third=True),
     _stopped('sim', '200_ms', 0.2, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
     _stopped('sim', '2_s', 2.0, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
-    _lost('control', _WHILE, silent=True),
+    _lost('control', _WHILE, silent=True, third=True),
     _lost('driver', _INITIALISE, silent=True, in_electronics=True, third=True),
     _lost('init', _TOLD),
     _lost('recorder', _TOLD, loses_samples=True),

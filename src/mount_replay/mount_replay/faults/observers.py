@@ -21,7 +21,7 @@ from mount_driver.bus import MULTICAST_GROUP, Reception, open_bus
 from mount_driver.codec import MountCodec, WrongCrcError, WrongLengthError
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.topics import DIAGNOSTICS, SIM_TRUTH
+from mount_ros.topics import AIR_GAP, DIAGNOSTICS, SIM_TRUTH
 
 _LOOK_PERIOD = 0.1  # s: how often a listener looks whether it shall end
 
@@ -67,6 +67,8 @@ class Observers:
         self.heard: list[Heard] = []
         self.seen: list[Seen] = []
         self.told: list[Told] = []
+        self.initialised: list[float] = []
+        """When gaps came: the ends of initialisations."""
         self.active: set[str] = set()
         """The nodes that said last that they are active."""
         self._namespace = namespace
@@ -112,6 +114,7 @@ def observers(context: Context, namespace: str, port: int) -> Iterator[Observers
     path = DataPath(node)
     path.subscribe(SIM_TRUTH, observed.take_truth)
     path.subscribe(DIAGNOSTICS, observed.take_diagnostics)
+    path.subscribe(AIR_GAP, lambda raw: observed.initialised.append(time.monotonic()))
     path.start()
     ending = threading.Event()
     listener = threading.Thread(target=_listen, args=(observed, port, ending), name='bus', daemon=True)

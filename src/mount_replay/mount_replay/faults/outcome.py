@@ -91,6 +91,7 @@ def judged(case: FaultCase, course: Course, observed: Observers) -> Outcome:
         )
     outcome.highest_current = round(max((each.current for each in heard), default=0.0), 4)
     _note_recovery(outcome, case, course)
+    _check_initialised(outcome, case, course, observed)
     if outcome.highest_current > HIGHEST_CURRENT:
         outcome.complaints.append(
             f'{outcome.highest_current} A on the bus; the limit is {HIGHEST_CURRENT:g} A'
@@ -153,6 +154,12 @@ def _note_recovery(outcome: Outcome, case: FaultCase, course: Course) -> None:
             outcome.recovery = 'not needed'
     else:
         outcome.recovery = 'none'
+
+
+def _check_initialised(outcome: Outcome, case: FaultCase, course: Course, observed: Observers) -> None:
+    initialised = [each for each in observed.initialised if course.begun < each < course.damping_again]
+    if case.reaction is Reaction.SAFE_UNTIL_INITIALISED and outcome.recovered and not initialised:
+        outcome.complaints.append('it damps again without a new initialisation')
 
 
 def _check_safe(
