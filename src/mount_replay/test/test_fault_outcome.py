@@ -13,7 +13,7 @@ from mount_ros.nodes.diagnostics import Level
 from mount_sim.electronics.faults.kinds import FAULTS
 
 SENTENCE = 'no frames for 100 ms (limit 20 ms); are the electronics powered?'
-COURSE = Course(begun=10.0, cleared=10.6, damping_again=11.0, over=11.0)
+COURSE = Course(begun=10.0, present=10.0, cleared=10.6, damping_again=11.0, over=11.0)
 
 
 def case(reaction: Reaction, **options) -> FaultCase:
@@ -71,7 +71,7 @@ def test_a_fault_that_must_be_tolerated_may_not_switch_off_or_tell_an_error():
 
 
 def test_a_drive_that_has_ended_has_not_recovered_and_may_only_where_that_is_required():
-    course = Course(begun=10.0, over=11.0, ended=True)
+    course = Course(begun=10.0, present=10.0, over=11.0, ended=True)
     seen = observed(10.02, 11.0, (told(10.1),))
     assert judged(case(Reaction.SAFE_UNTIL_INITIALISED), course, seen).ok
     assert 'does not damp again' in judged(case(Reaction.SAFE_WHILE), course, seen).wrong

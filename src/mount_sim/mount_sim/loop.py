@@ -114,7 +114,8 @@ class ElectronicsLoop:
         reading = mount.measure()
         microseconds = self._count(number)
         taken = self._valid(received)
-        frames = [self._can_end.measurement_frame(self._counted, microseconds, reading, mount.driver_on)]
+        state = mount.driver_on, not mount.enabled
+        frames = [self._can_end.measurement_frame(self._counted, microseconds, reading, *state)]
         if number % STATUS_EVERY == 0:
             frames.append(self._can_end.status_frame(mount.faults.status(self._status())))
         if mount.faults.present:

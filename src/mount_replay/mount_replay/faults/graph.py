@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -31,6 +32,7 @@ _LOOK_PERIOD = 0.005  # s
 _TRACEBACK = 'Traceback (most recent call last)'
 _DRIVE = (
     '--scenario', 'bench', '--duration', '600', '--no-report',
+    '--restarts', '90',  # each fault is one of its own
     '--set', 'mount_sim.timeline.start=3.2',  # chosen: the initialisation takes 3 s of rest
 )  # fmt: skip
 
@@ -77,6 +79,7 @@ class GraphUnderTest:
         self.observed = observed
         self.operator = operator
         self.refusals: list[str] = []
+        self._clients: dict[str, Client] = {}
         self._executor = SingleThreadedExecutor(context=operator.context)
         self._executor.add_node(operator)
         self._shared: set[str] = set()
@@ -159,15 +162,18 @@ class GraphUnderTest:
 
     def call(self, kind: Any, service: str, request: Any, limit: float = PATIENCE) -> Any:
         """Return the answer of a service of the graph, None if there is none."""
-        client = self.operator.create_client(kind, service)
-        try:
-            if not client.wait_for_service(limit):
-                return None
-            answer = client.call_async(request)
-            self._executor.spin_until_future_complete(answer, timeout_sec=limit)
-            return answer.result() if answer.done() else None
-        finally:
-            self.operator.destroy_client(client)
+        client = self.client(kind, service)
+        if not client.wait_for_service(limit):
+            return None
+        answer = client.call_async(request)
+        self._executor.spin_until_future_complete(answer, timeout_sec=limit)
+        return answer.result() if answer.done() else None
+
+    def client(self, kind: Any, service: str) -> Client:
+        """Return the client of a service; made once, for it takes time until the service is found."""
+        if service not in self._clients:
+            self._clients[service] = self.operator.create_client(kind, service)
+        return self._clients[service]
 
     def end(self, limit: float = PATIENCE) -> Ending:
         """End it as Ctrl-C does, if it has not ended by itself, and look for what it has left behind."""

@@ -17,8 +17,9 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
-from mount_replay.faults.graph import GraphUnderTest, GraphUnderTestError
+from mount_replay.faults.graph import PATIENCE, GraphUnderTest, GraphUnderTestError
 
+_INJECT = 'mount_sim/inject_fault'
 _INTRUDER = 'mount_replay.faults.intruder'
 _SHIM = Path(__file__).parent / 'clock_shim'
 CLOCK_FILE = 'ENGINE_MOUNT_CLOCK_STEP'
@@ -59,6 +60,7 @@ class Simulated:
         refusal = refusal_of(graph, 'mount_sim', {'inject': self.text})
         if refusal:
             raise GraphUnderTestError(f'mount_sim does not know the fault {self.text!r}: {refusal}')
+        graph.client(SetBool, _INJECT).wait_for_service(PATIENCE)
 
     def begin(self, graph: GraphUnderTest) -> None:
         self._ask(graph, wanted=True)
@@ -68,7 +70,7 @@ class Simulated:
             self._ask(graph, wanted=False)
 
     def _ask(self, graph: GraphUnderTest, *, wanted: bool) -> None:
-        answer = graph.call(SetBool, 'mount_sim/inject_fault', SetBool.Request(data=wanted))
+        answer = graph.call(SetBool, _INJECT, SetBool.Request(data=wanted))
         if wanted and (answer is None or not answer.success):
             said = 'nothing' if answer is None else answer.message
             raise GraphUnderTestError(f'mount_sim does not take the fault {self.text!r}: {said}')
@@ -184,7 +186,9 @@ class Transitioned:
     back: Steps = ()
 
     def prepare(self, graph: GraphUnderTest) -> None:
-        """Nothing takes time."""
+        """Find the services."""
+        for node, _ in (*self.there, *self.back):
+            graph.client(ChangeState, f'{node}/change_state').wait_for_service(PATIENCE)
 
     def begin(self, graph: GraphUnderTest) -> None:
         for node, transition in self.there:

@@ -15,6 +15,7 @@ AFTER_DETECTION = 0.020  # s: 0 A on the bus, from the first sign that the fault
 AFTER_OCCURRENCE = 0.050  # s: 0 A on the bus, from the beginning of silence
 _NO_CURRENT = 0.01  # A, chosen: below it the coil carries none
 _LAST = 0.1  # s, chosen: the end of a fault, over which the coil's current is told
+_LATENESS = re.compile('no (displacement|setpoint) ')  # of a machine with other work
 _REMEDY = re.compile(r'[;:?,] *\w+ \w+')
 
 
@@ -23,6 +24,7 @@ class Course:
     """One trial of a fault: its times (steady clock, s) and what was printed; NaN where it did not come."""
 
     begun: float
+    present: float = math.nan  # from then on it is there for sure
     cleared: float = math.nan
     damping_again: float = math.nan
     over: float = math.nan  # until when it was observed
@@ -96,7 +98,7 @@ def judged(case: FaultCase, course: Course, observed: Observers) -> Outcome:
         outcome.complaints.append(
             f'{outcome.highest_current} A on the bus; the limit is {HIGHEST_CURRENT:g} A'
         )
-    _CHECKS[case.reaction](outcome, case, course, told, _after(case, observed, zero, end))
+    _CHECKS[case.reaction](outcome, case, course, told, _after(case, course, observed, zero, end))
     return outcome
 
 
@@ -113,11 +115,13 @@ def _zero(case: FaultCase, observed: Observers, course: Course) -> float | None:
     return next((each.time for each in since(observed.heard, course.begun, end) if each.current == 0.0), None)
 
 
-def _after(case: FaultCase, observed: Observers, zero: float | None, end: float) -> list[float]:
+def _after(
+    case: FaultCase, course: Course, observed: Observers, zero: float | None, end: float
+) -> list[float]:
     """Return the currents (A) wanted of the coil between 0 A and the end of the fault."""
     if zero is None:
         return []
-    settled = zero + SETPOINT_TIMEOUT
+    settled = max(zero, course.present) + SETPOINT_TIMEOUT
     if case.in_electronics:
         return [each.followed for each in since(observed.seen, settled, end)]
     return [each.current for each in since(observed.heard, settled, end)]
@@ -203,7 +207,8 @@ def _check_tolerated(
 ) -> None:
     errors = [each for each in told if each.level >= Level.ERROR]
     if errors:
-        outcome.complaints.append(f'{errors[0].node} tells an error: {errors[0].sentence}')
+        complaints = outcome.late if _LATENESS.search(errors[0].sentence) else outcome.complaints
+        complaints.append(f'{errors[0].node} tells an error: {errors[0].sentence}')
     if outcome.zero_s is not None and after:
         outcome.late.append(f'0 A after {outcome.zero_s:.2f} s, though damping should go on')
     if not outcome.recovered:

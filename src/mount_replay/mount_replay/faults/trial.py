@@ -25,6 +25,7 @@ def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
     try:
         course = Course(begun=time.monotonic())
         case.injection.begin(graph)
+        course.present = time.monotonic()
         _observe(case, graph, course, output)
     finally:
         case.injection.end(graph)
@@ -33,7 +34,11 @@ def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
         _recover(case, graph, course, output)
     course.over = time.monotonic()
     course.printed = tuple(output.lines)
-    return judged(case, course, graph.observed)
+    outcome = judged(case, course, graph.observed)
+    if graph.refusals:
+        outcome.detected_by, outcome.sentence = 'each node', '; '.join(graph.refusals)
+        graph.refusals.clear()
+    return outcome
 
 
 def _observe(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> None:
@@ -80,8 +85,6 @@ class _Output:
         lines = self._graph.output.splitlines()
         now = time.monotonic()
         self.lines += [
-            Told(now, 'supervisor', Level.ERROR, line.strip())
-            for line in lines[self._known :]
-            if line.strip()
+            Told(now, 'supervisor', Level.WARN, line.strip()) for line in lines[self._known :] if line.strip()
         ]
         self._known = max(self._known, len(lines))

@@ -71,7 +71,12 @@ class CanEnd:
         return self._now < self._off_until
 
     def measurement_frame(
-        self, number: int, microseconds: int, reading: Reading, enabled: bool
+        self,
+        number: int,
+        microseconds: int,
+        reading: Reading,
+        enabled: bool,
+        setpoint_timeout: bool = False,
     ) -> can.Message:
         """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock.
 
@@ -87,6 +92,7 @@ class CanEnd:
             codec.current_rate.within(reading.current_rate),
             codec.flux_rate.within(reading.flux_rate),
             enabled=enabled,
+            setpoint_timeout=setpoint_timeout,
         )
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
         return Frame(self._codec.measurement.frame_id, data)
