@@ -33,6 +33,16 @@ class Threads:
         with contextlib.suppress(ProcessLookupError):
             os.sched_setscheduler(number, policy, os.sched_param(priority))
 
+    def of_python(self) -> set[int]:
+        """Return the numbers of the threads that take turns with the interpreter."""
+        return {thread.native_id for thread in threading.enumerate() if thread.native_id is not None}
+
+    def waits(self, number: int) -> bool:
+        """Return whether a thread that wants to run has no processor, or runs just now."""
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            return (_TASKS / str(number) / 'stat').read_text().rsplit(')', 1)[1].split()[0] == 'R'
+        return False
+
     def processor_time(self, number: int) -> float:
         """Return the processor time that a thread has used, s; NaN where it has ended."""
         try:
