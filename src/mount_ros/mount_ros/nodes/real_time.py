@@ -11,8 +11,8 @@ A watch gives the priority back, for all of them until the next activation, when
 - an ordinary thread of the process wanted to run and could not (the loops of all graphs take the machine);
 - a loop with a clock of its own missed most of its periods (it gains nothing by its priority).
 
-The watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that, or
-threads in C spin on all cores while another one has it, the system's own bound (RLIMIT_RTTIME) ends the
+The watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that,
+or threads in C spin on all cores while another one has it, the system's own bound (RLIMIT_RTTIME) ends the
 process; the electronics then go to 0 A by their own watch.
 """
 
