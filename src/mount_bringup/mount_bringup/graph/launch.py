@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
+from launch.actions import DeclareLaunchArgument, EmitEvent, LogInfo, OpaqueFunction, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
@@ -22,6 +22,7 @@ from mount_bringup.graph.nodes import GraphNode
 from mount_bringup.graph.order import LaunchArgument, LaunchOrder, launch_order
 from mount_bringup.graph.processes import node_environment
 from mount_ros.environment import prepare_environment
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
 _PATIENCE = '10'  # s, chosen: until a node that was asked to end is terminated
 
@@ -50,9 +51,11 @@ def _graph(
 ) -> list[LaunchDescriptionEntity]:
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
     order = launch_order(nodes, arguments, given)
+    inherited = drop_real_time()
     lock = contextlib.ExitStack()
     lock.enter_context(domain_lock(order.settings.domain, order.settings.namespace))
-    processes = [_node(node, order) for node in order.nodes]
+    priority = order.settings.priority or inherited
+    processes = [_node(node, order, priority) for node in order.nodes]
     processes.append(
         Node(
             package='mount_bringup',
@@ -79,17 +82,18 @@ def _graph(
         RegisterEventHandler(OnProcessExit(target_action=process, on_exit=partial(ended, name)))
         for name, process in zip(names, processes, strict=True)
     ]
-    return [*handlers, *processes]  # handlers first, so that no end can happen unheard
+    told = [LogInfo(msg=started_in_real_time(inherited))] if inherited else []
+    return [*told, *handlers, *processes]  # handlers first, so that no end can happen unheard
 
 
-def _node(node: GraphNode, order: LaunchOrder) -> Node:
+def _node(node: GraphNode, order: LaunchOrder, priority: int) -> Node:
     return Node(
         package=node.package,
         executable=node.name,
         name=node.name,
         namespace=order.settings.namespace,
         parameters=[dict(order.settings.parameters[node.name])],
-        additional_env=node_environment((node,), order.settings.priority),
+        additional_env=node_environment((node,), priority),
         ros_arguments=['--log-level', order.log_level],
         sigterm_timeout=_PATIENCE,
         output='both',

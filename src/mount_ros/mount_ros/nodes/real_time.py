@@ -27,6 +27,7 @@ from typing import NamedTuple, Protocol
 
 from mount_ros.nodes.scheduling import Threads
 
+HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
 WATCH_PERIOD = 0.2  # s, chosen
 _WINDOW = 5  # periods, chosen: 1 s
 _SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
@@ -76,8 +77,8 @@ class RealTime:
     def __init__(
         self, priority: int, threads: Threads | None = None, clock: Callable[[], float] = time.monotonic
     ):
-        self.priority = priority
-        """SCHED_FIFO, 1 .. 98; 0: none is ever taken."""
+        self.priority = min(priority, HIGHEST)
+        """Of SCHED_FIFO; 0: none is ever taken."""
         self.permitted = True
         self.given_back = ''
         """Why the priority was given back since the last activation, with value, limit and remedy."""

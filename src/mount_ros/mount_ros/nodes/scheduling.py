@@ -64,3 +64,8 @@ def drop_real_time() -> int:
             if os.sched_getparam(number).sched_priority:
                 os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
     return highest
+
+
+def started_in_real_time(priority: int) -> str:
+    """Return what is said of a process that `drop_real_time` has found at a `priority`."""
+    return f'started at real-time priority {priority}, now ordinary: only loops of active nodes have it'
