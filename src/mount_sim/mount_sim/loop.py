@@ -114,16 +114,11 @@ class ElectronicsLoop:
         reading = mount.measure()
         microseconds = self._count(number)
         taken = self._valid(received)
-<<<<<<< HEAD
-        state = mount.driver_on, not mount.enabled
-        frames = [self._can_end.measurement_frame(self._counted, microseconds, reading, *state)]
-=======
         frames = [
             self._can_end.measurement_frame(
                 self._counted, microseconds, reading, enabled=mount.driver_on, unheard=not mount.enabled
             )
         ]
->>>>>>> h-faultsim
         if number % STATUS_EVERY == 0:
             frames.append(self._can_end.status_frame(mount.faults.status(self._status())))
         if mount.faults.present:

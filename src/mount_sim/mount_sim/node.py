@@ -19,7 +19,7 @@ from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.real_time import Beats
+from mount_ros.nodes.real_time import Beats, Urgent
 from mount_sim.diagnosis import verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults.schedule import Faults, injected_faults
@@ -38,7 +38,7 @@ class MountSim(SafeLifecycleNode):
     """Stands in for the hardware: everything behind the CAN connector."""
 
     run_time_parameters = frozenset({INJECT})
-    real_time_threads = frozenset({'electronics'})
+    urgent = Urgent(frozenset({'electronics'}))
 
     def __init__(self, **arguments):
         super().__init__('mount_sim', **arguments)

@@ -71,16 +71,7 @@ class CanEnd:
         return self._now < self._off_until
 
     def measurement_frame(
-<<<<<<< HEAD
-        self,
-        number: int,
-        microseconds: int,
-        reading: Reading,
-        enabled: bool,
-        setpoint_timeout: bool = False,
-=======
         self, number: int, microseconds: int, reading: Reading, *, enabled: bool, unheard: bool = False
->>>>>>> h-faultsim
     ) -> can.Message:
         """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock.
 
@@ -97,11 +88,7 @@ class CanEnd:
             codec.current_rate.within(reading.current_rate),
             codec.flux_rate.within(reading.flux_rate),
             enabled=enabled,
-<<<<<<< HEAD
-            setpoint_timeout=setpoint_timeout,
-=======
             setpoint_timeout=unheard,
->>>>>>> h-faultsim
         )
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
         return Frame(self._codec.measurement.frame_id, data)
