@@ -41,6 +41,9 @@ class MountRecorder(SafeLifecycleNode):
     """Receives from `configure` on, records from `activate` to `deactivate`."""
 
     run_time_parameters = frozenset({'mark_text'})
+    real_time_threads = frozenset(
+        {f'{NAME}_io'}
+    )  # the collector; what it takes waits in memory to be written
 
     def __init__(self, name: str = NAME, **arguments):
         super().__init__(name, **arguments)

@@ -13,6 +13,7 @@ from mount_cli.commands import (
     cut,
     drive,
     experiment,
+    faults,
     identify,
     merge,
     record,
@@ -71,6 +72,7 @@ app.command(name='report', epilog=report.EPILOG)(report.report)
 app.command(name='cut', epilog=cut.EPILOG)(cut.cut)
 app.command(name='merge', epilog=merge.EPILOG)(merge.merge)
 app.command(name='experiment', epilog=experiment.EPILOG)(experiment.experiment)
+app.command(name='faults', epilog=faults.EPILOG)(faults.faults)
 app.add_typer(identify.app, name='identify')
 app.command(name='accept', epilog=accept.EPILOG)(accept.accept)
 app.add_typer(calibrate.app)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -22,6 +23,8 @@ from rclpy.parameter import Parameter
 from mount_driver.codec import Setpoint, Status
 from mount_driver.link import Arrival, Refusal
 from mount_driver.node import MountDriver
+from mount_models.coil.heating import CoilHeating
+from mount_models.specimen import default_specimen, save_specimen
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.messages.temperature import temperature_of
@@ -392,3 +395,15 @@ def test_the_codec_of_the_far_end_is_that_of_the_driver(make_driver):
     driver = make_driver()
     assert driver.trigger_configure() == SUCCESS
     assert driver._codec.measurement.data_id == CODEC.measurement.data_id
+
+
+def test_the_driver_takes_the_heating_of_a_specimen_file(make_driver, tmp_path):
+    file = tmp_path / 'left.yaml'
+    save_specimen(replace(default_specimen(), heating=CoilHeating(time_constant=100.0)), file)
+    driver = make_driver(**{'parameters_file': str(file), 'heating.ambient_celsius': 60.0})
+    assert driver.trigger_configure() == SUCCESS
+    assert driver._settings.heating == CoilHeating(time_constant=100.0, ambient_celsius=60.0)
+
+
+def test_a_heating_that_makes_no_sense_is_refused(make_driver):
+    assert make_driver(**{'heating.limit_celsius': 130.0}).trigger_configure() == FAILURE

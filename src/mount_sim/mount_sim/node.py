@@ -1,13 +1,17 @@
 """ROS 2 node of the simulator: parameters in, CAN frames and the rack's instruments out."""
 
 import threading
+from collections.abc import Mapping
+from typing import Any
 
 import can
 from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import Imu
+from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
+from mount_models.quantity import ParameterError
 from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
@@ -15,19 +19,26 @@ from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import Beats
 from mount_sim.diagnosis import verdict
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.faults import Fault
+from mount_sim.electronics.faults.schedule import Faults, injected_faults
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
+
+INJECT = 'inject'
+"""The parameter whose faults the service `~/inject_fault` begins."""
 
 _UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
 
 
 class MountSim(SafeLifecycleNode):
     """Stands in for the hardware: everything behind the CAN connector."""
+
+    run_time_parameters = frozenset({INJECT})
+    real_time_threads = frozenset({'electronics'})
 
     def __init__(self, **arguments):
         super().__init__('mount_sim', **arguments)
@@ -36,6 +47,8 @@ class MountSim(SafeLifecycleNode):
         self.declare_parameter('channel', DriverParameters().channel)
         self.declare_parameter('port', DriverParameters().port)
         self.declare_parameter('answer_patience', 10.0)
+        self.declare_parameter(INJECT, '')
+        self.create_service(SetBool, '~/inject_fault', self._inject)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self._loop: ElectronicsLoop | None = None
@@ -44,7 +57,6 @@ class MountSim(SafeLifecycleNode):
     def configure(self) -> None:
         self._settings = read(self, SimParameters())
         self._excitation = build_excitation(self._settings)
-        self._fault = Fault(self._settings.fault)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
         self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
         self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
@@ -66,9 +78,7 @@ class MountSim(SafeLifecycleNode):
         if self._mount.sample:
             self._prepare_mount()
         self._can_end = CanEnd(bus)
-        self._loop = ElectronicsLoop(
-            self._mount, self._can_end, self._settings.electronics, self._fault, self._publish
-        )
+        self._loop = ElectronicsLoop(self._mount, self._can_end, self._settings.electronics, self._publish)
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
@@ -89,13 +99,36 @@ class MountSim(SafeLifecycleNode):
             self._can_end.close()
             self._can_end = None
 
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        injected_faults(values[INJECT])
+
     def judge(self) -> Verdict:
         assert self._loop is not None
         return verdict(self._loop.figures, self._mount.run, lockstep=self.lockstep)
 
+    def _inject(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Begin the faults that `inject` names, or end all that were begun so."""
+        faults = self._mount.faults if self.active else None
+        try:
+            if faults is None:
+                raise ParameterError('mount_sim is not active: activate it first')
+            text = str(self.get_parameter(INJECT).value)
+            response.message = faults.inject(text) if request.data else faults.end_injected()
+            response.success = True
+            self.get_logger().warning(f'injected faults {response.message}')
+        except ParameterError as error:
+            response.message = str(error)
+        return response
+
+    def beats(self) -> Beats:
+        loop = self._loop
+        return Beats() if loop is None else Beats(loop.figures.samples, loop.figures.overruns)
+
     def _prepare_mount(self) -> None:
-        self._mount = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
-        rehearsal = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
+        settings = self._settings
+        faults = Faults(settings.faults, settings.seed)
+        self._mount = SimulatedMount(settings.plant, self._excitation, settings.seed, faults)
+        rehearsal = SimulatedMount(settings.plant, self._excitation, settings.seed)
         rehearsal.measure()  # loads the compiled plant before simulated time begins
         rehearsal.advance(0.0)
 

@@ -16,6 +16,7 @@ from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
 from mount_sim.electronics.electronics import STATUS_EVERY, Reading
+from mount_sim.electronics.faults.schedule import Faults, check_without_bus
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
@@ -71,7 +72,9 @@ def run_core_into(
 ) -> CoreOutcome:
     """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
     sim = _sim_parameters(parameters)
-    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
+    check_without_bus(sim.faults)
+    faults = Faults(sim.faults, sim.seed)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, faults)
     chain = CoreChain(parameters)
     celsius = _coil_temperature(sim)
     samples = Samples(_BLOCK, chain.policy)
@@ -81,7 +84,7 @@ def run_core_into(
         if not samples.room:
             messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-        if pending is not None and chain.answering.expects(_stamp(mount)):
+        if pending is not None and faults.none_told and chain.answering.expects(_stamp(mount)):
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
@@ -143,11 +146,12 @@ def _take_many(
     """Take samples while all of them are plausible; return how many, and the setpoint (A) for the next."""
     controller = chain.answering.controller
     assert controller is not None
-    ahead = mount.ahead(samples.room)
+    plausibility, ahead = chain.answering.watch.plausibility, mount.ahead(samples.room)
     part = slice(samples.count, samples.count + len(ahead.values))
     taken, arrived, last = loop.run_with(chain.policy)(
         ahead,
         controller.memory,
+        (plausibility.limits, plausibility.memory),
         chain.displacement_range,
         pending,
         samples.readings[part],
