@@ -52,7 +52,7 @@ def test_whatever_ends_the_electronics_is_an_error_of_the_node(
     sim = make_sim(lockstep=lockstep)
     assert sim.trigger_configure() == SUCCESS
 
-    def fail(number):
+    def fail(name, number):
         raise error
 
     monkeypatch.setattr(sim, '_publish', fail)

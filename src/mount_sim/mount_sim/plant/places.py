@@ -40,7 +40,8 @@ PLACES: tuple[str, ...] = Places._fields
 """Names of the places, which are those of their mounts and of the mounts' namespaces."""
 
 _OWN = ('actuator', 'coil', 'temperature', 'mechanics', 'friction', 'contact', 'hydromount', 'electronics')
-_OWN_TOO = ('mount', 'fault.', 'vehicle.elastomer.', 'vehicle.chassis_')
+_ALSO_OWN = ('mount', 'channel', 'port')
+_OWN_PARTS = ('fault.', 'vehicle.elastomer.', 'vehicle.chassis_')
 _SHARED = 'electronics.clock_drift'  # all mounts are sampled in the same millisecond
 
 
@@ -63,7 +64,7 @@ def general_name(name: str) -> str:
     prefix, _, rest = name.partition('.')
     if prefix.removeprefix('mount_') not in PLACES or not prefix.startswith('mount_'):
         return name
-    own = rest == _OWN_TOO[0] or rest.startswith((*(f'{part}.' for part in _OWN), *_OWN_TOO[1:]))
+    own = rest in _ALSO_OWN or rest.startswith((*(f'{part}.' for part in _OWN), *_OWN_PARTS))
     if not own or rest == _SHARED:
         raise ParameterError(f'{rest!r} is common to all mounts: set it without {prefix}.')
     return rest
