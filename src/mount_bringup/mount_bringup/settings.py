@@ -22,7 +22,7 @@ def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
     return {
         'mount_driver': flattened(DriverParameters()),
-        'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0},
+        'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0, 'inject': ''},
         'mount_init': {**flattened(InitParameters()), 'parameters_file': '', 'specimen': ''},
         'mount_control': control.defaults(),
         'mount_recorder': flattened(RecorderParameters()),
@@ -86,10 +86,20 @@ def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]
     return {**values, 'damper': damper_text(damper)}
 
 
+def _texts(name: str, value: Any) -> list[str]:
+    if isinstance(value, (list, tuple)) and value and all(isinstance(text, str) for text in value):
+        return list(value)
+    raise ParameterError(
+        f'{name} must be a list of at least one text, or be left out; instead received {value!r}'
+    )
+
+
 def _typed(name: str, value: Any, default: Any) -> Any:
     if isinstance(default, float) and not isinstance(value, bool):
         with contextlib.suppress(TypeError, ValueError):
             return float(value)  # of 3e-5 too, which is text in YAML
+    if isinstance(default, tuple):
+        return _texts(name, value)
     if not isinstance(value, type(default)):
         raise ParameterError(
             f'{name} must be a {type(default).__name__} such as {default!r}; instead received {value!r}'

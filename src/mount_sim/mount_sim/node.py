@@ -1,10 +1,12 @@
 """ROS 2 node of the simulator: parameters in, CAN frames and the rack's instruments out."""
 
 import threading
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import can
+from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
@@ -18,7 +20,7 @@ from mount_ros.private_rclpy import given_at_start
 from mount_sim.car_loop import CarLoop
 from mount_sim.diagnosis import car_verdict, verdict
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.faults import Fault
+from mount_sim.electronics.faults.schedule import Faults, injected_faults, texts_of_mount
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.instruments import Instruments
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
@@ -27,11 +29,16 @@ from mount_sim.plant.places import general_name, mount_names, values_of_mount
 from mount_sim.plant.simulated_car import CarMount, SimulatedCar, mount_parameters
 from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 
+INJECT = 'inject'
+"""The parameter whose faults the service `~/inject_fault` begins."""
+
 _ALONE = ''  # name of the mount where there is one
 
 
 class MountSim(SafeLifecycleNode):
     """Stands in for the hardware: everything behind the CAN connectors of one mount or of several."""
+
+    run_time_parameters = frozenset({INJECT})
 
     def __init__(self, **arguments):
         super().__init__('mount_sim', **arguments)
@@ -40,6 +47,8 @@ class MountSim(SafeLifecycleNode):
         self.declare_parameter('channel', DriverParameters().channel)
         self.declare_parameter('port', DriverParameters().port)
         self.declare_parameter('answer_patience', 10.0)
+        self.declare_parameter(INJECT, '')
+        self.create_service(SetBool, '~/inject_fault', self._inject)
         self._own = _declare_own(self)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -49,13 +58,11 @@ class MountSim(SafeLifecycleNode):
 
     def configure(self) -> None:
         self._settings = read(self, SimParameters())
-        self._values: dict[str, Any] = {
-            name: self.get_parameter(name).value
-            for name in (*flattened(SimParameters()), 'channel', 'port', *self._own)
-        }
+        self._values: dict[str, Any] = flattened(self._settings)
+        for name in ('channel', 'port', *self._own):
+            self._values[name] = self.get_parameter(name).value
         self._names = mount_names(self._settings.mounts) or (_ALONE,)
         self._excitation = build_excitation(self._settings)
-        self._faults = {name: Fault(mount_parameters(self._values, name).fault) for name in self._names}
         path = self.open_data_path()
         self._instruments = {name: Instruments(path, name) for name in self._names}
         path.start()
@@ -74,7 +81,6 @@ class MountSim(SafeLifecycleNode):
                 mount,
                 can_end,
                 mount_parameters(self._values, name).electronics,
-                self._faults[name],
                 partial(self._publish, name),
             )
         drift = self._settings.electronics.clock_drift
@@ -98,12 +104,38 @@ class MountSim(SafeLifecycleNode):
         while self._can_ends:
             self._can_ends.pop().close()
 
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        for texts in self._injected(values[INJECT]).values():
+            injected_faults(texts)
+
     def judge(self) -> Verdict:
         figures = {name: loop.figures for name, loop in self._loops.items()}
         run = next(iter(self._mounts.values())).run
         if _ALONE in figures:
             return verdict(figures[_ALONE], run, lockstep=self.lockstep)
         return car_verdict(figures, run, lockstep=self.lockstep)
+
+    def _injected(self, text: str) -> dict[str, str]:
+        """Return the faults to inject by mount."""
+        parts = [part.strip() for part in text.split(',')]
+        return {name: ', '.join(texts_of_mount(parts, name, self._names)) for name in self._names}
+
+    def _inject(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Begin the faults that `inject` names, or end all that were begun so."""
+        try:
+            if not self.active:
+                raise ParameterError('mount_sim is not active: activate it first')
+            told = self._injected(str(self.get_parameter(INJECT).value))
+            said = []
+            for name, mount in self._mounts.items():
+                if told[name] or not request.data or name == _ALONE:
+                    what = mount.faults.inject(told[name]) if request.data else mount.faults.end_injected()
+                    said.append(f'{name}: {what}' if name else what)
+            response.message, response.success = '; '.join(said), True
+            self.get_logger().warning(f'injected faults {response.message}')
+        except ParameterError as error:
+            response.message = str(error)
+        return response
 
     def _open_bus(self, interface: str, name: str) -> can.BusABC:
         """Return the bus of a mount; no two mounts may have the same."""
@@ -118,15 +150,17 @@ class MountSim(SafeLifecycleNode):
         return open_bus(interface, bus[0], port=bus[1])
 
     def _prepare_mounts(self) -> None:
-        self._mounts = self._simulated()
-        for mount in self._simulated().values():
+        self._mounts = self._simulated(self._settings.faults)
+        for mount in self._simulated(()).values():
             mount.measure()  # a rehearsal: loads the compiled plant before simulated time begins
             mount.advance(0.0)
 
-    def _simulated(self) -> dict[str, SimulatedMount | CarMount]:
+    def _simulated(self, faults: Sequence[str]) -> dict[str, SimulatedMount | CarMount]:
         if _ALONE in self._names:
-            return {_ALONE: SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)}
-        return {**SimulatedCar(self._values, self._excitation).mounts}
+            settings = self._settings
+            present = Faults(faults, settings.seed)
+            return {_ALONE: SimulatedMount(settings.plant, self._excitation, settings.seed, present)}
+        return {**SimulatedCar({**self._values, 'faults': faults}, self._excitation).mounts}
 
     def _run(self) -> None:
         assert self._loop is not None

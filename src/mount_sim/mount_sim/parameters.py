@@ -12,7 +12,6 @@ from mount_models.hydromount import Hydromount
 from mount_models.quantity import Quantity
 from mount_models.vehicle import Engine, Vehicle
 from mount_sim.electronics.electronics import ElectronicsParameters
-from mount_sim.electronics.faults import FaultParameters
 from mount_sim.electronics.warm_coil import TemperatureCoefficients
 from mount_sim.excitation.scenario import (
     BenchScenario,
@@ -51,7 +50,7 @@ class SimParameters(NamedTuple):
     places: Places = Places()
     hydromount: Hydromount = Hydromount()
     electronics: ElectronicsParameters = ElectronicsParameters()
-    fault: FaultParameters = FaultParameters()
+    faults: tuple[str, ...] = ()
 
     @property
     def plant(self) -> Plant:

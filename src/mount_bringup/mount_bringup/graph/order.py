@@ -17,6 +17,7 @@ from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import with_flattened
 from mount_ros.topics import TOPICS
+from mount_sim.electronics.faults.schedule import FORM, told_faults
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount
@@ -93,6 +94,7 @@ SIM_ARGUMENTS = (
         'duration', 's of excitation, after which the graph ends', ('mount_sim.timeline.duration',)
     ),
     LaunchArgument('port', _PORT, ('mount_driver.port', 'mount_sim.port')),
+    LaunchArgument('fault', f'faults as {FORM}, with commas between them', ('mount_sim.faults',)),
 )
 """The arguments of the graph with the simulated car, besides `config`."""
 
@@ -154,13 +156,16 @@ def _of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str])
         text = given[argument.name]
         for target in argument.sets if text else ():
             node, _, name = target.partition('.')
-            is_text = isinstance(_known()[node][name], str)
-            value = text if is_text else _value(argument.name, text)
+            value = _value(argument.name, text, _known()[node][name])
             settings.setdefault(node, {})[name] = value
     return settings
 
 
-def _value(name: str, text: str) -> Any:
+def _value(name: str, text: str, default: Any) -> Any:
+    if isinstance(default, str):
+        return text
+    if isinstance(default, tuple):
+        return [part.strip() for part in text.split(',')]
     try:
         return plain_yaml(text)
     except YamlError as error:
@@ -183,6 +188,7 @@ def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
         with_flattened(defaults, settings.get(node.name, {}))
     sim = with_flattened(SimParameters(), settings.get(SIM.name, {}))
     seated_mount(sim.mount)
+    told_faults(sim.faults)
     build_excitation(sim)
     check_control_of_mount(settings)
     chosen_control(settings)

@@ -26,6 +26,8 @@ Examples:
 
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
+`engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
+
 `engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.policy=switched_viscous`
 """
 
@@ -46,6 +48,14 @@ def drive(
     topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
     scale: Annotated[
         float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar='NAME@t[:duration]',
+            help='a fault from t s after the start of the simulator on, for so many s or for good; '
+            'may be repeated; list: what there is',
+        ),
     ] = None,
     lockstep: Annotated[
         bool, typer.Option('--lockstep', help='the electronics wait for each answer: deterministic, faster')
@@ -90,6 +100,9 @@ def drive(
     from mount_report.drive.telling import tell_drive, tell_snapshots
     from mount_report.json_file import write_json
 
+    if 'list' in (fault or []):
+        _list_faults()
+        raise typer.Exit
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
@@ -111,6 +124,8 @@ def drive(
     }
     sim = parameters.setdefault('mount_sim', {})
     sim.update({name: value for name, value in given.items() if value is not None})
+    if fault:
+        sim['faults'] = [*sim.get('faults', []), *fault]
     recorder = recorder_options(split or [], snapshot)
     if on_full != 'stop':
         recorder['on_full'] = on_full
@@ -143,3 +158,12 @@ def drive(
         note(console, complaint)
     if complaints:
         raise typer.Exit(1)
+
+
+def _list_faults() -> None:
+    from mount_sim.electronics.faults.kinds import FAULTS
+
+    console = terminal()
+    width = max(map(len, FAULTS))
+    for name, kind in FAULTS.items():
+        console.print(f'{name:{width}}  {kind.meaning}', soft_wrap=True, markup=False, highlight=False)

@@ -46,7 +46,7 @@ def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str
 
     Raises `Interrupted`, `GraphError` or a `ValueError` with the reason.
     """
-    excitation = preflight(order.parameters)
+    excitation = preflight(order.parameters, core=order.mode == 'core')
     for remark in excitation.notes:
         screen.note(remark)
     folder = make_run_folder(order.out, order.scenario)

@@ -9,18 +9,20 @@ from mount_models.actuator.closing import checked_closing
 from mount_models.quantity import with_flattened
 from mount_replay.drive.recorder_options import checked_recorder
 from mount_replay.loop.chain import CoreChain
-from mount_sim.electronics.faults import Fault
+from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant
 
 
-def preflight(parameters: Parameters) -> Excitation:
+def preflight(parameters: Parameters, *, core: bool = False) -> Excitation:
     """Return the excitation of a run, or raise the `ValueError` that says what is wrong with the order."""
     sim = with_flattened(SimParameters(), parameters.get('mount_sim', {}))
     excitation = build_excitation(sim)
-    Fault(sim.fault)
+    told_faults(sim.faults)
+    if core:
+        check_without_bus(sim.faults)
     check_control_of_mount(parameters)
     check_effect(parameters.get('mount_control', {}))
     checked_closing(sim.mechanics, sim.actuator)

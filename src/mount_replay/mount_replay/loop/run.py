@@ -16,6 +16,7 @@ from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
 from mount_sim.electronics.electronics import STATUS_EVERY, Reading
+from mount_sim.electronics.faults.schedule import Faults, check_without_bus
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
@@ -73,7 +74,9 @@ def run_core_into(
 ) -> CoreOutcome:
     """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
     sim = _sim_parameters(parameters)
-    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
+    check_without_bus(sim.faults)
+    faults = Faults(sim.faults, sim.seed)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, faults)
     chain = CoreChain(parameters)
     celsius = coil_temperature(sim)
     samples = Samples(BLOCK, chain.policy)
@@ -83,7 +86,7 @@ def run_core_into(
         if not samples.room:
             messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-        if pending is not None and chain.answering.expects(stamp_of(mount)):
+        if pending is not None and faults.none_told and chain.answering.expects(stamp_of(mount)):
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue

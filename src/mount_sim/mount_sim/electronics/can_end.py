@@ -43,6 +43,10 @@ class CanEnd:
         self._bus = bus
         self._reception = Reception()
         self._codec = MountCodec()
+        self.restart()
+
+    def restart(self) -> None:
+        """Count frames from 0, those that come too, as electronics do that were without power."""
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
         self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint, self._codec.setpoint)
@@ -72,10 +76,10 @@ class CanEnd:
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
         return Frame(self._codec.measurement.frame_id, data)
 
-    def send_status(self, status: Status) -> None:
-        """Send the slow health message."""
+    def status_frame(self, status: Status) -> can.Message:
+        """Return the frame of the slow health message."""
         data = self._codec.encode_status(status, self._status_alive.next())
-        self.send_frame(Frame(self._codec.status.frame_id, data))
+        return Frame(self._codec.status.frame_id, data)
 
     def send_frame(self, frame: can.Message) -> None:
         """Send a frame as it is."""

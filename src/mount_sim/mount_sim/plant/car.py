@@ -86,8 +86,9 @@ class CarSimulation:
             resting_body().view(np.uint8),
             resting_supports(len(supports)).view(np.uint8),
         )
-        for mount, place in zip(mounts, np.split(self.memory.states, len(mounts)), strict=True):
-            mount.keep_state_in(place)
+        bytes_of_each = (np.split(part, len(mounts)) for part in (self.memory.plants, self.memory.states))
+        for mount, plant, state in zip(mounts, *bytes_of_each, strict=True):
+            mount.stand_in(plant, state)
         self._seat = int(seat)
         self._step_time = step_time
 

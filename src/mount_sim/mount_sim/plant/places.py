@@ -6,6 +6,7 @@ from typing import Annotated, Any, NamedTuple
 from mount_models.engine_body import RigidEngine, Support, engine_modes
 from mount_models.quantity import ParameterError, Quantity, check_name
 from mount_models.vehicle import Vehicle
+from mount_sim.electronics.faults.schedule import texts_of_mount
 
 _X = Quantity('m', 'x of the mount, forward of the centre of gravity', -2.0, 2.0, 'chosen')
 _Y = Quantity('m', 'y of the mount, left of the centre of gravity', -2.0, 2.0, 'chosen')
@@ -41,7 +42,7 @@ PLACES: tuple[str, ...] = Places._fields
 
 _OWN = ('actuator', 'coil', 'temperature', 'mechanics', 'friction', 'contact', 'hydromount', 'electronics')
 _ALSO_OWN = ('mount', 'channel', 'port')
-_OWN_PARTS = ('fault.', 'vehicle.elastomer.', 'vehicle.chassis_')
+_OWN_PARTS = ('vehicle.elastomer.', 'vehicle.chassis_')
 _SHARED = 'electronics.clock_drift'  # all mounts are sampled in the same millisecond
 
 
@@ -73,8 +74,11 @@ def general_name(name: str) -> str:
 def values_of_mount(values: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Return the parameters {name: value} of mount_sim as they hold for the mount `name`."""
     own = f'mount_{name}.'
-    general = {key: value for key, value in values.items() if general_name(key) == key}
-    return general | {key[len(own) :]: value for key, value in values.items() if key.startswith(own)}
+    found = {key: value for key, value in values.items() if general_name(key) == key}
+    found |= {key[len(own) :]: value for key, value in values.items() if key.startswith(own)}
+    if name and found.get('faults'):
+        found['faults'] = tuple(texts_of_mount(found['faults'], name, mount_names(found['mounts'])))
+    return found
 
 
 def check_support(name: str, support: str) -> str:

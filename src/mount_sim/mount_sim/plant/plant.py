@@ -95,10 +95,8 @@ class PlantSimulation:
 
     def __init__(self, plant: Plant, seat: Seat, step_time: float):
         plant = Plant(*(checked(part) for part in plant))
-        celsius = plant.electronics.coil_temperature
-        plant = plant._replace(coil=coil_at(plant.coil, plant.temperature, celsius))
         checked_closing(plant.mechanics, plant.actuator)
-        self._plant = record_bytes(plant)
+        self._plant = record_bytes(_warm(plant))
         self._seat = int(seat)
         self._step_time = step_time
         self._state = np.zeros(1, STATE).view(np.uint8)
@@ -112,10 +110,10 @@ class PlantSimulation:
         """What the compiled `read` and `advance` need, for a compiled loop that calls them."""
         return Memory(self._plant, self._state, self._seat, self._step_time)
 
-    def keep_state_in(self, place: NDArray[np.uint8]) -> None:
-        """Have the state in the bytes `place` from now on, where that of several mounts stands together."""
-        place[:] = self._state
-        self._state = place
+    def stand_in(self, plant: NDArray[np.uint8], state: NDArray[np.uint8]) -> None:
+        """Have parameters and state in these bytes from now on, where those of several mounts stand."""
+        plant[:], state[:] = self._plant, self._state
+        self._plant, self._state = plant, state
 
     @property
     def truth(self) -> np.void:
@@ -140,6 +138,10 @@ class PlantSimulation:
         """
         advance(self._plant, self._state, self._seat, values, engine_forces, wanted_current, self._step_time)
 
+    def change(self, plant: Plant) -> None:
+        """Go on from the present state with other parameters; a fault's need not lie within their ranges."""
+        self._plant[:] = record_bytes(_warm(plant))
+
     @property
     def account(self) -> np.void:
         """The energy since the first `advance_with_books`, a record of `mount_models.energy.ACCOUNT`."""
@@ -157,6 +159,12 @@ class PlantSimulation:
         advance_with_books(
             self._plant, self._state, self._account, values, engine_forces, wanted_current, self._step_time
         )
+
+
+def _warm(plant: Plant) -> Plant:
+    """Return the plant with coil and core at their temperature."""
+    celsius = plant.electronics.coil_temperature
+    return plant._replace(coil=coil_at(plant.coil, plant.temperature, celsius))
 
 
 @compiled

@@ -1,5 +1,6 @@
 """Electronics of several mounts and the engine that rests on them, sample by sample, without bus or clock."""
 
+import zlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from mount_models.quantity import checked, with_flattened
 from mount_sim.electronics.electronics import Noise
+from mount_sim.electronics.faults.schedule import Faults
 from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.shaking import Shaking
 from mount_sim.parameters import SimParameters
@@ -35,11 +37,9 @@ class CarMount(MountElectronics):
         self.current = 0.0
         """What the coil is given up to the next sample, A."""
 
-    def advance(
-        self, setpoint: float | None, late: int = 0, driven: Callable[[float], float] | None = None
-    ) -> None:
+    def advance(self, setpoint: float | None, late: int = 0) -> None:
         """Go on to the next sample with a new setpoint (A), or None; as `SimulatedMount.advance`."""
-        self.current = self.wanted(setpoint, late, driven)
+        self.current = self.wanted(setpoint, late)
         self.sample += 1
         self._move()
 
@@ -77,7 +77,8 @@ class SimulatedCar:
         self.mounts: dict[str, CarMount] = {}
         for name in names:
             noise = Noise(general.seed, PLACES.index(name))
-            self.mounts[name] = CarMount(self._move, plants[name], simulations[name], noise, run)
+            faults = Faults(chosen[name].faults, general.seed ^ zlib.crc32(name.encode()))
+            self.mounts[name] = CarMount(self._move, plants[name], simulations[name], noise, run, faults)
         self._currents = np.zeros(len(names))
 
     def _move(self) -> None:
