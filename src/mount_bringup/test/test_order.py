@@ -83,7 +83,8 @@ def test_the_supervisor_is_told_what_it_supervises():
     order = vehicle(namespace='right', record='false', duration='30')
     assert arguments_of(order) == [
         '--node=mount_driver', '--node=mount_init', '--node=mount_control',
-        '--namespace=right', '--domain=7', '--scenario=car', '--duration=30.0',
+        '--namespace=right', '--domain=7', '--scenario=car', '--duration=30.0', '--grouping=APART',
+        '--restart-limit=3',
     ]  # fmt: skip
     assert '--duration=inf' in arguments_of(vehicle())
     assert '--scenario=bench' in arguments_of(sim(scenario='bench'))

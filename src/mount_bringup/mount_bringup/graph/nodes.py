@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 
 
 @dataclass(frozen=True)
@@ -57,18 +58,42 @@ def ending_order(nodes: Sequence[GraphNode]) -> list[GraphNode]:
     return [*(node for node in reversed(nodes) if node not in last), *last]
 
 
+class Grouping(Enum):
+    """Which nodes share a process, and in it a data thread."""
+
+    APART = 'each node has a process of its own'
+    COMPOSED = 'driver, initialisation and control of the mount share one'
+    TOGETHER = 'all nodes share one'
+
+
+def groups(nodes: Sequence[GraphNode], grouping: Grouping) -> list[list[GraphNode]]:
+    """Return the nodes of each process, in start order."""
+    if grouping is Grouping.TOGETHER:
+        return [list(nodes)]
+    if grouping is Grouping.APART:
+        return [[node] for node in nodes]
+    mount = [node for node in nodes if node in (DRIVER, INIT, CONTROL)]
+    return [mount if node is DRIVER else [node] for node in nodes if node not in (INIT, CONTROL)]
+
+
+RESTART_LIMIT = 3
+"""Times (chosen) that a node may be lost within a minute."""
+
+
 @dataclass(frozen=True)
 class GraphSettings:
     """Where the graph runs and with which parameters: {node: {parameter: value}}.
 
-    The nodes live `together` in one process with one data thread, or each in a process of its own. While one
-    of them works in lock-step the others wait for it anyway, and handing over to another thread or process
-    costs more than the work. Where the system permits it the processes run at the real-time `priority`
-    (SCHED_FIFO; 0: off), the recorder's behind those of the 1 kHz loop.
+    The nodes share processes as `grouping` says. In lock-step all share one: while one of them works the
+    others wait for it anyway, and handing over to another thread or process costs more than the work. Where
+    the system permits it the processes run at the real-time `priority` (SCHED_FIFO; 0: off), the recorder's
+    behind those of the 1 kHz loop. In real time a node may be lost `restart_limit` times within a minute
+    before the graph is given up; 0: the first loss ends it.
     """
 
     namespace: str = ''
     domain: int = 0
     parameters: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    together: bool = False
+    grouping: Grouping = Grouping.APART
     priority: int = 0
+    restart_limit: int = RESTART_LIMIT

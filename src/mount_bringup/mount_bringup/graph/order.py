@@ -7,7 +7,16 @@ from typing import Any, NamedTuple
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
-from mount_bringup.graph.nodes import DRIVER, INIT, RECORDER, SIM, GraphNode, GraphSettings
+from mount_bringup.graph.nodes import (
+    DRIVER,
+    INIT,
+    RECORDER,
+    RESTART_LIMIT,
+    SIM,
+    GraphNode,
+    GraphSettings,
+    Grouping,
+)
 from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
@@ -78,6 +87,17 @@ _ANY = (
         default='0',
     ),
     LaunchArgument(
+        'composed',
+        'true: driver, initialisation and control of the mount share a process',
+        default='false',
+        choices=('true', 'false'),
+    ),
+    LaunchArgument(
+        'restarts',
+        'times that a node may be lost within a minute before the graph ends; 0: the first loss ends it',
+        default=str(RESTART_LIMIT),
+    ),
+    LaunchArgument(
         'log_level',
         'what the nodes say at least',
         default='info',
@@ -132,7 +152,9 @@ def launch_order(
             namespace=namespace,
             domain=domain,
             parameters={node.name: settings.get(node.name, {}) for node in chosen},
+            grouping=Grouping.COMPOSED if given['composed'] == 'true' else Grouping.APART,
             priority=_number('priority', given['priority'], 99, int),
+            restart_limit=_number('restarts', given['restarts'], 1000, int),
         ),
         scenario=settings.get(SIM.name, {}).get('scenario', SimParameters().scenario)
         if SIM in nodes

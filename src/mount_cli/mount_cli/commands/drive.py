@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_bringup.graph.nodes import RESTART_LIMIT
 from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
 from mount_cli.terminal import note, terminal
 
@@ -64,6 +65,10 @@ def drive(
         bool,
         typer.Option('--apart', help='lock-step: each node in its own process, as in the car; slower'),
     ] = False,
+    composed: Annotated[
+        bool,
+        typer.Option('--composed', help='driver, initialisation and control of the mount share a process'),
+    ] = False,
     core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
     duration: Annotated[
         float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
@@ -87,6 +92,12 @@ def drive(
         int,
         typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
     ] = 10,
+    restarts: Annotated[
+        int,
+        typer.Option(
+            min=0, help='times that a node may be lost within a minute before the drive ends; 0: none'
+        ),
+    ] = RESTART_LIMIT,
     domain: Domain = None,
     namespace: Namespace = '',
 ) -> None:
@@ -107,6 +118,8 @@ def drive(
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
+    if composed and (lockstep or core):
+        raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
     try:
         parameters = settings_of_options(settings or [])
     except SettingError as error:
@@ -136,7 +149,9 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart)
+    order = DriveOrder(
+        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts
+    )
     console = terminal()
     screen = TerminalScreen(console)
     folder, run, complaints = record_drive(order, screen)

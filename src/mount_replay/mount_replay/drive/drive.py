@@ -13,7 +13,15 @@ from mount_bags.run.session import new_session, session_text
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.ending_signals import ending_signals
-from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph.nodes import (
+    CONTROL,
+    RECORDER,
+    RESTART_LIMIT,
+    SIM,
+    SIMULATED,
+    GraphSettings,
+    Grouping,
+)
 from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_control.diagnosis import fault_sentence
@@ -39,6 +47,8 @@ class DriveOrder:
     out: Path | None = None
     priority: int = 0
     apart: bool = False  # in lock-step too every node has a process of its own
+    composed: bool = False  # in real time driver, initialisation and control share one
+    restart_limit: int = RESTART_LIMIT
 
 
 def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str, Any], list[str]]:
@@ -69,10 +79,12 @@ def _drive_graph(
         namespace=order.namespace,
         domain=order.domain,
         parameters=_node_parameters(order, folder),
-        together=_together(order),
+        grouping=_grouping(order),
         priority=0 if lockstep else order.priority,
+        restart_limit=order.restart_limit,
     )
     supervisor = Supervisor(SIMULATED, settings, folder.logs)
+    supervisor.tell_loss = screen.note
     with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
         try:
             with screen.line('starting') as show:
@@ -91,6 +103,7 @@ def _drive_graph(
             if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
                 supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
+            complaints += [restart.sentence for restart in supervisor.restarts]
             for sentence in supervisor.notes:
                 screen.note(sentence)
     return {
@@ -101,6 +114,7 @@ def _drive_graph(
         'real_time_factor': float(figures['real_time_factor']),
         'latency_median_s': float(figures['latency_median_s']),
         'latency_p99_s': float(figures['latency_p99_s']),
+        'restarts': supervisor.restarts,
     }
 
 
@@ -147,6 +161,7 @@ def _drive_in_core(
         'real_time_factor': outcome.simulated / outcome.wall_time,
         'latency_median_s': float('nan'),
         'latency_p99_s': float('nan'),
+        'restarts': [],
     }
 
 
@@ -161,7 +176,7 @@ def _control_faults(faults: int) -> list[str]:
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
     lockstep = order.mode == 'lock-step'
     can = {
-        'interface': 'virtual' if _together(order) else 'udp_multicast',
+        'interface': 'virtual' if _grouping(order) is Grouping.TOGETHER else 'udp_multicast',
         'port': can_port(order.domain, order.namespace),
     }
     added: dict[str, dict[str, Any]] = {
@@ -178,8 +193,10 @@ def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str
     }
 
 
-def _together(order: DriveOrder) -> bool:
-    return order.mode == 'lock-step' and not order.apart
+def _grouping(order: DriveOrder) -> Grouping:
+    if order.composed:
+        return Grouping.COMPOSED
+    return Grouping.TOGETHER if order.mode == 'lock-step' and not order.apart else Grouping.APART
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:

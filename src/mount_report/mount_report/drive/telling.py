@@ -11,7 +11,7 @@ from mount_bags.audit.report import as_table, sentences
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.recorder.snapshot import saved_snapshots
-from mount_bags.run.folder import RunFolder
+from mount_bags.run.folder import RunFolder, recordings_of
 from mount_bags.run.screen import Screen
 from mount_bringup.chosen import Parameters, policy_of
 from mount_report.drive.evaluation import levels_of, samples_at_the_ends
@@ -39,23 +39,27 @@ def tell_drive(
 ) -> Told:
     """Print and write the figures of a drive, with `report` also its picture and its page.
 
-    `run` is what the run itself knows, `parameters` those of its nodes. A picture or page that cannot be made
-    is a complaint.
+    `run` is what the run itself knows, `parameters` those of its nodes. Where the recorder was started again
+    the figures are those of the longest recording, and the others are audited. A picture or page that cannot
+    be made is a complaint.
     """
-    recording = open_recording(folder.recording)
+    recording, *others = _longest_first(recordings_of(folder.recording))
     drive = load_drive(recording)
     audits = audit(recording)
     found = losses(recording, audits)
     complaints = [*recording.warnings, *found.complaints()]
     complaints += samples_at_the_ends(recording, audits, run['samples'])
+    places = sorted(entry.path for entry in (recording, *others))
+    run = {**run, 'recordings': [str(place) for place in places]}
     figures = summarise(recording, audits, found, drive, parameters, run)
+    complaints += [words for other in others for words in _audited(other, screen)]
     write_json(figures, folder.summary)
     print_summary(figures, found, screen)
     screen.table(as_table(audits))
     if report:
         complaints += _complaint(folder.figure, lambda: _draw(folder, parameters, drive, figures))
         complaints += _complaint(folder.report, lambda: _write_report(folder, recording, screen))
-    return Told(figures, [folder.recording], complaints)
+    return Told(figures, places, complaints)
 
 
 def tell_snapshots(
@@ -65,15 +69,25 @@ def tell_snapshots(
     saved = saved_snapshots(folder.recording)
     complaints: list[str] = []
     for place in saved:
-        recording = open_recording(place)
-        audits = audit(recording)
-        found = losses(recording, audits)
-        screen.say(f'{place.name}: {sentences(audits, found)[-1]}')
-        complaints += [*recording.warnings, *(f'{place.name}: {words}' for words in found.complaints())]
+        complaints += _audited(open_recording(place), screen)
     screen.say(snapshots_sentence(len(saved), recorder))
     figures = summarise_snapshots(saved, run)
     write_json(figures, folder.summary)
     return Told(figures, saved, complaints)
+
+
+def _longest_first(places: list[Path]) -> list[Recording]:
+    """Return the recordings of a run, that of which its figures are made first."""
+    return sorted(map(open_recording, places), key=lambda recording: -len(recording['displacement'].stamps))
+
+
+def _audited(recording: Recording, screen: Screen) -> list[str]:
+    """Say in one sentence what a recording holds; return what is not as it should be."""
+    audits = audit(recording)
+    found = losses(recording, audits)
+    name = recording.path.name
+    screen.say(f'{name}: {sentences(audits, found)[-1]}')
+    return [*recording.warnings, *(f'{name}: {words}' for words in found.complaints())]
 
 
 def _draw(folder: RunFolder, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:

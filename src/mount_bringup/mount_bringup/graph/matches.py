@@ -1,0 +1,23 @@
+"""Which topics that a node cannot do without have no other side yet."""
+
+from collections.abc import Mapping, Sequence
+
+from mount_bringup.graph.nodes import RECORDER, GraphNode
+from mount_ros.topics import SESSION
+
+
+def unmatched(
+    node: GraphNode, figures: Mapping[str, str], nodes: Sequence[GraphNode], namespace: str
+) -> list[str]:
+    """Return the names of these topics, by the node's own `figures`; `nodes` are those of the graph."""
+    if 'unmatched' not in figures:
+        return ['its first diagnostics']
+    prefix = namespace.rstrip('/') + '/'
+    names = {name.rsplit(prefix, 1)[-1] for name in figures['unmatched'].split(', ') if name}
+    return sorted(names & _needed(node, nodes))
+
+
+def _needed(node: GraphNode, nodes: Sequence[GraphNode]) -> set[str]:
+    if node is not RECORDER:
+        return set(node.needs)
+    return {name for other in nodes for name in other.needs} | {SESSION.name}
