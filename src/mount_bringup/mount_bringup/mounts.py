@@ -7,6 +7,7 @@ Of a node that every mount has, `left/mount_control` is that of one mount, `moun
 from collections.abc import Mapping
 from typing import Any
 
+from mount_bringup.settings import OF_EACH
 from mount_models.quantity import ParameterError
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import mount_names, values_of_mount
@@ -14,8 +15,6 @@ from mount_sim.plant.places import mount_names, values_of_mount
 Settings = Mapping[str, Mapping[str, Any]]
 """{node: {parameter: value}}."""
 
-OF_EACH = ('mount_driver', 'mount_init', 'mount_control')
-"""Nodes that each mount has."""
 _SIM = 'mount_sim'
 
 

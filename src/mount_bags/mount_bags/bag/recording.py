@@ -51,6 +51,8 @@ class Recording:
 
     def __init__(self, path: Path):
         self.path = path
+        self.mount = ''
+        """Of which of several mounts these are the topics; empty: of all."""
         self.warnings: list[str] = []
         self.information: BagInformation | None = None
         self.files: list[StoredFile] = self._open()
@@ -77,6 +79,7 @@ class Recording:
         """
         others = [f'/{other}/' for other in self.mounts if other != mount]
         part = copy.copy(self)
+        part.mount = mount
         part.topics = {
             name: topic for name, topic in self.topics.items() if not name.startswith(tuple(others))
         }
