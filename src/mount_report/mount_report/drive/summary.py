@@ -137,7 +137,7 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
 
 
 def print_summary(figures: dict[str, Any], found: Losses, screen: Screen, mount: str = '') -> None:
-    """Print the figures as a table, `mount` before its title; times are s from the first displacement sample."""
+    """Print the figures, `mount` before their title; times are s from the first displacement sample."""
     rows = [
         *(_gap_row(figures, name) for name in ('rest', 'contact')),
         ('excitation', f'from {figures["excitation_start_s"]:.2f} s on'),

@@ -41,9 +41,10 @@ def tell_drive(
 ) -> Told:
     """Print and write the figures of a drive, with `report` also its picture and its page.
 
-    `run` is what the run itself knows, `parameters` those of its nodes. Of several mounts each has figures under
-    `mounts`, a table and a picture; they share a page. Where the recorder was started again the figures are those of the longest recording, and the others are audited. A picture or page that cannot
-    be made is a complaint.
+    `run` is what the run itself knows, `parameters` those of its nodes. Of several mounts each has figures
+    under `mounts`, a table and a picture; they share a page. Where the recorder was started again the figures
+    are those of the longest recording, and the others are audited. A picture or page that cannot be made is a
+    complaint.
     """
     recording, *others = _longest_first(recordings_of(folder.recording))
     places = sorted(entry.path for entry in (recording, *others))
@@ -112,7 +113,14 @@ def tell_snapshots(
 
 def _longest_first(places: list[Path]) -> list[Recording]:
     """Return the recordings of a run, that of which its figures are made first."""
-    return sorted(map(open_recording, places), key=lambda recording: -len(recording['displacement'].stamps))
+
+    def samples(recording: Recording) -> int:
+        return sum(
+            recording.topics[f'/{name}/displacement'.replace('//', '/')].message_count
+            for name in recording.mounts
+        )
+
+    return sorted(map(open_recording, places), key=samples, reverse=True)
 
 
 def _audited(recording: Recording, screen: Screen) -> list[str]:
