@@ -263,8 +263,8 @@ class Recording:
     def times(self) -> dict[str, TopicTimes]:
         """Return the times of all topics: one pass through the files, no message is kept."""
         collectors = {
-            name: TimesCollector(name, declared.information.type, *self._definitions[name])
-            for name, declared in self._declared.items()
+            name: TimesCollector(name, topic.type, *self._definitions[name])
+            for name, topic in self.topics.items()
         }
         for name, block in self._blocks(list(self.topics)):
             collectors[name].add(block)
