@@ -48,6 +48,7 @@ def verdict(figures: ControlFigures) -> Verdict:
         'policy': figures.policy,
         'damper': figures.damper,
         'parameter_changes': figures.parameter_changes,
+        'needs_initialisation': bool(figures.table_refusal),
     }
     level, sentence = _judgement(figures)
     return Verdict(level, sentence, values)

@@ -55,6 +55,8 @@ class SampleWatch:
     def __init__(self) -> None:
         self.first: int | None = None
         self.last: int | None = None
+        self.measured_before = False
+        """Whether the measurements are known to have come without a break before the first sample, too."""
         self.interrupted = False  # since the activation
         self.counts = SampleCounts()
         self._used: int | None = None  # stamp of the last sample that the controller took, ns
@@ -66,7 +68,9 @@ class SampleWatch:
 
     def note(self, stamp: int) -> None:
         """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
-        if self.last is None or abs(stamp - self.last) > _STREAM_BREAK:
+        if self.last is None:
+            self.first, self.last = 0 if self.measured_before else stamp, stamp
+        elif abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
         elif stamp > self.last:
             self.last = stamp

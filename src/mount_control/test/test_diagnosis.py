@@ -91,6 +91,7 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'policy': 'switched_viscous',
         'damper': 'viscous_2000',
         'parameter_changes': 0,
+        'needs_initialisation': False,
     }
 
 

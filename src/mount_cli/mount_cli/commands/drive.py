@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_bringup.graph.nodes import RESTART_LIMIT
 from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
 from mount_cli.terminal import note, terminal
 
@@ -28,6 +29,8 @@ Examples:
 
 `engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
 
+`engine-mount drive --mounts left,right --fault right/coil_open@12` - one engine on two mounts
+
 `engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.policy=switched_viscous`
 """
 
@@ -36,6 +39,10 @@ def drive(
     scenario: Annotated[str, typer.Option(help='motorway, bench, sweep or recorded')] = 'motorway',
     mount: Annotated[
         str, typer.Option(help='friction, friction_off, friction_always_on, hydro or elastomer')
+    ] = '',
+    mounts: Annotated[
+        str,
+        typer.Option(help='mounts with electronics under one engine: of left, right, front, rear'),
     ] = '',
     file: Annotated[
         Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
@@ -64,6 +71,10 @@ def drive(
         bool,
         typer.Option('--apart', help='lock-step: each node in its own process, as in the car; slower'),
     ] = False,
+    composed: Annotated[
+        bool,
+        typer.Option('--composed', help='driver, initialisation and control of the mount share a process'),
+    ] = False,
     core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
     duration: Annotated[
         float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
@@ -87,6 +98,12 @@ def drive(
         int,
         typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
     ] = 10,
+    restarts: Annotated[
+        int,
+        typer.Option(
+            min=0, help='times that a node may be lost within a minute before the drive ends; 0: none'
+        ),
+    ] = RESTART_LIMIT,
     domain: Domain = None,
     namespace: Namespace = '',
 ) -> None:
@@ -107,6 +124,8 @@ def drive(
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
+    if composed and (lockstep or core):
+        raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
     try:
         parameters = settings_of_options(settings or [])
     except SettingError as error:
@@ -114,6 +133,7 @@ def drive(
     given = {
         'scenario': scenario,
         'mount': mount or None,
+        'mounts': mounts or None,
         'seed': seed,
         'timeline.duration': duration,
         'recorded.file': str(file.absolute()) if file else None,
@@ -136,7 +156,9 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart)
+    order = DriveOrder(
+        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts
+    )
     console = terminal()
     screen = TerminalScreen(console)
     folder, run, complaints = record_drive(order, screen)
@@ -148,8 +170,8 @@ def drive(
     complaints += told.complaints
     if json_file is not None:
         write_json(told.figures, json_file)
-    if folder.figure.exists():
-        console.print(f'figure     {folder.figure}', soft_wrap=True)
+    for figure in told.pictures:
+        console.print(f'figure     {figure}', soft_wrap=True)
     if folder.report.exists():
         console.print(f'report     {folder.report}', soft_wrap=True)
     for place in told.recordings:
