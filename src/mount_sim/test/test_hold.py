@@ -15,7 +15,6 @@ from mount_driver.frame import Frame
 from mount_driver.parameters import DriverParameters
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters
-from mount_sim.electronics.faults import Fault, FaultParameters
 from mount_sim.loop import ElectronicsLoop
 
 CODEC = MountCodec()
@@ -37,7 +36,6 @@ class Car:
             mount,
             self._end,
             ElectronicsParameters(),
-            Fault(FaultParameters()),
             lambda number: self.setpoints.append(mount.truth['current_setpoint']),
         )
         self._tap = self.bus()  # hears what the driver sends

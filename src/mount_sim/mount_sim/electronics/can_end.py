@@ -49,6 +49,10 @@ class CanEnd:
         self._bus = bus
         self._reception = Reception()
         self._codec = MountCodec()
+        self.restart()
+
+    def restart(self) -> None:
+        """Count frames from 0, those that come too, as electronics do that were without power."""
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
         self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint, self._codec.setpoint)
@@ -67,10 +71,11 @@ class CanEnd:
         return self._now < self._off_until
 
     def measurement_frame(
-        self, number: int, microseconds: int, reading: Reading, enabled: bool
+        self, number: int, microseconds: int, reading: Reading, *, enabled: bool, unheard: bool = False
     ) -> can.Message:
         """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock.
 
+        `enabled`: the power stage is on; `unheard`: it is off because setpoints stopped.
         What lies beyond the limits of its signal, and so of its sensor, is sent as not valid.
         """
         codec = self._codec
@@ -83,14 +88,15 @@ class CanEnd:
             codec.current_rate.within(reading.current_rate),
             codec.flux_rate.within(reading.flux_rate),
             enabled=enabled,
+            setpoint_timeout=unheard,
         )
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
         return Frame(self._codec.measurement.frame_id, data)
 
-    def send_status(self, status: Status) -> None:
-        """Send the slow health message."""
+    def status_frame(self, status: Status) -> can.Message:
+        """Return the frame of the slow health message."""
         data = self._codec.encode_status(status, self._status_alive.next())
-        self.send_frame(Frame(self._codec.status.frame_id, data))
+        return Frame(self._codec.status.frame_id, data)
 
     def send_frame(self, frame: can.Message) -> None:
         """Send a frame as it is."""
