@@ -53,9 +53,10 @@ def _off(name: str, words: str, **options) -> FaultCase:
     return _simulated(name, _INITIALISE, words, ends_drive=True, **options)
 
 
-def _sender(name: str, meaning: str, kind: str, reaction: Reaction = _WHILE, **options) -> FaultCase:
-    """Somebody sends what only one may send."""
-    return FaultCase(name, meaning, Intruder(kind), reaction, _ANOTHER, lasts=1.0, **options)
+def _sender(name: str, meaning: str, kind: str, **options) -> FaultCase:
+    """Somebody sends what only one may send: nobody knows whom to believe, and the drive ends."""
+    injection = Intruder(kind)
+    return FaultCase(name, meaning, injection, _INITIALISE, _ANOTHER, 1.0, ends_drive=True, **options)
 
 
 def _flood(name: str, meaning: str, kind: str) -> FaultCase:
@@ -148,26 +149,12 @@ COIL = (
     _at_start('gap_blocked', 'gap|contact|closed', third=True),
 )
 SENDERS = (
-    _sender(
-        'second_host',
-        'a second CAN host asks for 3 A',
-        'can_host',
-        _INITIALISE,
-        third=True,
-        ends_drive=True,
-        in_electronics=True,
-    ),
-    _sender(
-        'second_electronics',
-        'second electronics send samples at rest',
-        'can_electronics',
-        _INITIALISE,
-        ends_drive=True,
-    ),
+    _sender('second_host', 'a second CAN host asks for 3 A', 'can_host', third=True, in_electronics=True),
+    _sender('second_electronics', 'second electronics send samples at rest', 'can_electronics'),
     _sender(
         'second_setpoint', 'a second node publishes 3 A on current_setpoint', 'current_setpoint', third=True
     ),
-    _sender('second_displacement', 'a second node publishes on displacement', 'displacement', third=True),
+    _sender('second_displacement', 'a second node publishes on displacement', 'displacement'),
     _sender('second_air_gap', 'a second node publishes on air_gap', 'air_gap'),
     _sender('second_table', 'a second node publishes on current_force_table', 'table'),
     _sender('table_old', 'the same, a table of an older activation', 'table_old'),

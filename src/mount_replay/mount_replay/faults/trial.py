@@ -11,7 +11,7 @@ from mount_replay.faults.observers import Told
 from mount_replay.faults.outcome import Course, Outcome, judged
 from mount_ros.nodes.diagnostics import Level
 
-_END_PATIENCE = 40.0  # s, chosen: for the end of a drive that closes and audits its recording
+_END_PATIENCE = 20.0  # s, chosen: for the end of a drive that closes and audits its recording
 _RECOVERY_PATIENCE = 8.0  # s, chosen
 _AT_REST = 0.6  # s, chosen: so long a graph that must not recover by itself is watched
 _OWN_RECOVERY = 12.0  # s, chosen: a supervisor that initialises again by itself has done so by then
