@@ -163,7 +163,7 @@ class GraphUnderTest:
     def call(self, kind: Any, service: str, request: Any, limit: float = PATIENCE) -> Any:
         """Return the answer of a service of the graph, None if there is none."""
         client = self.client(kind, service)
-        if not client.wait_for_service(limit):
+        if not self.wait_until(client.service_is_ready, limit):
             return None
         answer = client.call_async(request)
         self._executor.spin_until_future_complete(answer, timeout_sec=limit)

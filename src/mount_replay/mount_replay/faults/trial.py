@@ -53,7 +53,8 @@ def _observe(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_O
 
 def _recover(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> None:
     """Wait for damping; where a new initialisation is required, see that there is none before it."""
-    if case.reaction is Reaction.SAFE_UNTIL_INITIALISED and not _back(graph, course, _OWN_RECOVERY, output):
+    by_hand = case.reaction is Reaction.SAFE_UNTIL_INITIALISED
+    if by_hand and not _back(graph, course, _OWN_RECOVERY, output) and not course.ended:
         for node in ('mount_control', 'mount_init', 'mount_driver'):
             take_through(graph, node, DEACTIVATE)
         for node in ('mount_driver', 'mount_init', 'mount_control'):
