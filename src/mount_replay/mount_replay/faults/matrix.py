@@ -48,6 +48,12 @@ def _at_start(name: str, words: str, **options) -> FaultCase:
     )
 
 
+def _from_start(name: str, lasts: float) -> FaultCase:
+    """A fault that cannot come or go during a run, and that must be tolerated."""
+    told = ('--set', 'mount_sim.faults=["clock_drift@0", "counter_wrap@8"]')
+    return FaultCase(name, FAULTS[name].meaning, Unchanged(), _TOLERATED, lasts=lasts, options=told)
+
+
 def _off(name: str, words: str, **options) -> FaultCase:
     """A fault of the coil or its supply: the drive ends."""
     return _simulated(name, _INITIALISE, words, ends_drive=True, **options)
@@ -94,15 +100,8 @@ BUS = (
 )
 CLOCKS = (
     _simulated('clock_jump', _INITIALISE, 'restart|clock|initialis'),
-    _simulated('clock_drift', _TOLERATED, lasts=2.0),
-    FaultCase(
-        'counter_wrap',
-        FAULTS['counter_wrap'].meaning,
-        Unchanged(),
-        _TOLERATED,
-        lasts=3.5,
-        options=('--set', 'mount_sim.faults=["counter_wrap@6"]'),
-    ),
+    _from_start('clock_drift', lasts=2.0),
+    _from_start('counter_wrap', lasts=6.0),
     _simulated('electronics_reset', _INITIALISE, 'restart|initialis', silent=True, third=True),
     FaultCase(
         'clock_forward', 'the system clock goes an hour ahead', ClockStep(_HOUR), _TOLERATED, clock=True
