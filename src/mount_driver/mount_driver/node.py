@@ -17,6 +17,7 @@ from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import Urgent
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
@@ -25,7 +26,7 @@ _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses
 class MountDriver(SafeLifecycleNode):
     """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
 
-    real_time_threads = frozenset({'data', 'can_receive'})
+    urgent = Urgent(frozenset({'data', 'can_receive'}))
 
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)

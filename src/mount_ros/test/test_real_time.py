@@ -3,19 +3,19 @@
 import pytest
 
 from mount_ros.nodes import real_time
-from mount_ros.nodes.real_time import WATCH_PERIOD, Beats, RealTime
+from mount_ros.nodes.real_time import WATCH_PERIOD, Beats, RealTime, Urgent
 
 NAMES = {
     1: 'MainThread', 2: 'mount_driver', 3: 'diagnostics', 4: 'data', 5: 'can_receive',
     6: 'dds.shm.12413', 7: 'dds.shm.wdog', 8: 'dds.asyn.0.0', 9: 'dds.ev.0', 10: 'dds.udp.12413',
 }  # fmt: skip
-WATCH, LOOP = 1, {4, 5, 6}
+WATCH, BESIDE, LOOP, TIMERS = 1, {2, 3}, {4, 5, 6}, 9
+ALL = {WATCH, *BESIDE, *LOOP}
 
 
 class Loop:
-    real_time_threads = frozenset({'data', 'can_receive'})
-
-    def __init__(self):
+    def __init__(self, interpreter=True):
+        self.urgent = Urgent(frozenset({'data', 'can_receive'}), interpreter)
         self.kept = Beats()
 
     def beats(self):
@@ -29,6 +29,7 @@ class FakeThreads:
         self.priorities = dict.fromkeys(NAMES, 0)
         self.shown = dict(NAMES)
         self.times = dict.fromkeys(NAMES, 0.0)
+        self.waiting = set()
         self.permitted = permitted
 
     def names(self):
@@ -39,6 +40,12 @@ class FakeThreads:
             raise PermissionError
         self.priorities[number] = priority
 
+    def of_python(self):
+        return {WATCH, *BESIDE, 4, 5} & self.shown.keys()
+
+    def waits(self, number):
+        return number in self.waiting
+
     def processor_time(self, number):
         return self.times[number]
 
@@ -46,31 +53,12 @@ class FakeThreads:
         return {number for number, priority in self.priorities.items() if priority}
 
 
-class FakePulse:
-    beats = True
-
-    def __init__(self):
-        self._count = 0
-
-    @property
-    def count(self):
-        self._count += FakePulse.beats
-        return self._count
-
-    def start(self):
-        """Nothing to start."""
-
-    stop = start
-
-
 @pytest.fixture
 def system(monkeypatch):
     system = FakeThreads()
     system.bounds = []
     system.now = 0.0
-    monkeypatch.setattr(real_time, '_Pulse', FakePulse)
     monkeypatch.setattr(real_time, 'bound', lambda *limits: system.bounds.append(limits))
-    monkeypatch.setattr(FakePulse, 'beats', True)
     return system
 
 
@@ -93,7 +81,7 @@ def test_the_threads_of_the_data_have_the_priority_while_a_node_is_active(system
     whole, loop = shared(system), Loop()
     assert not system.urgent()
     whole.begin(loop)
-    assert system.urgent() == {WATCH, *LOOP}
+    assert system.urgent() == ALL
     assert {system.priorities[number] for number in LOOP} == {10}
     assert whole.held == 10
     whole.end(loop)
@@ -101,10 +89,17 @@ def test_the_threads_of_the_data_have_the_priority_while_a_node_is_active(system
     assert whole.held == 0
 
 
-def test_the_watch_runs_above_the_loop_and_the_system_bounds_both(system):
+def test_who_can_wait_for_the_interpreter_leaves_the_others_ordinary(system):
+    whole = shared(system, priority=5)
+    whole.begin(Loop(interpreter=False))
+    assert system.urgent() == {WATCH, *LOOP}
+
+
+def test_the_watch_runs_above_the_loop_who_takes_turns_with_it_behind_and_the_system_bounds_both(system):
     whole = shared(system)
     whole.begin(Loop())
     assert system.priorities[WATCH] == 11
+    assert {system.priorities[number] for number in BESIDE} == {9}
     assert system.bounds
 
 
@@ -123,7 +118,7 @@ def test_of_two_nodes_in_a_process_the_last_one_ends_it(system):
     whole.begin(first)
     whole.begin(second)
     whole.end(first)
-    assert system.urgent() == {WATCH, *LOOP}
+    assert system.urgent() == ALL
     whole.end(second)
     assert not system.urgent()
 
@@ -145,7 +140,7 @@ def test_a_loop_within_its_share_keeps_it(system):
     whole = shared(system)
     whole.begin(Loop())
     assert looks(whole, system, 100, {4: 0.5, 5: 0.5, 6: 0.75}) == []
-    assert system.urgent() == {WATCH, *LOOP}
+    assert system.urgent() == ALL
 
 
 def test_a_thread_that_uses_more_than_its_share_ends_it_within_two_seconds(system):
@@ -165,15 +160,22 @@ def test_a_burst_within_a_window_is_no_overuse(system):
     assert said == []
 
 
-def test_ordinary_threads_that_do_not_come_to_run_end_it(system, monkeypatch):
+def test_an_ordinary_thread_that_waits_for_a_processor_ends_it(system):
     whole = shared(system)
     whole.begin(Loop())
     assert looks(whole, system, 5) == []
-    monkeypatch.setattr(FakePulse, 'beats', False)
+    system.waiting = {TIMERS}
     said = looks(whole, system, round(1.0 / WATCH_PERIOD))
     assert len(said) == 1
-    assert 'did not come to run for 0.6 s (limit 0.6 s)' in said[0]
+    assert 'had to wait for a processor for 0.6 s (limit 0.6 s)' in said[0]
     assert not system.urgent()
+
+
+def test_an_ordinary_thread_that_is_seen_waiting_but_runs_between_is_served(system):
+    whole = shared(system)
+    whole.begin(Loop())
+    system.waiting = {TIMERS}
+    assert looks(whole, system, 50, {TIMERS: 0.001}) == []
 
 
 @pytest.mark.parametrize(('missed', 'kept'), [(90, True), (150, False)])
@@ -206,4 +208,4 @@ def test_what_was_given_back_stays_so_until_the_next_activation(system):
     assert whole.given_back
     whole.begin(loop)
     assert not whole.given_back
-    assert system.urgent() == {WATCH, *LOOP}
+    assert system.urgent() == ALL

@@ -79,10 +79,10 @@ class Spinning(SafeLifecycleNode):
     def configure(self):
         path = self.open_data_path()
         path.attend(lambda: True)  # never sleeps: there is always something to do
-    def activate(self):
-        self.active_policy = policy('data')
     def _turn(self):
         getattr(self, 'trigger_' + next(self.turn, 'nothing'), lambda: None)()
+        if self.real_time.held:
+            self.active_policy = policy('data')
         if self.active and self.real_time.given_back:
             print(self.active_policy, policy('data'), policy('MainThread'), flush=True)
             print(self.sentence, flush=True)

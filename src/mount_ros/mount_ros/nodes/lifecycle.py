@@ -12,7 +12,7 @@ from mount_ros.data_thread import DataThread
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
 from mount_ros.nodes.parameters import refuse_unknown
-from mount_ros.nodes.real_time import Beats, RealTime
+from mount_ros.nodes.real_time import Beats, RealTime, Urgent
 from mount_ros.private_rclpy import OpenLifecycleNode, integer_as_float
 
 
@@ -46,8 +46,8 @@ class SafeLifecycleNode(OpenLifecycleNode):
     run_time_parameters: frozenset[str] = frozenset()
     """Names of the parameters that can be set on the configured node: `check_parameters`, `take_changes`."""
 
-    real_time_threads: frozenset[str] = frozenset({'data'})
-    """Names of its threads that work in real time while it is active, besides those of the middleware."""
+    urgent = Urgent(frozenset({'data'}))
+    """Its threads that work in real time while it is active."""
 
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
@@ -149,11 +149,12 @@ class SafeLifecycleNode(OpenLifecycleNode):
         return outcome
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.real_time.begin(self)
         outcome = self._attempt('activate', self.activate, undo=self.deactivate)
         self._active = outcome == TransitionCallbackReturn.SUCCESS
-        if not self._active:
-            self.real_time.end(self)
+        if self._active:
+            self.real_time.begin(self)
+        else:
+            self.real_time.end(self)  # where the activation itself took it
         return outcome
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:

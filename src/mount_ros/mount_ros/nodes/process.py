@@ -18,7 +18,7 @@ from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
-from mount_ros.nodes.scheduling import drop_real_time
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 from mount_ros.nodes.starter import Starter, given_priority
 
 _SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
@@ -52,7 +52,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         node.real_time = real_time
     logger = nodes[0].get_logger()
     if inherited:
-        logger.warning(f'started at real-time priority {inherited}: that is for the loop of an active node')
+        logger.warning(started_in_real_time(inherited))
     over.listen(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     _freeze()
     services = [_Service(node, over) for node in nodes]

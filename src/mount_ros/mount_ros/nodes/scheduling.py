@@ -33,6 +33,16 @@ class Threads:
         with contextlib.suppress(ProcessLookupError):
             os.sched_setscheduler(number, policy, os.sched_param(priority))
 
+    def of_python(self) -> set[int]:
+        """Return the numbers of the threads that take turns with the interpreter."""
+        return {thread.native_id for thread in threading.enumerate() if thread.native_id is not None}
+
+    def waits(self, number: int) -> bool:
+        """Return whether a thread that wants to run has no processor, or runs just now."""
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            return (_TASKS / str(number) / 'stat').read_text().rsplit(')', 1)[1].split()[0] == 'R'
+        return False
+
     def processor_time(self, number: int) -> float:
         """Return the processor time that a thread has used, s; NaN where it has ended."""
         try:
@@ -54,3 +64,8 @@ def drop_real_time() -> int:
             if os.sched_getparam(number).sched_priority:
                 os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
     return highest
+
+
+def started_in_real_time(priority: int) -> str:
+    """Return what is said of a process that `drop_real_time` has found at a `priority`."""
+    return f'started at real-time priority {priority}, now ordinary: only loops of active nodes have it'

@@ -71,15 +71,11 @@ class CanEnd:
         return self._now < self._off_until
 
     def measurement_frame(
-        self,
-        number: int,
-        microseconds: int,
-        reading: Reading,
-        enabled: bool,
-        setpoint_timeout: bool = False,
+        self, number: int, microseconds: int, reading: Reading, *, enabled: bool, unheard: bool = False
     ) -> can.Message:
         """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock.
 
+        `enabled`: the power stage is on; `unheard`: it is off because setpoints stopped.
         What lies beyond the limits of its signal, and so of its sensor, is sent as not valid.
         """
         codec = self._codec
@@ -92,7 +88,7 @@ class CanEnd:
             codec.current_rate.within(reading.current_rate),
             codec.flux_rate.within(reading.flux_rate),
             enabled=enabled,
-            setpoint_timeout=setpoint_timeout,
+            setpoint_timeout=unheard,
         )
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
         return Frame(self._codec.measurement.frame_id, data)
