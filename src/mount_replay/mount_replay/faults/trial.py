@@ -7,8 +7,8 @@ from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.graph import GraphUnderTest
 from mount_replay.faults.injections import take_through
 from mount_replay.faults.matrix import ACTIVATE, DEACTIVATE
-from mount_replay.faults.observers import Told
-from mount_replay.faults.outcome import Course, Outcome, judged
+from mount_replay.faults.observers import Told, since
+from mount_replay.faults.outcome import Course, Outcome, judged, tells
 from mount_ros.nodes.diagnostics import Level
 
 _END_PATIENCE = 20.0  # s, chosen: for the end of a drive that closes and audits its recording
@@ -25,12 +25,12 @@ def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
     try:
         course = Course(begun=time.monotonic())
         case.injection.begin(graph)
-        course.present = time.monotonic()
         _observe(case, graph, course, output)
     finally:
+        cleared = time.monotonic()
         case.injection.end(graph)
     if not course.ended:
-        course.cleared = time.monotonic()
+        course.cleared = cleared
         _recover(case, graph, course, output)
     course.over = time.monotonic()
     course.printed = tuple(output.lines)
@@ -60,6 +60,15 @@ def _recover(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_O
         for node in ('mount_driver', 'mount_init', 'mount_control'):
             take_through(graph, node, ACTIVATE)
     _back(graph, course, _RECOVERY_PATIENCE, output)
+    if case.reaction is Reaction.TOLD:
+        graph.wait_until(lambda: _is_told(case, graph, course, output), _RECOVERY_PATIENCE)
+
+
+def _is_told(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> bool:
+    """Return whether a sentence has come: a supervisor tells of a node when it has brought it back."""
+    output.look()
+    told = [*since(graph.observed.told, course.begun), *output.lines]
+    return any(tells(case, each) for each in told)
 
 
 def _back(graph: GraphUnderTest, course: Course, limit: float, output: '_Output') -> bool:
