@@ -178,7 +178,7 @@ PROCESSES = (
     _lost('sim', _INITIALISE, silent=True, ends_drive=True),
     FaultCase(
         'kill_supervisor', 'SIGKILL of the supervisor', Killed('supervisor'), _INITIALISE,
-        'started this one has ended', ends_drive=True,
+        'started this one .* has ended', ends_drive=True,
     ),
     FaultCase(
         'interrupt', 'Ctrl-C amid damping', Killed('supervisor', SIGINT), _INITIALISE, 'interrupted',

@@ -135,7 +135,7 @@ def _note_telling(
     found = [each for each in told if tells(case, each)]
     times = [zero] if zero is not None and case.reaction in SAFE else []
     if found:
-        gravest = max(found, key=lambda each: (each.level, -each.time))
+        gravest = max(found, key=lambda each: (each.level, not _lacking(each.sentence), -each.time))
         outcome.sentence, outcome.detected_by = gravest.sentence, found[0].node
         times.append(found[0].time)
     if times and course.begun <= min(times):
@@ -209,13 +209,16 @@ def _check_tolerated(
 
 
 def _check_sentence(outcome: Outcome) -> None:
-    if not outcome.sentence:
+    if outcome.sentence:
+        outcome.complaints += [f'the sentence has no {what}' for what in _lacking(outcome.sentence)]
+    else:
         outcome.complaints.append('nothing tells of it')
-        return
-    if not re.search(r'\d', outcome.sentence):
-        outcome.complaints.append('the sentence has no value')
-    if not _REMEDY.search(outcome.sentence):
-        outcome.complaints.append('the sentence has no remedy')
+
+
+def _lacking(sentence: str) -> list[str]:
+    """Return what a sentence lacks, as far as its form shows."""
+    found = {'value': re.search(r'\d', sentence), 'remedy': _REMEDY.search(sentence)}
+    return [what for what, there in found.items() if not there]
 
 
 _CHECKS = {

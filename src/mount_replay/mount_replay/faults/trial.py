@@ -84,17 +84,22 @@ def _back(graph: GraphUnderTest, course: Course, limit: float, output: '_Output'
 
 
 class _Output:
-    """The lines that the command and its nodes print from now on, as what the supervisor tells."""
+    """The lines that the command and its nodes print from now on, as what they tell."""
 
     def __init__(self, graph: GraphUnderTest):
         self.lines: list[Told] = []
         self._graph = graph
-        self._known = len(graph.output.splitlines())
+        self._known: dict[str, int] = {}
+        self.look()
+        self.lines.clear()
 
     def look(self) -> None:
-        lines = self._graph.output.splitlines()
+        """Take what was printed since the last look."""
         now = time.monotonic()
-        self.lines += [
-            Told(now, 'supervisor', Level.WARN, line.strip()) for line in lines[self._known :] if line.strip()
-        ]
-        self._known = max(self._known, len(lines))
+        for name, text in self._graph.outputs().items():
+            new = text[self._known.get(name, 0) :]
+            whole = new[: new.rfind('\n') + 1]
+            self._known[name] = self._known.get(name, 0) + len(whole)
+            self.lines += [
+                Told(now, name, Level.WARN, line.strip()) for line in whole.splitlines() if line.strip()
+            ]
