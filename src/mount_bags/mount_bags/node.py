@@ -28,6 +28,7 @@ from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import Urgent
 from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
 NAME = 'mount_recorder'
@@ -43,6 +44,7 @@ class MountRecorder(SafeLifecycleNode):
     """Receives from `configure` on, records from `activate` to `deactivate`."""
 
     run_time_parameters = frozenset({'mark_text'})
+    urgent = Urgent(frozenset({f'{NAME}_io'}), interpreter=False)  # the collector; its queues hold seconds
 
     def __init__(self, name: str = NAME, **arguments):
         super().__init__(name, **arguments)

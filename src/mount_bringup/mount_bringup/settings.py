@@ -25,7 +25,7 @@ class SettingError(ParameterError):
 def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
     return {
-        'mount_driver': flattened(DriverParameters()),
+        'mount_driver': {**flattened(DriverParameters()), 'parameters_file': '', 'specimen': ''},
         'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0, 'inject': ''},
         'mount_init': {**flattened(InitParameters()), 'parameters_file': '', 'specimen': ''},
         'mount_control': control.defaults(),

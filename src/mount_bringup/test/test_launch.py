@@ -89,6 +89,18 @@ def test_nodes_and_their_supervisor_end_with_launch_and_run_at_the_priority_aske
     launched.end_all()
 
 
+def test_the_real_time_priority_that_launch_runs_at_is_the_loops_and_not_that_of_the_start(
+    launch, monkeypatch
+):
+    monkeypatch.setattr(launch, 'drop_real_time', lambda: 20)
+    launched = Launched(launch, 'sim', recording='bags/first', namespace='left')
+    told = {name: process['additional_env'] for name, process in launched.processes.items()}
+    assert told['mount_control']['ENGINE_MOUNT_PRIORITY'] == '20'
+    assert told['mount_recorder']['ENGINE_MOUNT_PRIORITY'] == '10'
+    assert 'priority 20, now ordinary' in launch.LogInfo.call_args.kwargs['msg']
+    launched.end_all()
+
+
 def test_a_second_launch_in_the_namespace_is_refused_until_the_last_process_of_the_first_has_ended(launch):
     first = Launched(launch, 'sim', recording='bags/first', namespace='left')
     other = Launched(launch, 'vehicle', recording='bags/first', namespace='right')

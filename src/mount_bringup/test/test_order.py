@@ -103,7 +103,7 @@ def test_the_supervisor_is_told_what_it_supervises():
         ({'port': '['}, r'^port:=\[ is not valid YAML'),
         ({'duration': 'long'}, 'timeline.duration must be a float'),
         ({'port': '80'}, r'port \(80 1\) must lie within 1024'),
-        ({'priority': '-1'}, r'priority:=-1 must be a number within 0 \.\. 99'),
+        ({'priority': '-1'}, r'priority:=-1 must be a number within 0 \.\. 98'),
         ({'parameters_file': 'none.yaml'}, 'none.yaml'),
         ({'config': 'none.yaml'}, 'none.yaml cannot be read'),
     ],

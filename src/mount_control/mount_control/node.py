@@ -144,6 +144,8 @@ class MountControl(SafeLifecycleNode):
                 policy=self._settings.parameters.policy,
                 damper=self.get_parameter('damper').value,
                 parameter_changes=self._parameter_changes,
+                doubt=answering.watch.plausibility.sentence,
+                doubted=answering.watch.plausibility.held,
             )
         )
 

@@ -117,7 +117,11 @@ class ElectronicsLoop:
         reading = mount.measure()
         microseconds = self._count(number)
         taken = self._valid(received)
-        frames = [self._can_end.measurement_frame(self._counted, microseconds, reading, mount.driver_on)]
+        frames = [
+            self._can_end.measurement_frame(
+                self._counted, microseconds, reading, enabled=mount.driver_on, unheard=not mount.enabled
+            )
+        ]
         if number % STATUS_EVERY == 0:
             frames.append(self._can_end.status_frame(mount.faults.status(self._status())))
         if mount.faults.present:

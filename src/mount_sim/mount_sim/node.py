@@ -16,6 +16,7 @@ from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import Beats, Urgent
 from mount_ros.private_rclpy import given_at_start
 from mount_sim.car_loop import CarLoop
 from mount_sim.diagnosis import car_verdict, verdict
@@ -39,6 +40,7 @@ class MountSim(SafeLifecycleNode):
     """Stands in for the hardware: everything behind the CAN connectors of one mount or of several."""
 
     run_time_parameters = frozenset({INJECT})
+    urgent = Urgent(frozenset({'electronics'}))
 
     def __init__(self, **arguments):
         super().__init__('mount_sim', **arguments)
@@ -136,6 +138,12 @@ class MountSim(SafeLifecycleNode):
         except ParameterError as error:
             response.message = str(error)
         return response
+
+    def beats(self) -> Beats:
+        figures = [loop.figures for loop in self._loops.values()]
+        if not figures:
+            return Beats()
+        return Beats(min(each.samples for each in figures), max(each.overruns for each in figures))
 
     def _open_bus(self, interface: str, name: str) -> can.BusABC:
         """Return the bus of a mount; no two mounts may have the same."""

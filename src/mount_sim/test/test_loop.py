@@ -389,6 +389,7 @@ def test_a_deaf_end_switches_off_on_its_own_and_says_so(ends, make_mount):
     answering.join()
     assert mount.truth['coil_current'] == 0.0
     assert [sample.enabled for sample in host.samples] == [True] * 20 + [False] * 280
+    assert [sample.setpoint_timeout for sample in host.samples] == [False] * 20 + [True] * 280
     assert [status.setpoint_timeout for status in host.statuses[:3]] == [False, True, True]
     assert loop.figures.answered == 1  # the last one, after the run
 

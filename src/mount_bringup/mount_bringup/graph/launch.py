@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
+from launch.actions import DeclareLaunchArgument, EmitEvent, LogInfo, OpaqueFunction, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
@@ -25,6 +25,7 @@ from mount_bringup.graph.order import LaunchArgument, LaunchOrder, launch_order
 from mount_bringup.graph.processes import node_environment, parameter_text
 from mount_bringup.graph.restarts import restartable
 from mount_ros.environment import prepare_environment
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
 _PATIENCE = '10'  # s, chosen: until a node that was asked to end is terminated
 _RESPAWN_DELAY = 0.2  # s, chosen: a node that dies at once must not keep the machine busy
@@ -54,11 +55,13 @@ def _graph(
 ) -> list[LaunchDescriptionEntity]:
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
     order = launch_order(nodes, arguments, given)
+    inherited = drop_real_time()
+    priority = order.settings.priority or inherited
     held = contextlib.ExitStack()  # until the last process has ended
     held.enter_context(domain_lock(order.settings.domain, order.settings.namespace))
     grouped = groups(order.nodes, order.settings.grouping)
     respawned = {_name(group): _is_respawned(group, order) for group in grouped}
-    processes = [_process(group, order, held) for group in grouped]
+    processes = [_process(group, order, priority, held) for group in grouped]
     processes.append(
         Node(
             package='mount_bringup',
@@ -87,10 +90,13 @@ def _graph(
         RegisterEventHandler(OnProcessExit(target_action=process, on_exit=partial(ended, name)))
         for name, process in zip(names, processes, strict=True)
     ]
-    return [*handlers, *processes]  # handlers first, so that no end can happen unheard
+    told = [LogInfo(msg=started_in_real_time(inherited))] if inherited else []
+    return [*told, *handlers, *processes]  # handlers first, so that no end can happen unheard
 
 
-def _process(nodes: Sequence[GraphNode], order: LaunchOrder, held: contextlib.ExitStack) -> Node:
+def _process(
+    nodes: Sequence[GraphNode], order: LaunchOrder, priority: int, held: contextlib.ExitStack
+) -> Node:
     [first, *others] = nodes
     if others:
         place = {'package': 'mount_bringup', 'executable': COMPOSED}
@@ -102,7 +108,7 @@ def _process(nodes: Sequence[GraphNode], order: LaunchOrder, held: contextlib.Ex
         **place,
         namespace=order.settings.namespace,
         parameters=parameters,
-        additional_env=node_environment(nodes, order.settings.priority),
+        additional_env=node_environment(nodes, priority),
         ros_arguments=['--log-level', order.log_level],
         sigterm_timeout=_PATIENCE,
         respawn=_is_respawned(nodes, order),

@@ -25,11 +25,15 @@ from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import with_flattened
+from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
 from mount_sim.electronics.faults.schedule import FORM, told_faults
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount
+
+_OF_SPECIMEN = ('mount_driver', 'mount_init', 'mount_control')
+"""The nodes that load the specimen file."""
 
 
 class LaunchArgument(NamedTuple):
@@ -74,16 +78,16 @@ _ANY = (
     LaunchArgument(
         'parameters_file',
         'specimen file of this actuator; empty: as in the config file, else the shipped one',
-        ('mount_init.parameters_file', 'mount_control.parameters_file'),
+        tuple(f'{node}.parameters_file' for node in _OF_SPECIMEN),
     ),
     LaunchArgument(
         'specimen',
         'name that the specimen file must bear; empty: as in the config file, else any',
-        ('mount_init.specimen', 'mount_control.specimen'),
+        tuple(f'{node}.specimen' for node in _OF_SPECIMEN),
     ),
     LaunchArgument(
         'priority',
-        'real-time priority (SCHED_FIFO, 1 .. 99) of the loop, half of it for the recorder; 0: none',
+        'real-time priority (SCHED_FIFO, 1 .. 98) of the loop, half of it for the recorder; 0: none',
         default='0',
     ),
     LaunchArgument(
@@ -153,7 +157,7 @@ def launch_order(
             domain=domain,
             parameters={node.name: settings.get(node.name, {}) for node in chosen},
             grouping=Grouping.COMPOSED if given['composed'] == 'true' else Grouping.APART,
-            priority=_number('priority', given['priority'], 99, int),
+            priority=_number('priority', given['priority'], HIGHEST, int),
             restart_limit=_number('restarts', given['restarts'], 1000, int),
         ),
         scenario=settings.get(SIM.name, {}).get('scenario', SimParameters().scenario)

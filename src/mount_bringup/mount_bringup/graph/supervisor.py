@@ -7,6 +7,7 @@ from mount_bringup.graph.bringup import Bringup
 from mount_bringup.graph.nodes import GraphNode, GraphSettings
 from mount_bringup.graph.processes import NodeProcess, end_all, start_processes
 from mount_bringup.graph.restarts import Loss, NodesLostError
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
 
 class Supervisor(Bringup):
@@ -18,6 +19,9 @@ class Supervisor(Bringup):
         self._processes: list[NodeProcess] = []
 
     def start_nodes(self) -> None:
+        inherited = drop_real_time()
+        if inherited:
+            self.notes.append(started_in_real_time(inherited))
         self.refuse_others(own=0)
         self._processes = start_processes(self.nodes, self._settings, self._folder)
 

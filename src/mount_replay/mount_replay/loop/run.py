@@ -151,11 +151,12 @@ def _take_many(
     """Take samples while all of them are plausible; return how many, and the setpoint (A) for the next."""
     controller = chain.answering.controller
     assert controller is not None
-    ahead = mount.ahead(samples.room)
+    plausibility, ahead = chain.answering.watch.plausibility, mount.ahead(samples.room)
     part = slice(samples.count, samples.count + len(ahead.values))
     taken, arrived, last = loop.run_with(chain.policy)(
         ahead,
         controller.memory,
+        (plausibility.limits, plausibility.memory),
         chain.displacement_range,
         pending,
         samples.readings[part],
