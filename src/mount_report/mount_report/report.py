@@ -114,12 +114,12 @@ def _section_or_reason(make: MakeSection, subjects: Sequence[Subject], failures:
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
     """Return short names that differ."""
-    mounts = [recording.mount for recording in recordings]
-    if all(mounts) and len(set(mounts)) == len(mounts):
-        return mounts
     names = [recording.path.absolute() for recording in recordings]
     for parts in (1, 2, 3):
         short = ['/'.join([each for each in path.parts if each != 'recording'][-parts:]) for path in names]
+        short = [
+            f'{name} {recording.mount}'.strip() for name, recording in zip(short, recordings, strict=True)
+        ]
         if len(set(short)) == len(short):
             return short
     return [f'{number}: {path}' for number, path in enumerate(names, 1)]

@@ -140,8 +140,10 @@ class MountSim(SafeLifecycleNode):
         return response
 
     def beats(self) -> Beats:
-        loop = next(iter(self._loops.values()), None)  # all take their samples together
-        return Beats() if loop is None else Beats(loop.figures.samples, loop.figures.overruns)
+        figures = [loop.figures for loop in self._loops.values()]
+        if not figures:
+            return Beats()
+        return Beats(min(each.samples for each in figures), max(each.overruns for each in figures))
 
     def _open_bus(self, interface: str, name: str) -> can.BusABC:
         """Return the bus of a mount; no two mounts may have the same."""

@@ -72,6 +72,10 @@ class Recording:
         ends = [name.removesuffix(DISPLACEMENT.name) for name in self.topics]
         return [end.strip('/') for end, name in zip(ends, self.topics, strict=True) if end != name]
 
+    def by_mount(self) -> list['Recording']:
+        """Return the recording of each mount, or this one alone where there are not several."""
+        return [self.of_mount(mount) for mount in self.mounts] if len(self.mounts) > 1 else [self]
+
     def of_mount(self, mount: str) -> 'Recording':
         """Return the same recording with the topics of one of `mounts` and those that belong to none.
 
