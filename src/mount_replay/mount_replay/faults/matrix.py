@@ -192,18 +192,21 @@ OPERATION = (
         _WHILE, 'no setpoint|inactive', silent=True, third=True,
     ),
     FaultCase(
-        'shutdown', 'mount_control is shut down amid damping',
-        Transitioned((('mount_control', Transition.TRANSITION_ACTIVE_SHUTDOWN),)),
-        _INITIALISE, 'no setpoint|shut', silent=True, ends_drive=True,
+        'table_missing', 'mount_control is activated without a table',
+        Transitioned(
+            (
+                ('mount_control', DEACTIVATE), ('mount_control', _CLEANUP),
+                ('mount_init', DEACTIVATE), ('mount_init', _CLEANUP),
+                ('mount_control', _CONFIGURE), ('mount_control', ACTIVATE),
+            ),
+            (('mount_init', _CONFIGURE), ('mount_init', ACTIVATE), ('mount_control', ACTIVATE)),
+        ),
+        _INITIALISE, 'table',
     ),
     FaultCase(
-        'table_missing', 'mount_control is activated without a table',
-        Transitioned((
-            ('mount_control', DEACTIVATE), ('mount_control', _CLEANUP),
-            ('mount_init', DEACTIVATE), ('mount_init', _CLEANUP),
-            ('mount_control', _CONFIGURE), ('mount_control', ACTIVATE),
-        )),
-        _INITIALISE, 'no setpoint|table', ends_drive=True,
+        'shutdown', 'mount_control is shut down amid damping',
+        Transitioned((('mount_control', Transition.TRANSITION_ACTIVE_SHUTDOWN),)),
+        _INITIALISE, 'no setpoint|shut', silent=True, for_good=True,
     ),
     FaultCase(
         'nonsense_parameters', 'parameters of all nodes are set to what makes no sense',
