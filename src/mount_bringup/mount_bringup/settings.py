@@ -12,6 +12,10 @@ from mount_models.damper import damper_text
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, check_name, flattened
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.places import general_name
+
+OF_EACH = ('mount_driver', 'mount_init', 'mount_control')
+"""Nodes that each mount of a car has."""
 
 
 class SettingError(ParameterError):
@@ -67,15 +71,21 @@ def checked_settings(
         known = defaults_of_nodes()
     checked: dict[str, dict[str, Any]] = {}
     for node, values in settings.items():
-        if node not in known:
+        kind = node.rpartition('/')[2]  # of a node of one mount, as in left/mount_control
+        if kind not in known or (kind != node and kind not in OF_EACH):
             raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
         for name in values:
-            check_name(node, name, known[node])
+            check_name(node, _general(kind, name), known[kind])
         checked[node] = {
-            name: _typed(f'{node}.{name}', value, known[node][name])
-            for name, value in _with_damper_text(node, values).items()
+            name: _typed(f'{node}.{name}', value, known[kind][_general(kind, name)])
+            for name, value in _with_damper_text(kind, values).items()
         }
     return checked
+
+
+def _general(node: str, name: str) -> str:
+    """Return the parameter behind that of one mount, as in mount_sim.mount_left.friction.scale."""
+    return general_name(name) if node == 'mount_sim' else name
 
 
 def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -11,9 +11,12 @@ from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import STATUS_EVERY, ElectronicsParameters
+from mount_sim.plant.simulated_car import CarMount
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
-_LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
+LOCKSTEP_WAIT = 0.1
+"""Seconds: how often a loop in lock-step looks whether it shall end."""
+
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
 
@@ -40,7 +43,7 @@ class ElectronicsLoop:
 
     def __init__(
         self,
-        mount: SimulatedMount,
+        mount: SimulatedMount | CarMount,
         can_end: CanEnd,
         electronics: ElectronicsParameters,
         publish: Callable[[int], None],
@@ -83,7 +86,7 @@ class ElectronicsLoop:
     def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
         """Sample as fast as the answers come; raise `NoAnswerError` after `patience` s without one."""
         while not self.finished and not ending.is_set():
-            self.step_in_lockstep(patience, _LOCKSTEP_WAIT)
+            self.step_in_lockstep(patience, LOCKSTEP_WAIT)
 
     def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
         """Take the next sample if the last one is answered within `wait` s; return whether it was.

@@ -55,7 +55,7 @@ def test_whatever_ends_the_electronics_is_an_error_of_the_node(
     sim = make_sim(lockstep=lockstep)
     assert sim.trigger_configure() == SUCCESS
 
-    def fail(number):
+    def fail(name, number):
         raise error
 
     monkeypatch.setattr(sim, '_publish', fail)
@@ -89,7 +89,7 @@ def ask(context):
 
 
 def _kinds(sim):
-    return [type(fault).__name__ for fault in sim._mount.faults.present]
+    return [type(fault).__name__ for fault in sim._mounts[''].faults.present]
 
 
 def test_faults_are_told_as_a_list_of_texts_that_may_be_empty(make_sim):

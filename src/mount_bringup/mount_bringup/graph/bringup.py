@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import Any
 
 import rclpy
@@ -33,6 +34,7 @@ from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
 from mount_bringup.graph.verdicts import Verdicts
+from mount_bringup.mounts import settings_of_mount
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.leaving import leave_middleware
 from mount_ros.qos import publisher_qos, recording_qos
@@ -62,6 +64,7 @@ class Bringup:
         self.tell_loss: Callable[[str], None] = lambda text: None
         self._settings = settings
         self._groups = groups(nodes, settings.grouping)
+        self._mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
         self._interrupted = False  # no lock: a second signal may come amid the first
         self._context = Context()
         self._recovery = Recovery(self, settings.restart_limit)
@@ -74,7 +77,7 @@ class Bringup:
     def start(
         self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
     ) -> None:
-        """Bring all nodes to life; `session` makes the session text from all parameters of all nodes."""
+        """Bring all nodes to life; `session` makes the session text of a mount from its nodes' parameters."""
         rclpy.init(
             context=self._context,
             domain_id=self._settings.domain,
@@ -87,17 +90,21 @@ class Bringup:
         self._node.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self.verdicts.take, recording_qos(DIAGNOSTICS)
         )
-        publisher = self._node.create_publisher(String, SESSION.name, publisher_qos(SESSION))
+        qos = publisher_qos(SESSION)
+        publishers = {
+            mount: self._node.create_publisher(String, f'{mount}/{SESSION.name}'.lstrip('/'), qos)
+            for mount in self._mounts
+        }
         say('starting the nodes')
         self.start_nodes()
         for node in self.nodes:
             self.transition(node, Transition.TRANSITION_CONFIGURE)
-        self.parameters = {node.name: parameters_of(node.name, self.call) for node in self.nodes}
-        publisher.publish(String(data=session(self.parameters)))
+        self.parameters = {node.full_name: parameters_of(node.full_name, self.call) for node in self.nodes}
+        for mount, publisher in publishers.items():
+            publisher.publish(String(data=session(settings_of_mount(self.parameters, mount))))
         self.wait_for_matches()
-        for node in self.nodes:
-            say(f'activating {node.name}')
-            self.activate(node, say)
+        for _, side_by_side in groupby(self.nodes, lambda node: node.name):
+            self._activate_all(list(side_by_side), say)
         self._makes_good = not any(values.get('lockstep') for values in self.parameters.values())
         self.verdicts.liveliness.pause()
 
@@ -126,23 +133,61 @@ class Bringup:
         """
         begin, asked = time.monotonic(), 0
         while True:
-            before = self._pace()
+            before = self._pace(node.mount)
             try:
                 self.transition(node, Transition.TRANSITION_ACTIVATE)
                 self.verdicts.note_active(node)
                 return
             except GraphError as error:
-                self.serve_for(_FRESH_DIAGNOSTICS)
-                was_late = self._pace().was_late_since(before)
-                asked += not was_late
+                asked += not self._was_late(node, before)
                 if asked >= node.activations or time.monotonic() - begin > _LATE_PATIENCE:
                     raise
-                reason = ' (this machine was too late for 1 kHz)' if was_late else ''
-                self.notes.append(f'{error}{reason}; it was activated again')
-                say(f'activating {node.name} again{reason}')
+                self._tell_again(node, error, before, say)
 
-    def _pace(self) -> Pace:
-        return pace(self.figures(DRIVER), self.figures(SIM))
+    def _was_late(self, node: GraphNode, before: Pace) -> bool:
+        """Return whether this machine has been too late since `before`, by fresh figures."""
+        self.serve_for(_FRESH_DIAGNOSTICS)
+        return self._pace(node.mount).was_late_since(before)
+
+    def _tell_again(
+        self, node: GraphNode, error: GraphError, before: Pace, say: Callable[[str], None]
+    ) -> None:
+        was_late = self._pace(node.mount).was_late_since(before)
+        reason = ' (this machine was too late for 1 kHz)' if was_late else ''
+        self.notes.append(f'{error}{reason}; it was activated again')
+        say(f'activating {node.full_name} again{reason}')
+
+    def _activate_all(self, nodes: Sequence[GraphNode], say: Callable[[str], None]) -> None:
+        """Activate one node, or those of all mounts at the same time; one that refuses is asked by itself."""
+        say(f'activating {", ".join(node.full_name for node in nodes)}')
+        if len(nodes) == 1:
+            self.activate(nodes[0], say)
+            return
+        before = {node: self._pace(node.mount) for node in nodes}
+        clients = {node: self._wait_for_service(node) for node in nodes}
+        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
+        answers = {node: client.call_async(request) for node, client in clients.items()}
+        names = ', '.join(node.full_name for node in nodes)
+
+        def all_done() -> bool:
+            return all(answer.done() for answer in answers.values())
+
+        self.wait_until(all_done, _TRANSITION_LIMIT, f'activate of {names}')
+        for node, client in clients.items():
+            self._node.destroy_client(client)
+            if answers[node].result().success:
+                self.verdicts.note_active(node)
+        for node in nodes:
+            if not answers[node].result().success:
+                error = self._refusal(node, 'activate')
+                if not self._was_late(node, before[node]) and node.activations == 1:
+                    raise error
+                self._tell_again(node, error, before[node], say)
+                self.activate(node, say)
+
+    def _pace(self, mount: str) -> Pace:
+        driver = next((node for node in self.nodes if node.is_a(DRIVER) and node.mount == mount), DRIVER)
+        return pace(self.figures(driver), self.figures(SIM))
 
     def serve_for(self, duration: float) -> None:
         """Serve the graph for so many s."""
@@ -175,7 +220,7 @@ class Bringup:
     def _check_work(self) -> None:
         """Raise `NodesLostError` if a node hangs, or the electronics have lost their initialisation."""
         if silent := self.verdicts.liveliness.silent(time.monotonic()):
-            hanging = [group for group in self._groups if {node.name for node in group} & {*silent}]
+            hanging = [group for group in self._groups if {node.full_name for node in group} & {*silent}]
             nodes = tuple(node for group in hanging for node in group)
             reason = f'{", ".join(silent)} told nothing for {SILENCE_LIMIT:g} s and counts as dead'
             raise NodesLostError(Loss(nodes, reason))
@@ -216,10 +261,10 @@ class Bringup:
         request = ChangeState.Request(transition=Transition(id=transition))
         answer = client.call_async(request)
         label = {1: 'configure', 3: 'activate', 4: 'deactivate'}.get(transition, str(transition))
-        self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.name}')
+        self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.full_name}')
         self._node.destroy_client(client)
         if not answer.result().success:
-            raise GraphError(f'{node.name} refused to {label}: {self._reason(node)}')
+            raise self._refusal(node, label)
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
@@ -239,9 +284,12 @@ class Bringup:
         rclpy.try_shutdown(context=self._context)
 
     def _wait_for_service(self, node: GraphNode) -> Client:
-        client = self._node.create_client(ChangeState, f'{node.name}/change_state')
-        self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.name}')
+        client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
+        self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.full_name}')
         return client
+
+    def _refusal(self, node: GraphNode, label: str) -> GraphError:
+        return GraphError(f'{node.full_name} refused to {label}: {self._reason(node)}')
 
     def _reason(self, node: GraphNode) -> str:
         """Return what the node says of its refusal; it may come after the answer."""
@@ -254,7 +302,7 @@ class Bringup:
         # A node that cannot is ended by a signal, to which it answers in the same way.
         if self.figures(node).get('state') != 'active':
             return
-        client = self._node.create_client(ChangeState, f'{node.name}/change_state')
+        client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
         if client.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
             self._executor.spin_until_future_complete(client.call_async(request), timeout_sec=2.0)
@@ -268,10 +316,11 @@ class Bringup:
             space = self._node.get_namespace()
             present = self._node.get_node_names_and_namespaces()
             for node in self.nodes:
-                if present.count((node.name, space)) > own:
+                own_space = f'{space.rstrip("/")}/{node.mount}'.rstrip('/') or '/'
+                if present.count((node.name, own_space)) > own:
                     raise GraphError(
-                        f'{node.name} already runs in ROS domain {self._settings.domain}, namespace {space}: '
-                        'end that graph, or choose another domain or namespace'
+                        f'{node.name} already runs in ROS domain {self._settings.domain}, namespace '
+                        f'{own_space}: end that graph, or choose another domain or namespace'
                     )
 
     def wait_for_matches(self) -> None:
@@ -284,7 +333,7 @@ class Bringup:
             self.wait_until(all_matched, _MATCH_LIMIT, 'connection of all topics')
         except GraphError as error:
             alone = '; '.join(
-                f'{node.name} waits for {", ".join(self._unmatched(node))}'
+                f'{node.full_name} waits for {", ".join(self._unmatched(node))}'
                 for node in self.nodes
                 if self._unmatched(node)
             )

@@ -5,7 +5,7 @@ import os
 import socket
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 HIGHEST_DOMAIN = 101  # above, the ports of Fast DDS run into those of other programs on Linux
@@ -58,6 +58,15 @@ def domain_lock(domain: int, namespace: str) -> Iterator[None]:
         except OSError:
             raise DomainError(_occupied(domain, name, port)) from None
         told.bind(f'{_PLACE}_{port} {name}')
+        yield
+
+
+@contextlib.contextmanager
+def domain_locks(domain: int, namespace: str, mounts: Sequence[str]) -> Iterator[None]:
+    """Hold the places of a graph and of each of its mounts, whose namespaces are within its own."""
+    with contextlib.ExitStack() as held:
+        for mount in ('', *mounts):
+            held.enter_context(domain_lock(domain, f'{namespace}/{mount}'))
         yield
 
 

@@ -26,15 +26,15 @@ class NodeProcess:
 
     def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
         self.nodes = tuple(nodes)
-        self.name = ' + '.join(node.name for node in nodes)
-        stem = '_'.join(node.name for node in nodes)
+        self.name = ' + '.join(node.full_name for node in nodes)
+        stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
         self._settings = settings
         self.log_file = folder / f'{stem}.log'
         parameter_file = folder / f'{stem}.yaml'
         parameter_file.write_text(parameter_text(self.nodes, settings))
-        self._command = [sys.executable, '-c', _program(self.nodes), '--ros-args']
+        self._command = [sys.executable, '-c', _program(self.nodes, settings.namespace), '--ros-args']
         self._command += ['--params-file', str(parameter_file)]
-        if settings.namespace:
+        if settings.namespace and not any(node.mount for node in nodes):
             self._command += ['-r', f'__ns:=/{settings.namespace.strip("/")}']
         self._process = self._start()
 
@@ -106,7 +106,7 @@ def node_environment(nodes: Sequence[GraphNode], priority: int) -> dict[str, str
     """Return what a process is told: its `nodes`, its starter, which is this process, and its priority."""
     share = _RECORDER_SHARE if RECORDER in nodes else 1.0
     given = environment_of_children(max(1, round(share * priority)) if priority else 0)
-    return {**given, NODES_OF_PROCESS: ' '.join(node.name for node in nodes)}
+    return {**given, NODES_OF_PROCESS: ' '.join(node.full_name for node in nodes)}
 
 
 def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
@@ -114,16 +114,23 @@ def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[st
     return {**own, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'}
 
 
-def _program(nodes: Sequence[GraphNode]) -> str:
-    imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in nodes)
-    classes = ', '.join(node.class_name for node in nodes)
+def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
+    imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in dict.fromkeys(nodes))
+    if any(node.mount for node in nodes):  # a namespace for each, which no remapping of ROS could tell apart
+        creates = []
+        for node in nodes:
+            space = f'/{namespace.strip("/")}/{node.mount}'.replace('//', '/')
+            creates.append(f'partial({node.class_name}, namespace={space!r})')
+        classes, imports = ', '.join(creates), f'from functools import partial; {imports}'
+    else:
+        classes = ', '.join(node.class_name for node in nodes)
     return f'{imports}; from mount_ros.nodes.process import run_nodes; run_nodes([{classes}])'
 
 
 def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
     """Return a parameter file of ROS for these nodes, whatever their namespace."""
     tables = {
-        f'/**/{node.name}': {'ros__parameters': dict(settings.parameters.get(node.name, {}))}
+        f'/**/{node.full_name}': {'ros__parameters': dict(settings.parameters.get(node.full_name, {}))}
         for node in nodes
     }
     return yaml.safe_dump(tables, sort_keys=True)

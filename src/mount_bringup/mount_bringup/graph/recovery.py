@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -71,45 +72,59 @@ class Recovery:
 
     def _bring_back(self, loss: Loss, active: Sequence[GraphNode]) -> Remedy:
         graph = self._graph
-        chosen = remedy(loss, table_holds=self._table_holds())
+        chosen = remedy(loss, table_holds=self._table_holds(loss))
+        graph.start_again(loss.nodes)  # first: each wait for the others would find them lost once more
         if chosen is Remedy.INITIALISE:
-            for node in (CONTROL, INIT, DRIVER):
+            for node in self._of_mounts(loss, CONTROL, INIT, DRIVER):
                 if node not in loss.nodes:
                     self._deactivate(node)
-        graph.start_again(loss.nodes)
         for node in (node for node in graph.nodes if node in loss.nodes):
             self._await_birth(node)
             self._prepare(node, chosen)
             graph.transition(node, Transition.TRANSITION_CONFIGURE)
         graph.wait_for_matches()
-        if chosen is Remedy.DAMP_ON and not self._table_holds_still():
+        if chosen is Remedy.DAMP_ON and not self._table_holds_still(loss):
             return self._bring_back(loss, active)
-        wanted = ({*loss.nodes} - {INIT}) & {*active}
+        wanted = {node for node in loss.nodes if not node.is_a(INIT)} & {*active}
         if chosen is Remedy.INITIALISE:
-            wanted |= {DRIVER, INIT} | ({CONTROL} & {*active})
+            wanted |= {*self._of_mounts(loss, DRIVER, INIT)} | ({*self._of_mounts(loss, CONTROL)} & {*active})
         for node in graph.nodes:
             if node in wanted:
                 graph.activate(node, lambda _: None)
         return chosen
 
-    def _table_holds(self) -> bool:
-        return table_holds(self._graph.figures(DRIVER), self._graph.figures(INIT))
+    def _of_mounts(self, loss: Loss, *kinds: GraphNode) -> list[GraphNode]:
+        """Return the nodes of these kinds in the mounts that a loss concerns; one of the electronics all."""
+        concerned = {node.mount for node in loss.nodes if node.is_a(DRIVER, INIT, CONTROL)}
+        return [
+            node
+            for kind in kinds
+            for node in self._graph.nodes
+            if node.is_a(kind) and (node.mount in concerned or not loss.nodes)
+        ]
 
-    def _table_holds_still(self) -> bool:
+    def _table_holds(self, loss: Loss) -> bool:
+        figures = self._graph.figures
+        pairs = zip(self._of_mounts(loss, DRIVER), self._of_mounts(loss, INIT), strict=True)
+        return all(table_holds(figures(driver), figures(init)) for driver, init in pairs)
+
+    def _table_holds_still(self, loss: Loss) -> bool:
         """Return the same by what the driver tells now; a later break is seen by the control itself."""
         graph = self._graph
-        graph.verdicts.forget(DRIVER)
-        graph.wait_until(lambda: bool(graph.figures(DRIVER)), _FRESH_LIMIT, 'a word of mount_driver')
-        return self._table_holds()
+        for driver in self._of_mounts(loss, DRIVER):
+            graph.verdicts.forget(driver)
+            heard = partial(lambda driver: bool(graph.figures(driver)), driver)
+            graph.wait_until(heard, _FRESH_LIMIT, f'a word of {driver.full_name}')
+        return self._table_holds(loss)
 
     def _deactivate(self, node: GraphNode) -> None:
-        state = self._graph.call(GetState, f'{node.name}/get_state', GetState.Request()).current_state
+        state = self._graph.call(GetState, f'{node.full_name}/get_state', GetState.Request()).current_state
         if state.id == State.PRIMARY_STATE_ACTIVE:
             self._graph.transition(node, Transition.TRANSITION_DEACTIVATE)
 
     def _await_birth(self, node: GraphNode) -> None:
         """Return when the new node answers: not yet configured."""
-        client = self._graph.client(GetState, f'{node.name}/get_state')
+        client = self._graph.client(GetState, f'{node.full_name}/get_state')
         answers: list[Any] = []
         asked = 0.0
 
@@ -123,18 +138,18 @@ class Recovery:
                 for answer in answers
             )
 
-        self._graph.wait_until(born, _BIRTH_LIMIT, f'start of {node.name} again')
+        self._graph.wait_until(born, _BIRTH_LIMIT, f'start of {node.full_name} again')
         client.destroy()
 
     def _prepare(self, node: GraphNode, chosen: Remedy) -> None:
-        if node is RECORDER:
+        if node.is_a(RECORDER):
             first = Path(str(self._graph.parameters[RECORDER.name]['uri']))
             self._set(node, 'uri', str(next_recording(first)))
-        elif node is CONTROL:
+        elif node.is_a(CONTROL):
             self._set(node, 'measured_before', chosen is Remedy.DAMP_ON)
 
     def _set(self, node: GraphNode, name: str, value: object) -> None:
         request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        result = self._graph.call(SetParameters, f'{node.name}/set_parameters', request).results[0]
+        result = self._graph.call(SetParameters, f'{node.full_name}/set_parameters', request).results[0]
         if not result.successful:
-            raise GraphError(f'{node.name} refused {name}: {result.reason}')
+            raise GraphError(f'{node.full_name} refused {name}: {result.reason}')

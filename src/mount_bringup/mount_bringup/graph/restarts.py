@@ -49,7 +49,7 @@ class Loss:
     @property
     def names(self) -> str:
         """The nodes, for people."""
-        return ' + '.join(node.name for node in self.nodes) or 'electronics'
+        return ' + '.join(node.full_name for node in self.nodes) or 'electronics'
 
     def with_more(self, other: 'Loss') -> 'Loss':
         """Return this loss with another that came while it was made good."""
@@ -110,8 +110,8 @@ class RestartCount:
         """Count a loss at the steady time `now` (s); raise `GraphError` where the graph is to be given up."""
         if self._limit == 0:
             raise NodesLostError(loss)
-        for name in [node.name for node in loss.nodes] or [loss.names]:
-            if REMEDIES.get(name) is Remedy.END:
+        for name in [node.full_name for node in loss.nodes] or [loss.names]:
+            if REMEDIES.get(name.rpartition('/')[2]) is Remedy.END:
                 raise GraphError(f'{loss.reason}; without it there is no coil to drive: {Remedy.END.value}')
             times = self._times.setdefault(name, deque())
             while times and now - times[0] > _WINDOW:

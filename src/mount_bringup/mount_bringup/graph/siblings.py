@@ -40,7 +40,7 @@ def sibling_of(nodes: Sequence[GraphNode]) -> Sibling | None:
     By its environment, which its starter has given it: no message can make this process end another one.
     """
     parent = str(os.getppid())
-    wanted = f'{NODES_OF_PROCESS}={" ".join(node.name for node in nodes)}'.encode()
+    wanted = f'{NODES_OF_PROCESS}={" ".join(node.full_name for node in nodes)}'.encode()
     for process in Path('/proc').glob('[0-9]*'):
         with contextlib.suppress(OSError):  # it has just ended, or is another user's
             if (process / 'stat').read_text().rpartition(')')[2].split()[1] != parent:

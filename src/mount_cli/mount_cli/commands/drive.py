@@ -29,6 +29,8 @@ Examples:
 
 `engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
 
+`engine-mount drive --mounts left,right --fault right/coil_open@12` - one engine on two mounts
+
 `engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.policy=switched_viscous`
 """
 
@@ -37,6 +39,10 @@ def drive(
     scenario: Annotated[str, typer.Option(help='motorway, bench, sweep or recorded')] = 'motorway',
     mount: Annotated[
         str, typer.Option(help='friction, friction_off, friction_always_on, hydro or elastomer')
+    ] = '',
+    mounts: Annotated[
+        str,
+        typer.Option(help='mounts with electronics under one engine: of left, right, front, rear'),
     ] = '',
     file: Annotated[
         Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
@@ -127,6 +133,7 @@ def drive(
     given = {
         'scenario': scenario,
         'mount': mount or None,
+        'mounts': mounts or None,
         'seed': seed,
         'timeline.duration': duration,
         'recorded.file': str(file.absolute()) if file else None,
@@ -163,8 +170,8 @@ def drive(
     complaints += told.complaints
     if json_file is not None:
         write_json(told.figures, json_file)
-    if folder.figure.exists():
-        console.print(f'figure     {folder.figure}', soft_wrap=True)
+    for figure in told.pictures:
+        console.print(f'figure     {figure}', soft_wrap=True)
     if folder.report.exists():
         console.print(f'report     {folder.report}', soft_wrap=True)
     for place in told.recordings:

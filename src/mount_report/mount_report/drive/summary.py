@@ -136,8 +136,8 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
     )
 
 
-def print_summary(figures: dict[str, Any], found: Losses, screen: Screen) -> None:
-    """Print the figures as a table; times are s from the first displacement sample."""
+def print_summary(figures: dict[str, Any], found: Losses, screen: Screen, mount: str = '') -> None:
+    """Print the figures, `mount` before their title; times are s from the first displacement sample."""
     rows = [
         *(_gap_row(figures, name) for name in ('rest', 'contact')),
         ('excitation', f'from {figures["excitation_start_s"]:.2f} s on'),
@@ -148,7 +148,7 @@ def print_summary(figures: dict[str, Any], found: Losses, screen: Screen) -> Non
         ('latency', _latency_text(figures)),
         ('speed', f'{figures["real_time_factor"]:.2f} x real time'),
     ]
-    screen.table(Table(f'{figures["scenario"]}, {figures["mode"]}', 'll', rows))
+    screen.table(Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows))
 
 
 def _gap_row(figures: dict[str, Any], name: str) -> tuple[str, str]:

@@ -4,7 +4,7 @@ import math
 import re
 import zlib
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 import can
@@ -48,6 +48,23 @@ def injected_faults(text: str) -> list[ToldFault]:
             raise ParameterError(
                 f'{fault.name} begins with a run: give it in `faults`, as in {fault.name}@10'
             )
+    return found
+
+
+def texts_of_mount(texts: Iterable[str], mount: str, mounts: Collection[str]) -> list[str]:
+    """Return the texts that hold for `mount`, without its name: `right/NAME...`; without one all have it.
+
+    `mounts` are the names of all, '' where there is one alone. Raises `ParameterError` for another name.
+    """
+    found = []
+    for text in texts:
+        name, slash, fault = text.rpartition('/')
+        if slash and name not in mounts:
+            known = ', '.join(each for each in mounts if each)
+            reason = f'known are {known}' if known else 'there is one mount alone'
+            raise ParameterError(f'fault {text!r:.60} names no mount: {reason}')
+        if not slash or name == mount:
+            found.append(fault)
     return found
 
 
