@@ -12,6 +12,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -52,6 +53,8 @@ class Bringup:
         self._verdicts: dict[str, dict[str, str]] = {}
         self._context = Context()
         self.notes: list[str] = []
+        self.at_rest = False
+        """Whether `stop` has deactivated all nodes: then nothing depends on the order of their ends."""
 
     def interrupt(self) -> None:
         """Make every wait of the supervisor end with `Interrupted`; safe from a signal handler."""
@@ -76,8 +79,7 @@ class Bringup:
         publisher = self._node.create_publisher(String, SESSION.name, publisher_qos(SESSION))
         say('starting the nodes')
         self.start_nodes()
-        for node in self._nodes:
-            self.transition(node, Transition.TRANSITION_CONFIGURE)
+        self._configure()
         publisher.publish(
             String(data=session({node.name: parameters_of(node.name, self._call) for node in self._nodes}))
         )
@@ -94,6 +96,19 @@ class Bringup:
 
     def check_processes(self) -> None:
         """Raise `GraphError` if a process is no more what it was."""
+
+    def _configure(self) -> None:
+        """Configure the nodes, all at the same time where each has a process of its own.
+
+        In one process their order counts: the data thread serves those first that came last.
+        """
+        configure = Transition.TRANSITION_CONFIGURE
+        if self._settings.together:
+            for node in self._nodes:
+                self.transition(node, configure)
+        else:
+            for node, asked in [(node, self._ask(node, configure)) for node in self._nodes]:
+                self._take_answer(node, configure, asked)
 
     def _activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
         """Activate a node; one that refuses is asked as often as the graph declares.
@@ -156,9 +171,14 @@ class Bringup:
 
     def transition(self, node: GraphNode, transition: int) -> None:
         """Take a node through a lifecycle transition, or raise `GraphError` with the node's own reason."""
+        self._take_answer(node, transition, self._ask(node, transition))
+
+    def _ask(self, node: GraphNode, transition: int) -> tuple[Client, Future]:
         client = self._wait_for_service(node)
-        request = ChangeState.Request(transition=Transition(id=transition))
-        answer = client.call_async(request)
+        return client, client.call_async(ChangeState.Request(transition=Transition(id=transition)))
+
+    def _take_answer(self, node: GraphNode, transition: int, asked: tuple[Client, Future]) -> None:
+        client, answer = asked
         label = {1: 'configure', 3: 'activate', 4: 'deactivate'}.get(transition, str(transition))
         self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.name}')
         self._node.destroy_client(client)
@@ -167,8 +187,8 @@ class Bringup:
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
-        for node in ending_order(self._nodes):
-            self._try_to_deactivate(node)
+        resting = [self._try_to_deactivate(node) for node in ending_order(self._nodes)]
+        self.at_rest = all(resting)
         return self.leave()
 
     def leave(self) -> list[str]:
@@ -194,15 +214,19 @@ class Bringup:
             self._executor.spin_once(0.05)
         return self.figures(node).get('sentence', '(it said nothing)')
 
-    def _try_to_deactivate(self, node: GraphNode) -> None:
-        # A node that cannot is ended by a signal, to which it answers in the same way.
+    def _try_to_deactivate(self, node: GraphNode) -> bool:
+        """Return whether the node is not active any more; if not, a signal has the same effect."""
         if self.figures(node).get('state') != 'active':
-            return
+            return True
+        done = False
         client = self._node.create_client(ChangeState, f'{node.name}/change_state')
         if client.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
-            self._executor.spin_until_future_complete(client.call_async(request), timeout_sec=2.0)
+            answer = client.call_async(request)
+            self._executor.spin_until_future_complete(answer, timeout_sec=2.0)
+            done = answer.done() and answer.result().success
         self._node.destroy_client(client)
+        return done
 
     def refuse_others(self, own: int) -> None:
         """Raise `GraphError` if there are more than `own` nodes of the same name."""
