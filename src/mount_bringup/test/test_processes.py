@@ -18,7 +18,7 @@ TELL = 'from mount_ros.nodes.starter import given_priority; print(given_priority
 def test_the_loop_is_given_the_priority_and_the_recorder_one_behind_it(
     tmp_path, monkeypatch, node, priority, told
 ):
-    monkeypatch.setattr(processes, '_program', lambda nodes: TELL)
+    monkeypatch.setattr(processes, '_program', lambda *_: TELL)
     settings = GraphSettings(priority=priority)
     process = processes.NodeProcess([node], settings, tmp_path)
     assert process.wait() == 0
@@ -29,15 +29,13 @@ def test_the_loop_is_given_the_priority_and_the_recorder_one_behind_it(
 def held(tmp_path, monkeypatch):
     """Return a process that has loaded a module of its own and makes no node yet."""
     (tmp_path / 'loaded.py').write_text('print("loaded", flush=True)\ndef run_nodes(classes): print("begun")')
-    program = processes._program([CONTROL])
+    program = processes._program([CONTROL], '')
     for module in ('mount_ros.nodes.process', 'mount_control.node'):
         program = program.replace(module, 'loaded')
     monkeypatch.setattr(
         processes,
         '_program',
-        lambda nodes: f'MountControl = 0; {program}'.replace(
-            'from loaded import MountControl', 'import loaded'
-        ),
+        lambda *_: f'MountControl = 0; {program}'.replace('from loaded import MountControl', 'import loaded'),
     )
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     process = processes.NodeProcess([CONTROL], GraphSettings(), tmp_path)

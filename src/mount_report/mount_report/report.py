@@ -114,6 +114,9 @@ def _section_or_reason(make: MakeSection, subjects: Sequence[Subject], failures:
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
     """Return short names that differ."""
+    mounts = [recording.mount for recording in recordings]
+    if all(mounts) and len(set(mounts)) == len(mounts):
+        return mounts
     names = [recording.path.absolute() for recording in recordings]
     for parts in (1, 2, 3):
         short = ['/'.join([each for each in path.parts if each != 'recording'][-parts:]) for path in names]

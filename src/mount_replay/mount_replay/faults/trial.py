@@ -1,0 +1,90 @@
+"""One fault in a graph that damps: brought in, observed, taken away, recovered from."""
+
+import math
+import time
+
+from mount_replay.faults.fault import FaultCase, Reaction
+from mount_replay.faults.graph import GraphUnderTest
+from mount_replay.faults.injections import take_through
+from mount_replay.faults.matrix import ACTIVATE, DEACTIVATE
+from mount_replay.faults.observers import Told
+from mount_replay.faults.outcome import Course, Outcome, judged
+from mount_ros.nodes.diagnostics import Level
+
+_END_PATIENCE = 40.0  # s, chosen: for the end of a drive that closes and audits its recording
+_RECOVERY_PATIENCE = 8.0  # s, chosen
+_AT_REST = 0.6  # s, chosen: so long a graph that must not recover by itself is watched
+_OWN_RECOVERY = 12.0  # s, chosen: a supervisor that initialises again by itself has done so by then
+_LOOK_PERIOD = 0.005  # s
+
+
+def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
+    """Try one fault in a graph that damps (or, for a fault of the start, that starts) and judge it."""
+    output = _Output(graph)
+    case.injection.prepare(graph)
+    try:
+        course = Course(begun=time.monotonic())
+        case.injection.begin(graph)
+        course.present = time.monotonic()
+        _observe(case, graph, course, output)
+    finally:
+        case.injection.end(graph)
+    if not course.ended:
+        course.cleared = time.monotonic()
+        _recover(case, graph, course, output)
+    course.over = time.monotonic()
+    course.printed = tuple(output.lines)
+    outcome = judged(case, course, graph.observed)
+    if graph.refusals:
+        outcome.detected_by, outcome.sentence = 'each node', '; '.join(graph.refusals)
+        graph.refusals.clear()
+    return outcome
+
+
+def _observe(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> None:
+    """Wait while the fault lasts, or until the graph has ended where it must."""
+    lasts = _END_PATIENCE if case.ends_drive else case.lasts
+    end = course.begun + lasts
+    while time.monotonic() < end and not course.ended:
+        time.sleep(_LOOK_PERIOD)
+        output.look()
+        course.ended = graph.ended
+
+
+def _recover(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> None:
+    """Wait for damping; where a new initialisation is required, see that there is none before it."""
+    if case.reaction is Reaction.SAFE_UNTIL_INITIALISED and not _back(graph, course, _OWN_RECOVERY, output):
+        for node in ('mount_control', 'mount_init', 'mount_driver'):
+            take_through(graph, node, DEACTIVATE)
+        for node in ('mount_driver', 'mount_init', 'mount_control'):
+            take_through(graph, node, ACTIVATE)
+    _back(graph, course, _RECOVERY_PATIENCE, output)
+
+
+def _back(graph: GraphUnderTest, course: Course, limit: float, output: '_Output') -> bool:
+    """Return whether it damps again within `limit` s."""
+    end = time.monotonic() + limit
+    while time.monotonic() < end and not course.ended and math.isnan(course.damping_again):
+        time.sleep(_LOOK_PERIOD)
+        output.look()
+        course.ended = graph.ended
+        if graph.damping():
+            course.damping_again = time.monotonic()
+    return not math.isnan(course.damping_again)
+
+
+class _Output:
+    """The lines that the command and its nodes print from now on, as what the supervisor tells."""
+
+    def __init__(self, graph: GraphUnderTest):
+        self.lines: list[Told] = []
+        self._graph = graph
+        self._known = len(graph.output.splitlines())
+
+    def look(self) -> None:
+        lines = self._graph.output.splitlines()
+        now = time.monotonic()
+        self.lines += [
+            Told(now, 'supervisor', Level.WARN, line.strip()) for line in lines[self._known :] if line.strip()
+        ]
+        self._known = max(self._known, len(lines))
