@@ -15,7 +15,7 @@ TELL = 'from mount_ros.nodes.starter import given_priority; print(given_priority
 def test_the_loop_is_given_the_priority_and_the_recorder_one_behind_it(
     tmp_path, monkeypatch, node, priority, told
 ):
-    monkeypatch.setattr(processes, '_program', lambda nodes: TELL)
+    monkeypatch.setattr(processes, '_program', lambda *_: TELL)
     settings = GraphSettings(priority=priority)
     process = processes.NodeProcess([node], settings, tmp_path)
     assert process.wait() == 0
