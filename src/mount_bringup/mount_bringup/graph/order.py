@@ -205,6 +205,8 @@ def _of_mounts(
     channels = _channels(mounts, given)
     shared.setdefault(RECORDER.name, {})['mounts'] = ','.join(mounts)
     settings = {name: values for name, values in shared.items() if name in (RECORDER.name, SIM.name)}
+    if SIM.name in settings:
+        settings[SIM.name]['mounts'] = ','.join(mounts)
     for mount in mounts:
         own = given_to(mount)
         own[DRIVER.name] |= channels.get(mount, {})
