@@ -42,8 +42,8 @@ REPLAYED_NODES = ('mount_control', 'mount_init')
 class ReplayOrder:
     """What the user orders; `changes` are parameters other than those recorded, {node: {parameter: value}}.
 
-    `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one. `mount` is which
-    of several mounts is replayed.
+    `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one.
+    `mount` is which of several mounts is replayed.
     """
 
     recording: Path
