@@ -70,7 +70,7 @@ def main() -> int:
 def attempt(number: signal.Signals, told_at: float, domain: int, options: list[str]) -> Outcome:
     """Start the graph, end it by a signal `told_at` s later, and look what is left."""
     folder = Path(tempfile.mkdtemp(prefix='endurance_'))
-    files: set[Path] = set()
+    files, before = set[Path](), own_files()
     log = folder / 'said.txt'
     command = [str(Path(sys.executable).parent / 'engine-mount'), 'drive', '--scenario', 'bench',
                '--duration', '600', '--no-report', '--out', str(folder / 'run'), *options]  # fmt: skip
@@ -87,7 +87,7 @@ def attempt(number: signal.Signals, told_at: float, domain: int, options: list[s
     code = wait_for_end(process)
     outcome = Outcome(told_at, number, code, by_itself)
     outcome.faults += wrong_end(outcome, log.read_text(errors='replace'))
-    outcome.faults += left_behind(process.pid, domain, files)
+    outcome.faults += left_behind(process.pid, domain, files, before)
     outcome.faults += open_recordings(folder / 'run' / 'recording')
     if outcome.faults:
         outcome.faults.append(f'kept: {folder}')
@@ -113,21 +113,20 @@ def wrong_end(outcome: Outcome, said: str) -> list[str]:
     return [*faults, *(['traceback'] if 'Traceback' in said else [])]
 
 
-def left_behind(starter: int, domain: int, files: set[Path]) -> list[str]:
+def left_behind(starter: int, domain: int, files: set[Path], before: set[Path]) -> list[str]:
     """Return processes, files and the place in the domain that a graph still has, after a while."""
     end = time.monotonic() + PATIENCE
-    while (left := remains(starter, domain, files)) and time.monotonic() < end:
+    while (left := remains(starter, domain, files, before)) and time.monotonic() < end:
         time.sleep(LOOK_PERIOD)
     return left
 
 
-def remains(starter: int, domain: int, files: set[Path]) -> list[str]:
+def remains(starter: int, domain: int, files: set[Path], before: set[Path]) -> list[str]:
     """Return what there still is of a graph at this moment, in words."""
     left = [f'process {pid}' for pid in processes_of(starter)]
-    temporary = Path(tempfile.gettempdir())
     held = set().union(*(shared_memory(process) for _, process in all_processes()))
     left += [f'file {path}' for path in sorted(files - held) if path.exists()]
-    left += [f'file {path}' for name in OWN_FILES for path in temporary.glob(f'{name}*')]
+    left += [f'file {path}' for path in sorted(own_files() - before)]
     try:
         with domain_lock(domain, ''):
             pass
@@ -140,6 +139,12 @@ def processes_of(starter: int) -> list[int]:
     """Return the processes that a supervisor with this number has started."""
     wanted = f'ENGINE_MOUNT_STARTER={starter}'.encode()
     return [pid for pid, process in all_processes() if wanted in content(process / 'environ').split(b'\0')]
+
+
+def own_files() -> set[Path]:
+    """Return the temporary files of all graphs of this machine."""
+    temporary = Path(tempfile.gettempdir())
+    return {path for name in OWN_FILES for path in temporary.glob(f'{name}*')}
 
 
 def files_of(starter: int) -> set[Path]:

@@ -125,9 +125,9 @@ def test_a_control_without_a_table_that_holds_waits_for_a_new_initialisation(gra
     graph.said[DRIVER.name]['gaps'] = '1'
     assert made_good(graph, CONTROL) is Remedy.INITIALISE
     assert graph.done == [
+        'start mount_control',
         'deactivate mount_init',
         'deactivate mount_driver',
-        'start mount_control',
         'mount_control.measured_before = False',
         'configure mount_control',
         'match',
@@ -142,12 +142,12 @@ def test_measurements_that_break_off_while_control_starts_end_in_a_new_initialis
     assert graph.done.index('mount_control.measured_before = False') > graph.done.index('match')
 
 
-def test_a_driver_comes_back_with_a_full_initialisation_and_control_is_off_meanwhile(graph):
+def test_a_lost_driver_is_started_before_anything_is_waited_for_and_comes_back_with_an_initialisation(graph):
     assert made_good(graph, DRIVER) is Remedy.INITIALISE
     assert graph.done == [
+        'start mount_driver',
         'deactivate mount_control',
         'deactivate mount_init',
-        'start mount_driver',
         'configure mount_driver',
         'match',
         *INITIALISED,

@@ -19,6 +19,7 @@ from mount_control.sample_watch import Judgement
 from mount_control.settings import (
     FILES,
     FRICTION,
+    check_policies,
     control_settings,
     defaults,
     parameter_sets,
@@ -115,6 +116,7 @@ class MountControl(SafeLifecycleNode):
 
     def check_parameters(self, values: Mapping[str, Any]) -> None:
         control_settings(values, self._specimen)
+        check_policies(values)  # what has no effect now stands in event and session all the same
 
     def take_changes(self, changes: Mapping[str, Change]) -> None:
         self._settings = control_settings(self._values(), self._specimen)

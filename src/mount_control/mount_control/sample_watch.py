@@ -162,10 +162,9 @@ class SampleWatch:
     def follow(self, last_stamp: int, count: int) -> None:
         """Note `count` samples that followed each other without a doubt, the last at `last_stamp` (ns).
 
-        They have passed `plausibility`.
+        They have passed `plausibility`. However long they lasted, nothing was interrupted.
         """
-        self.note(last_stamp)
-        self._used = self._seen = last_stamp
+        self.last = self._used = self._seen = last_stamp
         self.counts.samples += count
 
 

@@ -13,7 +13,7 @@ from mount_ros.nodes.diagnostics import Level
 from mount_sim.electronics.faults.kinds import FAULTS
 
 SENTENCE = 'no frames for 100 ms (limit 20 ms); are the electronics powered?'
-COURSE = Course(begun=10.0, present=10.0, cleared=10.6, damping_again=11.0, over=11.0)
+COURSE = Course(begun=10.0, cleared=10.6, damping_again=11.0, over=11.0)
 
 
 def case(reaction: Reaction, **options) -> FaultCase:
@@ -48,8 +48,8 @@ def test_a_safe_reaction_in_time_is_as_required():
 @pytest.mark.parametrize(
     ('zero_at', 'until', 'sentences', 'wrong'),
     [
-        (None, 0.0, (told(10.1),), 'does not go to 0 A'),
-        (10.02, 10.3, (told(10.1),), '1.00 A while the fault lasts'),
+        (None, 0.0, (told(10.1),), '1.00 A at the end of the fault'),
+        (10.02, 10.3, (told(10.1),), 'does not stay at 0 A'),
         (10.02, 10.6, (), 'nothing tells of it'),
         (10.02, 10.6, (told(10.1, 'no frames; look at the bus'),), 'no value'),
         (10.02, 10.6, (told(10.1, 'no frames for 100 ms'),), 'no remedy'),
@@ -71,7 +71,7 @@ def test_a_fault_that_must_be_tolerated_may_not_switch_off_or_tell_an_error():
 
 
 def test_a_drive_that_has_ended_has_not_recovered_and_may_only_where_that_is_required():
-    course = Course(begun=10.0, present=10.0, over=11.0, ended=True)
+    course = Course(begun=10.0, over=11.0, ended=True)
     seen = observed(10.02, 11.0, (told(10.1),))
     assert judged(case(Reaction.SAFE_UNTIL_INITIALISED), course, seen).ok
     assert 'does not damp again' in judged(case(Reaction.SAFE_WHILE), course, seen).wrong
@@ -117,4 +117,4 @@ def test_the_page_has_a_row_for_each_fault_and_says_what_is_wrong(tmp_path):
     page = (tmp_path / 'faults.md').read_text()
     assert '| `name` | meaning | mount_driver | 100 |' in page
     assert '1 \\| 2' in page
-    assert 'NOT AS REQUIRED: nothing tells of it; the current does not go to 0 A' in page
+    assert 'NOT AS REQUIRED: nothing tells of it; the current does not stay at 0 A' in page

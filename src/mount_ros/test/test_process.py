@@ -135,7 +135,8 @@ def test_nodes_whose_starter_is_killed_are_closed_and_say_so(start, monkeypatch,
         starter.kill()
         code, errors = process.end()
     assert code == 0
-    assert errors == '[ERROR] [one]: the process that started this one has ended, so this one ends too\n'
+    who = f'the process that started this one ({starter.pid})'
+    assert errors == f'[ERROR] [one]: {who} has ended, so this one ends too, at 0 A: start the graph again\n'
     assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
 
 

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from itertools import groupby
+from itertools import groupby, zip_longest
 from typing import Any
 
 import rclpy
@@ -14,6 +14,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -43,6 +44,7 @@ from mount_sim.diagnosis import FINISHED
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
+_CONFIGURE = Transition.TRANSITION_CONFIGURE
 
 
 class Bringup:
@@ -57,6 +59,8 @@ class Bringup:
         self.parameters: dict[str, dict[str, object]] = {}
         """All parameters of all nodes, as they were at the start."""
         self.notes: list[str] = []
+        self.at_rest = False
+        """Whether `stop` has deactivated all nodes: then nothing depends on the order of their ends."""
         self.verdicts = Verdicts(nodes, settings.namespace)
         self.tell_loss: Callable[[str], None] = lambda text: None
         self._settings = settings
@@ -95,8 +99,7 @@ class Bringup:
         }
         say('starting the nodes')
         self.start_nodes()
-        for node in self.nodes:
-            self.transition(node, Transition.TRANSITION_CONFIGURE)
+        self._configure()
         self.parameters = {node.full_name: parameters_of(node.full_name, self.call) for node in self.nodes}
         for mount, publisher in publishers.items():
             publisher.publish(String(data=session(settings_of_mount(self.parameters, mount))))
@@ -114,6 +117,16 @@ class Bringup:
 
     def check_processes(self) -> None:
         """Raise `NodesLostError` if a process is no more what it was."""
+
+    def _configure(self) -> None:
+        """Configure the processes' nodes, those of one process in their order.
+
+        It counts there: the data thread serves those first that came last.
+        """
+        for side_by_side in zip_longest(*self._groups):
+            asked = [(node, self._ask(node, _CONFIGURE)) for node in side_by_side if node is not None]
+            for node, question in asked:
+                self._take_answer(node, _CONFIGURE, question)
 
     def start_again(self, nodes: Sequence[GraphNode]) -> None:
         """End what is left of the processes of `nodes`, and start them again."""
@@ -196,9 +209,14 @@ class Bringup:
 
     def transition(self, node: GraphNode, transition: int) -> None:
         """Take a node through a lifecycle transition, or raise `GraphError` with the node's own reason."""
+        self._take_answer(node, transition, self._ask(node, transition))
+
+    def _ask(self, node: GraphNode, transition: int) -> tuple[Client, Future]:
         client = self.wait_for_service(node)
-        request = ChangeState.Request(transition=Transition(id=transition))
-        answer = client.call_async(request)
+        return client, client.call_async(ChangeState.Request(transition=Transition(id=transition)))
+
+    def _take_answer(self, node: GraphNode, transition: int, asked: tuple[Client, Future]) -> None:
+        client, answer = asked
         label = {1: 'configure', 3: 'activate', 4: 'deactivate'}.get(transition, str(transition))
         self.wait_until(answer.done, TRANSITION_LIMIT, f'{label} of {node.full_name}')
         self._node.destroy_client(client)
@@ -207,8 +225,8 @@ class Bringup:
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
-        for node in ending_order(self.nodes):
-            self._try_to_deactivate(node)
+        resting = [self._try_to_deactivate(node) for node in ending_order(self.nodes)]
+        self.at_rest = all(resting)
         return self.leave()
 
     def leave(self) -> list[str]:
@@ -239,15 +257,19 @@ class Bringup:
             self._executor.spin_once(0.05)
         return self.figures(node).get('sentence', '(it said nothing)')
 
-    def _try_to_deactivate(self, node: GraphNode) -> None:
-        # A node that cannot is ended by a signal, to which it answers in the same way.
+    def _try_to_deactivate(self, node: GraphNode) -> bool:
+        """Return whether the node is not active any more; if not, a signal has the same effect."""
         if self.figures(node).get('state') != 'active':
-            return
+            return True
+        done = False
         client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
         if client.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
-            self._executor.spin_until_future_complete(client.call_async(request), timeout_sec=2.0)
+            answer = client.call_async(request)
+            self._executor.spin_until_future_complete(answer, timeout_sec=2.0)
+            done = answer.done() and answer.result().success
         self._node.destroy_client(client)
+        return done
 
     def refuse_others(self, own: int) -> None:
         """Raise `GraphError` if there are more than `own` nodes of the same name."""

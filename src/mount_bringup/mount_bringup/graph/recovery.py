@@ -73,11 +73,11 @@ class Recovery:
     def _bring_back(self, loss: Loss, active: Sequence[GraphNode]) -> Remedy:
         graph = self._graph
         chosen = remedy(loss, table_holds=self._table_holds(loss))
+        graph.start_again(loss.nodes)  # first: each wait for the others would find them lost once more
         if chosen is Remedy.INITIALISE:
             for node in self._of_mounts(loss, CONTROL, INIT, DRIVER):
                 if node not in loss.nodes:
                     self._deactivate(node)
-        graph.start_again(loss.nodes)
         for node in (node for node in graph.nodes if node in loss.nodes):
             self._await_birth(node)
             self._prepare(node, chosen)

@@ -105,13 +105,18 @@ class GraphUnderTest:
 
     @property
     def ended(self) -> bool:
-        """Whether the command has ended."""
-        return self.process.poll() is not None
+        """Whether the command has ended, and every process that it was known to have."""
+        return self.process.poll() is not None and not self._alive()
 
     @property
     def output(self) -> str:
         """What the command has printed so far."""
         return self._log.read_text(errors='replace')
+
+    def outputs(self) -> dict[str, str]:
+        """Return {who: what it has printed so far} of the supervisor and the nodes."""
+        logs = {file.stem: file.read_text(errors='replace') for file in self.folder.glob('log/*.log')}
+        return {'supervisor': self.output, **logs}
 
     def nodes(self) -> dict[str, Process]:
         """Return {node: process} of those that the command has started and that still run."""
@@ -163,7 +168,7 @@ class GraphUnderTest:
     def call(self, kind: Any, service: str, request: Any, limit: float = PATIENCE) -> Any:
         """Return the answer of a service of the graph, None if there is none."""
         client = self.client(kind, service)
-        if not client.wait_for_service(limit):
+        if not self.wait_until(client.service_is_ready, limit):
             return None
         answer = client.call_async(request)
         self._executor.spin_until_future_complete(answer, timeout_sec=limit)

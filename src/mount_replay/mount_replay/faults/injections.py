@@ -1,5 +1,6 @@
 """How each fault comes into the graph: from the simulated electronics, by a signal, by another sender."""
 
+import contextlib
 import mmap
 import os
 import signal
@@ -76,32 +77,33 @@ class Simulated:
             raise GraphUnderTestError(f'mount_sim does not take the fault {self.text!r}: {said}')
 
 
-@dataclass(frozen=True)
-class Killed(_Momentary):
+class Killed:
     """The process of a node, or the supervisor's, gets a signal that ends it."""
 
-    node: str
-    signal: int = signal.SIGKILL
-
-    def begin(self, graph: GraphUnderTest) -> None:
-        os.kill(_pid(graph, self.node), self.signal)
-
-
-@dataclass(frozen=True)
-class Stopped:
-    """The process of a node stands still until the fault is taken away."""
-
-    node: str
+    def __init__(self, node: str, number: int = signal.SIGKILL):
+        self._node, self._number = node, number
+        self._pid = 0
 
     def prepare(self, graph: GraphUnderTest) -> None:
-        """Nothing takes time."""
+        """Find the process."""
+        self._pid = graph.process.pid if self._node == 'supervisor' else graph.nodes()[self._node].pid
 
     def begin(self, graph: GraphUnderTest) -> None:
-        os.kill(_pid(graph, self.node), signal.SIGSTOP)
+        os.kill(self._pid, self._number)
 
     def end(self, graph: GraphUnderTest) -> None:
-        if self.node in graph.nodes():
-            os.kill(_pid(graph, self.node), signal.SIGCONT)
+        """Nothing can be taken away."""
+
+
+class Stopped(Killed):
+    """The process of a node stands still until the fault is taken away."""
+
+    def __init__(self, node: str):
+        super().__init__(node, signal.SIGSTOP)
+
+    def end(self, graph: GraphUnderTest) -> None:
+        with contextlib.suppress(ProcessLookupError):  # somebody has ended it meanwhile
+            os.kill(self._pid, signal.SIGCONT)
 
 
 class Intruder:
@@ -236,7 +238,3 @@ def _write_step(file: Path, seconds: float) -> None:
         file.write_bytes(bytes(mmap.PAGESIZE))
     with file.open('r+b') as opened:
         opened.write(struct.pack('<q', round(seconds * 1e9)))
-
-
-def _pid(graph: GraphUnderTest, node: str) -> int:
-    return graph.process.pid if node == 'supervisor' else graph.nodes()[node].pid

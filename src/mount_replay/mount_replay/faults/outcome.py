@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-from mount_models.sampling import HIGHEST_CURRENT, SETPOINT_TIMEOUT
+from mount_models.sampling import HIGHEST_CURRENT
 from mount_replay.faults.fault import SAFE, FaultCase, Reaction
 from mount_replay.faults.observers import Observers, Told, since
 from mount_ros.nodes.diagnostics import Level
@@ -19,12 +19,15 @@ _LATENESS = re.compile('no (displacement|setpoint) ')  # of a machine with other
 _REMEDY = re.compile(r'[;:?,] *\w+ \w+')
 
 
+Wanted = list[tuple[float, float]]
+"""Times (s) and currents (A)."""
+
+
 @dataclass
 class Course:
     """One trial of a fault: its times (steady clock, s) and what was printed; NaN where it did not come."""
 
     begun: float
-    present: float = math.nan  # from then on it is there for sure
     cleared: float = math.nan
     damping_again: float = math.nan
     over: float = math.nan  # until when it was observed
@@ -83,7 +86,8 @@ def judged(case: FaultCase, course: Course, observed: Observers) -> Outcome:
     end = course.over if math.isnan(course.cleared) else course.cleared
     heard, seen = since(observed.heard, course.begun, end), since(observed.seen, course.begun, end)
     told = [*since(observed.told, course.begun, course.over), *course.printed]
-    zero = _zero(case, observed, course)
+    wanted = _wanted(case, course, observed)
+    zero = _zero(case, course, wanted)
     _note_telling(outcome, case, course, told, zero)
     if zero is not None:
         outcome.zero_s = round(zero - course.begun, 4)
@@ -98,46 +102,40 @@ def judged(case: FaultCase, course: Course, observed: Observers) -> Outcome:
         outcome.complaints.append(
             f'{outcome.highest_current} A on the bus; the limit is {HIGHEST_CURRENT:g} A'
         )
-    _CHECKS[case.reaction](outcome, case, course, told, _after(case, course, observed, zero, end))
+    _CHECKS[case.reaction](outcome, case, course, told, wanted)
     return outcome
 
 
-def _zero(case: FaultCase, observed: Observers, course: Course) -> float | None:
-    """Return when the current was 0 A for the first time after the fault began; None if it never was."""
-    end = course.over
+def _wanted(case: FaultCase, course: Course, observed: Observers) -> Wanted:
+    """Return times (s) and currents (A) wanted of the coil while the fault is there."""
+    end = course.over if math.isnan(course.cleared) else course.cleared
+    if case.in_electronics:
+        return [(each.time, each.followed) for each in since(observed.seen, course.begun, end)]
+    return [(each.time, each.current) for each in since(observed.heard, course.begun, end)]
+
+
+def _zero(case: FaultCase, course: Course, wanted: Wanted) -> float | None:
+    """Return when the current fell to 0 A (s), for good where the fault demands that; None if it did not."""
     if case.reaction is Reaction.NOT_STARTED:
-        driven = [each.time for each in since(observed.heard, course.begun, end) if each.current > 0.0]
-        return driven[-1] if driven else course.begun
-    if case.in_electronics:
-        return next(
-            (each.time for each in since(observed.seen, course.begun, end) if each.followed == 0.0), None
-        )
-    return next((each.time for each in since(observed.heard, course.begun, end) if each.current == 0.0), None)
+        return max((time for time, current in wanted if current > 0.0), default=course.begun)
+    if case.reaction not in SAFE:
+        return next((time for time, current in wanted if current == 0.0), None)
+    driven = max((place for place, (_, current) in enumerate(wanted) if current > 0.0), default=-1)
+    return wanted[driven + 1][0] if driven + 1 < len(wanted) else None
 
 
-def _after(
-    case: FaultCase, course: Course, observed: Observers, zero: float | None, end: float
-) -> list[float]:
-    """Return the currents (A) wanted of the coil between 0 A and the end of the fault."""
-    if zero is None:
-        return []
-    settled = max(zero, course.present) + SETPOINT_TIMEOUT
-    if case.in_electronics:
-        return [each.followed for each in since(observed.seen, settled, end)]
-    return [each.current for each in since(observed.heard, settled, end)]
+def tells(case: FaultCase, told: Told) -> bool:
+    """Return whether a sentence tells of the fault."""
+    return told.level >= Level.WARN and bool(case.words) and bool(re.search(case.words, told.sentence))
 
 
 def _note_telling(
     outcome: Outcome, case: FaultCase, course: Course, told: list[Told], zero: float | None
 ) -> None:
-    found = [
-        each
-        for each in told
-        if each.level >= Level.WARN and case.words and re.search(case.words, each.sentence)
-    ]
+    found = [each for each in told if tells(case, each)]
     times = [zero] if zero is not None and case.reaction in SAFE else []
     if found:
-        gravest = max(found, key=lambda each: (each.level, -each.time))
+        gravest = max(found, key=lambda each: (each.level, not _lacking(each.sentence), -each.time))
         outcome.sentence, outcome.detected_by = gravest.sentence, found[0].node
         times.append(found[0].time)
     if times and course.begun <= min(times):
@@ -145,8 +143,9 @@ def _note_telling(
 
 
 def _note_recovery(outcome: Outcome, case: FaultCase, course: Course) -> None:
-    if course.ended:
-        outcome.recovery = 'the drive has ended; a new start initialises'
+    if course.ended or case.for_good:
+        what = 'the drive has ended; ' if course.ended else ''
+        outcome.recovery = f'{what}a new start initialises'
     elif not math.isnan(course.damping_again):
         outcome.recovered = True
         after = course.damping_again - course.cleared
@@ -166,15 +165,12 @@ def _check_initialised(outcome: Outcome, case: FaultCase, course: Course, observ
         outcome.complaints.append('it damps again without a new initialisation')
 
 
-def _check_safe(
-    outcome: Outcome, case: FaultCase, course: Course, told: list[Told], after: list[float]
-) -> None:
+def _check_safe(outcome: Outcome, case: FaultCase, course: Course, told: list[Told], wanted: Wanted) -> None:
     _check_sentence(outcome)
     if outcome.zero_s is None:
-        outcome.complaints.append('the current does not go to 0 A')
+        last = wanted[-1][1] if wanted else math.nan
+        outcome.complaints.append(f'the current does not stay at 0 A: {last:.2f} A at the end of the fault')
         return
-    if max(after, default=0.0) > 0.0:
-        outcome.complaints.append(f'{max(after):.2f} A while the fault lasts, after 0 A')
     if case.silent and outcome.zero_s > AFTER_OCCURRENCE:
         outcome.late.append(
             f'0 A after {1e3 * outcome.zero_s:.0f} ms; the limit is {1e3 * AFTER_OCCURRENCE:g} ms'
@@ -182,47 +178,49 @@ def _check_safe(
     if outcome.detected_s is not None and outcome.zero_s - outcome.detected_s > AFTER_DETECTION:
         late = 1e3 * (outcome.zero_s - outcome.detected_s)
         outcome.late.append(f'0 A {late:.0f} ms after detection; the limit is {1e3 * AFTER_DETECTION:g} ms')
-    if not outcome.recovered and not (course.ended and case.reaction is Reaction.SAFE_UNTIL_INITIALISED):
+    over = course.ended or case.for_good
+    if not outcome.recovered and not (over and case.reaction is Reaction.SAFE_UNTIL_INITIALISED):
         outcome.complaints.append('it does not damp again')
 
 
 def _check_not_started(
-    outcome: Outcome, case: FaultCase, course: Course, told: list[Told], after: list[float]
+    outcome: Outcome, case: FaultCase, course: Course, told: list[Told], wanted: Wanted
 ) -> None:
     _check_sentence(outcome)
     if not course.ended:
         outcome.complaints.append('the graph is started with the fault')
 
 
-def _check_told(
-    outcome: Outcome, case: FaultCase, course: Course, told: list[Told], after: list[float]
-) -> None:
+def _check_told(outcome: Outcome, case: FaultCase, course: Course, told: list[Told], wanted: Wanted) -> None:
     _check_sentence(outcome)
     if not outcome.recovered:
         outcome.complaints.append('it does not damp again')
 
 
 def _check_tolerated(
-    outcome: Outcome, case: FaultCase, course: Course, told: list[Told], after: list[float]
+    outcome: Outcome, case: FaultCase, course: Course, told: list[Told], wanted: Wanted
 ) -> None:
     errors = [each for each in told if each.level >= Level.ERROR]
     if errors:
         complaints = outcome.late if _LATENESS.search(errors[0].sentence) else outcome.complaints
         complaints.append(f'{errors[0].node} tells an error: {errors[0].sentence}')
-    if outcome.zero_s is not None and after:
+    if outcome.zero_s is not None:
         outcome.late.append(f'0 A after {outcome.zero_s:.2f} s, though damping should go on')
     if not outcome.recovered:
         outcome.complaints.append('it does not damp any more')
 
 
 def _check_sentence(outcome: Outcome) -> None:
-    if not outcome.sentence:
+    if outcome.sentence:
+        outcome.complaints += [f'the sentence has no {what}' for what in _lacking(outcome.sentence)]
+    else:
         outcome.complaints.append('nothing tells of it')
-        return
-    if not re.search(r'\d', outcome.sentence):
-        outcome.complaints.append('the sentence has no value')
-    if not _REMEDY.search(outcome.sentence):
-        outcome.complaints.append('the sentence has no remedy')
+
+
+def _lacking(sentence: str) -> list[str]:
+    """Return what a sentence lacks, as far as its form shows."""
+    found = {'value': re.search(r'\d', sentence), 'remedy': _REMEDY.search(sentence)}
+    return [what for what, there in found.items() if not there]
 
 
 _CHECKS = {

@@ -7,11 +7,11 @@ from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.graph import GraphUnderTest
 from mount_replay.faults.injections import take_through
 from mount_replay.faults.matrix import ACTIVATE, DEACTIVATE
-from mount_replay.faults.observers import Told
-from mount_replay.faults.outcome import Course, Outcome, judged
+from mount_replay.faults.observers import Told, since
+from mount_replay.faults.outcome import Course, Outcome, judged, tells
 from mount_ros.nodes.diagnostics import Level
 
-_END_PATIENCE = 40.0  # s, chosen: for the end of a drive that closes and audits its recording
+_END_PATIENCE = 20.0  # s, chosen: for the end of a drive that closes and audits its recording
 _RECOVERY_PATIENCE = 8.0  # s, chosen
 _AT_REST = 0.6  # s, chosen: so long a graph that must not recover by itself is watched
 _OWN_RECOVERY = 12.0  # s, chosen: a supervisor that initialises again by itself has done so by then
@@ -25,12 +25,12 @@ def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
     try:
         course = Course(begun=time.monotonic())
         case.injection.begin(graph)
-        course.present = time.monotonic()
         _observe(case, graph, course, output)
     finally:
+        cleared = time.monotonic()
         case.injection.end(graph)
-    if not course.ended:
-        course.cleared = time.monotonic()
+    if not course.ended and not case.for_good:
+        course.cleared = cleared
         _recover(case, graph, course, output)
     course.over = time.monotonic()
     course.printed = tuple(output.lines)
@@ -53,12 +53,22 @@ def _observe(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_O
 
 def _recover(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> None:
     """Wait for damping; where a new initialisation is required, see that there is none before it."""
-    if case.reaction is Reaction.SAFE_UNTIL_INITIALISED and not _back(graph, course, _OWN_RECOVERY, output):
+    by_hand = case.reaction is Reaction.SAFE_UNTIL_INITIALISED
+    if by_hand and not _back(graph, course, _OWN_RECOVERY, output) and not course.ended:
         for node in ('mount_control', 'mount_init', 'mount_driver'):
             take_through(graph, node, DEACTIVATE)
         for node in ('mount_driver', 'mount_init', 'mount_control'):
             take_through(graph, node, ACTIVATE)
     _back(graph, course, _RECOVERY_PATIENCE, output)
+    if case.reaction is Reaction.TOLD:
+        graph.wait_until(lambda: _is_told(case, graph, course, output), _RECOVERY_PATIENCE)
+
+
+def _is_told(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> bool:
+    """Return whether a sentence has come: a supervisor tells of a node when it has brought it back."""
+    output.look()
+    told = [*since(graph.observed.told, course.begun), *output.lines]
+    return any(tells(case, each) for each in told)
 
 
 def _back(graph: GraphUnderTest, course: Course, limit: float, output: '_Output') -> bool:
@@ -74,17 +84,22 @@ def _back(graph: GraphUnderTest, course: Course, limit: float, output: '_Output'
 
 
 class _Output:
-    """The lines that the command and its nodes print from now on, as what the supervisor tells."""
+    """The lines that the command and its nodes print from now on, as what they tell."""
 
     def __init__(self, graph: GraphUnderTest):
         self.lines: list[Told] = []
         self._graph = graph
-        self._known = len(graph.output.splitlines())
+        self._known: dict[str, int] = {}
+        self.look()
+        self.lines.clear()
 
     def look(self) -> None:
-        lines = self._graph.output.splitlines()
+        """Take what was printed since the last look."""
         now = time.monotonic()
-        self.lines += [
-            Told(now, 'supervisor', Level.WARN, line.strip()) for line in lines[self._known :] if line.strip()
-        ]
-        self._known = max(self._known, len(lines))
+        for name, text in self._graph.outputs().items():
+            new = text[self._known.get(name, 0) :]
+            whole = new[: new.rfind('\n') + 1]
+            self._known[name] = self._known.get(name, 0) + len(whole)
+            self.lines += [
+                Told(now, name, Level.WARN, line.strip()) for line in whole.splitlines() if line.strip()
+            ]

@@ -61,7 +61,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     for node in nodes:
         node.ending.set()
     if over.starter.ended:
-        logger.error('the process that started this one has ended, so this one ends too')
+        logger.error(f'{over.starter.name} has ended, so this one ends too, at 0 A: start the graph again')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()

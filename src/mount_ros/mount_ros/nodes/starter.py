@@ -42,6 +42,11 @@ class Starter:
         return descriptor in ready
 
     @property
+    def name(self) -> str:
+        """The process, for people."""
+        return f'the process that started this one ({os.environ.get(_STARTER, "none")})'
+
+    @property
     def ended(self) -> bool:
         """Whether it has ended; never where none is known."""
         return self._had_ended or bool(select.select(self._end, [], [], 0.0)[0])
