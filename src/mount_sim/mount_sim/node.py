@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -25,7 +24,6 @@ from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import Beats, Urgent
 from mount_ros.private_rclpy import given_at_start
-from mount_ros.topics import Topic
 from mount_sim.car_loop import CarLoop
 from mount_sim.diagnosis import car_verdict, verdict
 from mount_sim.electronics.can_end import CanEnd
@@ -231,15 +229,12 @@ class _Instruments:
     """Publishes truth, acceleration and force of one mount, the one `name` of several or the only one."""
 
     def __init__(self, path: DataPath, name: str = ''):
-        def of_mount(topic: Topic) -> Topic:
-            return replace(topic, name=f'{name}/{topic.name}') if name else topic
-
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
         self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
         self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
-        self._send_truth = path.sender(of_mount(topics.SIM_TRUTH))
-        self._send_acceleration = path.sender(of_mount(topics.SIM_CHASSIS_ACCELERATION))
-        self._send_force = path.sender(of_mount(topics.SIM_MOUNT_FORCE))
+        self._send_truth = path.sender(topics.SIM_TRUTH, name)
+        self._send_acceleration = path.sender(topics.SIM_CHASSIS_ACCELERATION, name)
+        self._send_force = path.sender(topics.SIM_MOUNT_FORCE, name)
 
     def publish(self, stamp: int, truth: np.void, truth_bytes: bytes) -> None:
         """Publish what was true at the time `stamp` (ns)."""
