@@ -236,7 +236,7 @@ class Exchange:
             self.unsent_reason = self.trouble
             return False
         try:
-            self.guard.note_sent(setpoint, self._now())
+            self.guard.note_sent(setpoint)
             self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
             bus.send(self._frame)
         except Exception as error:

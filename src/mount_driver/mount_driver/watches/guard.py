@@ -58,10 +58,10 @@ class Guard:
         times = (self._foreign_at, self._samples.last, self._statuses.last)
         return max((time for time in times if time is not None), default=None)
 
-    def note_sent(self, setpoint: Setpoint, now: int) -> None:
-        """Take a setpoint that leaves at `now`; one thread at a time."""
+    def note_sent(self, setpoint: Setpoint) -> None:
+        """Take a setpoint that leaves; one thread at a time."""
         self._sent = setpoint.current
-        self._coil.note_sent(setpoint.current, now)
+        self._coil.note_sent(setpoint)
 
     def judge_sample(self, stamped: Stamped, received: int) -> Fault | None:
         """Take a new sample and lower the link's limits as the watches say."""
@@ -73,7 +73,7 @@ class Guard:
         if link.jumps + self._clock.restarts != self._breaks:
             self._breaks = link.jumps + self._clock.restarts
             return Fault(self._restarted(), needs_initialisation=True)
-        sentence = self._coil.judge(sample.coil_current, sample.enabled, self._clock.taken(received), now)
+        sentence = self._coil.judge(sample)
         return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:
