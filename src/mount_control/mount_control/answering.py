@@ -92,7 +92,9 @@ class Answering:
         """Answer what comes after `activation` (ns), the stamp of the table."""
         controller = Controller(ControlLaw(settings, table))
         parameters = settings.parameters
-        self.watch.begin(activation, parameters.longest_bridge, parameters.displacement_range)
+        self.watch.begin(
+            activation, parameters.longest_bridge, parameters.displacement_range, parameters.sample_rate
+        )
         self._table, self._faults, self.last_fault = table, 0, 0
         self._changes.clear()
         self.controller = controller

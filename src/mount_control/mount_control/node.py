@@ -85,6 +85,7 @@ class MountControl(SafeLifecycleNode):
 
     def activate(self) -> None:
         table, air_gap = self._activation.wait(self.answering.watch, self.ending)
+        self.answering.watch.check_rate(self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
         self._latency = LatencyHistogram()
         self._heard = time.monotonic()

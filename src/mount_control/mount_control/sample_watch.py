@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control.force_to_current import ForceTableError
-from mount_models.sampling import SAMPLE_TIME_NS
+from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
 
 _NANOSECONDS = 1e9
+_COUNTED = 50  # chosen: samples from which their rate is known
+_RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses before an activation
 _STREAM_BREAK = 1_000_000_000  # ns, chosen: a longer silence may have been a loss of power
 
 INTERRUPTED = (
@@ -57,13 +59,17 @@ class SampleWatch:
         self._activation = 0  # ns
         self._longest_bridge = 0  # ns
         self._range = 0.0  # m
+        self._period = SAMPLE_TIME_NS  # ns between two samples
+        self._noted = 0  # samples since `first`
 
     def note(self, stamp: int) -> None:
         """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
         if self.last is None or abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
+            self._noted = 1
         elif stamp > self.last:
             self.last = stamp
+            self._noted += 1
 
     def check_belongs(self, table_stamp: int | None, air_gap_stamp: int | None) -> None:
         """Raise `ForceTableError` unless the table was measured on the present uninterrupted measurements.
@@ -93,11 +99,25 @@ class SampleWatch:
                 f'{remedy}'
             )
 
-    def begin(self, activation: int, longest_bridge: float, displacement_range: float) -> None:
-        """Count anew: what comes after `activation` (ns) is to be answered; limits in s and m."""
+    def check_rate(self, sample_rate: float) -> None:
+        """Raise `ForceTableError` if the samples so far did not come at `sample_rate` (Hz)."""
+        if self.first is None or self.last is None or self._noted < _COUNTED:
+            return
+        rate = 1e9 * (self._noted - 1) / (self.last - self.first)
+        if abs(rate - sample_rate) > _RATE_TOLERANCE * sample_rate:
+            raise ForceTableError(
+                f'displacement comes at {rate:.0f} Hz, but sample_rate of mount_control is {sample_rate:g} '
+                f'Hz (limit {100.0 * _RATE_TOLERANCE:g} %); start the whole graph with one sample_rate'
+            )
+
+    def begin(
+        self, activation: int, longest_bridge: float, displacement_range: float, sample_rate: float
+    ) -> None:
+        """Count anew: what comes after `activation` (ns) is to be answered; limits in s and m, rate in Hz."""
         self._activation = activation
         self._longest_bridge = round(longest_bridge * _NANOSECONDS)
         self._range = displacement_range
+        self._period = sample_time_ns(sample_rate)
         self._used, self.interrupted, self.counts = None, False, SampleCounts()
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
@@ -120,20 +140,20 @@ class SampleWatch:
         if elapsed > self._longest_bridge:
             self.counts.restarts += 1
             return Judgement.RESTART, 0
-        missing = max(0, (elapsed + SAMPLE_TIME_NS // 2) // SAMPLE_TIME_NS - 1)
+        missing = max(0, (elapsed + self._period // 2) // self._period - 1)
         self.counts.bridged += missing
         return Judgement.USE, missing
 
     def expects(self, stamp: int) -> bool:
         """Whether a believable sample of time `stamp` (ns) just goes on where the last one used ended."""
-        return self._used == stamp - SAMPLE_TIME_NS
+        return self._used == stamp - self._period
 
     def following(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which of the samples (n,) are believable and one period after the one before."""
         valid = np.abs(displacement) <= self._range  # not so for NaN
         follows = np.zeros(len(stamps), bool)
         steps = np.diff(stamps)
-        follows[1:] = valid[1:] & (steps > 0) & (steps < SAMPLE_TIME_NS + SAMPLE_TIME_NS // 2)
+        follows[1:] = valid[1:] & (steps > 0) & (steps < self._period + self._period // 2)
         return follows
 
     def follow(self, last_stamp: int, count: int) -> None:

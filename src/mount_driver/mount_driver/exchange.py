@@ -20,7 +20,9 @@ from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.frame import Frame
 from mount_driver.link import Arrival, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
+from mount_driver.rate_watch import RateWatch
 from mount_driver.status_watch import StatusWatch
+from mount_models.sampling import sample_time_ns
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
 _REOPEN_PERIOD = 0.2  # s, chosen
@@ -46,7 +48,8 @@ class Exchange:
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
         steady: Callable[[], int] = time.monotonic_ns,
     ):
-        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9))
+        sample_time = sample_time_ns(parameters.sample_rate)
+        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9), sample_time)
         self.reception = Reception()
         self.failure = ''
         """Why the exchange has ended on its own; empty while it runs."""
@@ -68,7 +71,8 @@ class Exchange:
         self._temperature_stamp: int | None = None  # of the temperature told last
         self._clock = clock
         self._steady = steady
-        self._coil = CoilWatch(parameters.coil)
+        self._coil = CoilWatch(parameters.coil, sample_time)
+        self._rate = RateWatch(parameters.sample_rate)
         self._health = StatusWatch(parameters.status)
         self._ids = (codec.measurement.frame_id, codec.status.frame_id)
         self._bus: can.BusABC | None = None
@@ -173,6 +177,7 @@ class Exchange:
         if stamped is not None:
             self.bus_off = False
             self.last_received = received
+            self._switch_off(self._rate.judge(stamped.sample))
             self._watch_coil(stamped, received)
             self._on_sample(stamped)
         elif self.link.arrival is Arrival.RESENT:

@@ -19,7 +19,6 @@ _REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 2
 _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFF_FFFF
 _LATE_US = 1_000_000  # chosen: beyond it a step of the clock back is a restart, forward a pause
-_SAMPLE_TIME_US = SAMPLE_TIME_NS // 1000
 _SLACK = 2  # samples, chosen: more may have been taken in a time than fit in by the clock's steps
 
 
@@ -57,7 +56,13 @@ class Stamped(NamedTuple):
 class Link:
     """Judges and stamps every measurement, judges every setpoint, and counts."""
 
-    def __init__(self, codec: MountCodec, clock: Clock, setpoint_timeout_ns: int):
+    def __init__(
+        self,
+        codec: MountCodec,
+        clock: Clock,
+        setpoint_timeout_ns: int,
+        sample_time_ns: int = SAMPLE_TIME_NS,
+    ):
         self.clock = clock
         self.samples = E2EReceiver(codec.decode_measurement, codec.measurement)
         self.statuses = E2EReceiver(codec.decode_status, codec.status)
@@ -88,6 +93,7 @@ class Link:
 
         self._highest_current = codec.current.high
         self._timeout = setpoint_timeout_ns
+        self._sample_time_us = sample_time_ns // 1000
         self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, oldest first
         self._answered_stamp = -1
         # No sample of the first minute bears this number: 0 A sent before any answer answers nothing.
@@ -229,6 +235,6 @@ class Link:
             return Arrival.LATE
         # Behind a restart or a pause the counters say nothing: the clock counts it, once. Nor were more
         # samples taken than there was time for.
-        if step > 1 and (step - _SLACK) * _SAMPLE_TIME_US <= step_us < _LATE_US:
+        if step > 1 and (step - _SLACK) * self._sample_time_us <= step_us < _LATE_US:
             self.lost += step - 1
         return Arrival.NEW

@@ -9,6 +9,7 @@ from mount_driver.diagnosis import LinkWatch, judge, snapshot
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal, Stamped
 from mount_driver.parameters import DriverParameters
+from mount_models.sampling import sample_time_ns
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.nodes.diagnostics import Level, Verdict
@@ -39,6 +40,7 @@ class MountDriver(SafeLifecycleNode):
 
     def configure(self) -> None:
         self._settings = read(self, DriverParameters())
+        sample_time_ns(self._settings.sample_rate)  # refuses what the electronics cannot count
         self._codec = MountCodec()
         path = self.open_data_path()
         self._publish_displacement = path.sender(DISPLACEMENT)
@@ -53,7 +55,8 @@ class MountDriver(SafeLifecycleNode):
         self.ending.wait(max(0.0, self._not_before - time.monotonic()))
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
-        clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
+        period = sample_time_ns(self._settings.sample_rate)
+        clock = CounterClock(period) if self.lockstep else ElectronicsClock(epoch_offset, period)
         exchange = Exchange(
             self._settings, self._codec, clock, self._on_sample, on_temperature=self._on_temperature
         )

@@ -6,7 +6,7 @@ from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
 from mount_driver.coil_watch import CoilWatchParameters
 from mount_driver.status_watch import StatusLimits
 from mount_models.quantity import Quantity
-from mount_models.sampling import SETPOINT_TIMEOUT
+from mount_models.sampling import SAMPLE_RATE, SETPOINT_TIMEOUT, SampleRate
 
 
 class DriverParameters(NamedTuple):
@@ -26,6 +26,7 @@ class DriverParameters(NamedTuple):
     data_bitrate: Annotated[
         int, Quantity('bit/s', 'data bit rate of CAN FD, likewise', 10_000, 8_000_000)
     ] = 2_000_000
+    sample_rate: SampleRate = SAMPLE_RATE
     setpoint_timeout: Annotated[
         float,
         Quantity('s', 'greatest age of the sample that a current answers; then 0 A', 0.002, SETPOINT_TIMEOUT),

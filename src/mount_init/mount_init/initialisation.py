@@ -40,7 +40,7 @@ from mount_init.plausibility import (
     check_steady_fall,
 )
 from mount_init.ramp import Ramp, current_ramp
-from mount_init.readings import Readings, check_readings
+from mount_init.readings import Readings, check_rate, check_readings
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, find_crossing
@@ -113,6 +113,7 @@ class Initialisation:
         self.ramp: Ramp = current_ramp(parameters, specimen.rest_current)
         self.readings = Readings(self.ramp.setpoints.size)
         self.last_stamp: int | None = None
+        self._first_stamp: int | None = None
         self._temperatures = temperatures or TemperatureReadings()
         self._middle_stamp: int | None = None
         self._setpoints: list[float] = self.ramp.setpoints.tolist()
@@ -141,6 +142,8 @@ class Initialisation:
             return OFF
         number = self.readings.received
         self.last_stamp = stamp
+        if number == 0:
+            self._first_stamp = stamp
         if number == self.length // 2:
             self._middle_stamp = stamp
         valid = self.readings.add(current, current_rate, flux_rate)
@@ -163,6 +166,9 @@ class Initialisation:
                 f'air gap not estimated: {self.readings.received} of {self.length} ripple samples '
                 'received; is mount_driver active?'
             )
+        assert self._first_stamp is not None
+        assert self.last_stamp is not None
+        check_rate(self.last_stamp - self._first_stamp, self.length, self.parameters)
         check_readings(self.readings, self.ramp, self.parameters)
         temperature = coil_temperature(
             self._temperatures, self._middle_stamp, self.parameters.coil_temperature_celsius

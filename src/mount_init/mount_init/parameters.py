@@ -8,7 +8,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.quantity import Quantity
-from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SampleRate
 
 _WIDE = 'chosen: seven standard deviations or more at 1 % ripple noise'
 
@@ -16,10 +16,7 @@ _WIDE = 'chosen: seven standard deviations or more at 1 % ripple noise'
 class InitParameters(NamedTuple):
     """All parameters of `mount_init`; the ramp with these values takes 2.75 s."""
 
-    sample_rate: Annotated[
-        float,
-        Quantity('Hz', 'ripple samples per second: turns durations into counts', 100, 10e3),
-    ] = SAMPLE_RATE
+    sample_rate: SampleRate = SAMPLE_RATE
     rise_duration: Annotated[
         float, Quantity('s', 'smooth rise from 0 A to the rest current, and fall back to 0 A', 0.02, 1.0)
     ] = 0.05

@@ -32,7 +32,7 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of the graph; `rate` is in Hz, 0 for topics without a rate of their own."""
+    """A topic of the graph; `rate` is in Hz at the default sample rate, 0 for topics without their own."""
 
     name: str
     type: str
@@ -41,6 +41,10 @@ class Topic:
     content: str
     scalars: tuple[Scalar, ...] = ()
     optional: tuple[Scalar, ...] = ()  # that some senders name between them
+
+    def rate_at(self, sample_rate: float) -> float:
+        """Return the rate (Hz) of a graph that samples at `sample_rate` (Hz)."""
+        return sample_rate if self.rate == SAMPLE_RATE else self.rate
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mount_driver.codec import Status
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
-from mount_sim.electronics.electronics import STATUS_EVERY, ElectronicsParameters
+from mount_sim.electronics.electronics import ElectronicsParameters, status_every
 from mount_sim.electronics.faults import Fault
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
@@ -49,6 +48,7 @@ class ElectronicsLoop:
     ):
         self._mount = mount
         self._can_end = can_end
+        self._status_every = status_every(mount.sample_rate)
         self._electronics = electronics
         self._fault = fault
         self._publish = publish
@@ -63,11 +63,11 @@ class ElectronicsLoop:
         self.last_latency = math.nan
 
     def run_in_real_time(self, ending: threading.Event) -> None:
-        """Sample at 1 kHz of the electronics' clock until `ending` is set, behind the end of the run too.
+        """Sample by the electronics' clock until `ending` is set, behind the end of the run too.
 
         Electronics do not fall silent when a drive is over; if they did, the control would rightly report it.
         """
-        period = SAMPLE_TIME / (1.0 + self._electronics.clock_drift)
+        period = 1.0 / self._mount.sample_rate / (1.0 + self._electronics.clock_drift)
         begin = time.monotonic()
         while not ending.is_set():
             self.step_in_real_time()
@@ -116,13 +116,13 @@ class ElectronicsLoop:
         taken = self._valid(received, now)
         reading = self._fault.reading(now, mount.measure())
         frame = self._can_end.measurement_frame(
-            number, number * SAMPLE_TIME_NS // _NS, reading, mount.driver_on
+            number, number * mount.sample_time // _NS, reading, mount.driver_on
         )
         arriving = self._fault.frame(now, number, frame)
         self._sent_at[number % _REMEMBERED] = time.time()
         if arriving is not None:
             self._can_end.send_frame(arriving)
-        if number % STATUS_EVERY == 0:
+        if number % self._status_every == 0:
             self._can_end.send_status(self._fault.status(now, self._status()))
         self._publish(number)
         mount.advance(*taken, lambda wanted: self._fault.driven(now, wanted))
@@ -159,9 +159,8 @@ class ElectronicsLoop:
     def _check_patience(self, number: int, patience: float) -> None:
         first = math.isnan(self._answered_first)
         if not first and time.monotonic() - self._asked_at >= patience:
-            raise NoAnswerError(
-                f'sample {number} ({number * SAMPLE_TIME:.3f} s) was not answered within {patience:g} s'
-            )
+            at = number / self._mount.sample_rate
+            raise NoAnswerError(f'sample {number} ({at:.3f} s) was not answered within {patience:g} s')
 
     def _status(self) -> Status:
         failed, self._failed_told = self._failed_told, self._can_end.failed_setpoints

@@ -8,7 +8,6 @@ from sensor_msgs.msg import Imu
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
-from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
@@ -94,8 +93,12 @@ class MountSim(SafeLifecycleNode):
         return verdict(self._loop.figures, self._mount.run, lockstep=self.lockstep)
 
     def _prepare_mount(self) -> None:
-        self._mount = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
-        rehearsal = SimulatedMount(self._settings.plant, self._excitation, self._settings.seed)
+        self._mount, rehearsal = (
+            SimulatedMount(
+                self._settings.plant, self._excitation, self._settings.seed, self._settings.sample_rate
+            )
+            for _ in range(2)
+        )
         rehearsal.measure()  # loads the compiled plant before simulated time begins
         rehearsal.advance(0.0)
 
@@ -127,7 +130,7 @@ class MountSim(SafeLifecycleNode):
         self.get_logger().error(sentence)
 
     def _publish(self, number: int) -> None:
-        stamp = self._time_zero + number * SAMPLE_TIME_NS
+        stamp = self._time_zero + number * self._mount.sample_time
         truth = self._mount.truth
         if self._loop is not None and not self.lockstep:
             truth['setpoint_latency'] = self._loop.last_latency

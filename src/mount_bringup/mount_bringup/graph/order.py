@@ -7,9 +7,19 @@ from typing import Any, NamedTuple
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
-from mount_bringup.graph.nodes import DRIVER, INIT, RECORDER, SIM, GraphNode, GraphSettings
+from mount_bringup.graph.nodes import (
+    DRIVER,
+    INIT,
+    RECORDER,
+    SIM,
+    SIMULATED,
+    VEHICLE,
+    GraphNode,
+    GraphSettings,
+)
 from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.parameter_file import settings_of_file
+from mount_bringup.sample_rate import check_sample_rate
 from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
 from mount_control.policy.registry import POLICIES
 from mount_driver.parameters import DriverParameters
@@ -83,10 +93,21 @@ _ANY = (
         choices=('debug', 'info', 'warn', 'error', 'fatal'),
     ),
 )
+
+
+def _sample_rate(nodes: Sequence[GraphNode]) -> LaunchArgument:
+    return LaunchArgument(
+        'sample_rate',
+        'Hz: how often the electronics measure and are answered',
+        tuple(f'{node.name}.sample_rate' for node in nodes),
+    )
+
+
 _PORT = 'UDP port of the simulated CAN bus; empty: one for each ROS domain and namespace'
 
 SIM_ARGUMENTS = (
     *_ANY,
+    _sample_rate(SIMULATED),
     LaunchArgument('scenario', 'what is driven: motorway, bench, sweep, recorded', ('mount_sim.scenario',)),
     LaunchArgument('mount', f'what is between engine and chassis: {", ".join(MOUNTS)}', ('mount_sim.mount',)),
     LaunchArgument(
@@ -98,6 +119,7 @@ SIM_ARGUMENTS = (
 
 VEHICLE_ARGUMENTS = (
     *_ANY,
+    _sample_rate(VEHICLE),
     LaunchArgument('interface', 'interface of python-can', ('mount_driver.interface',), default='socketcan'),
     LaunchArgument('channel', 'channel of the interface', ('mount_driver.channel',), default='can0'),
     LaunchArgument('port', f'{_PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
@@ -123,7 +145,7 @@ def launch_order(
             settings.setdefault(name, {}).update(values)
     settings = with_control_of_mount(checked_settings(settings, known))
     _check_damper(given['damper'], settings)
-    _check(settings)
+    _check(nodes, settings)
     return LaunchOrder(
         nodes=chosen,
         settings=GraphSettings(
@@ -176,7 +198,7 @@ def _check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> Non
         )
 
 
-def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
+def _check(nodes: Sequence[GraphNode], settings: Mapping[str, Mapping[str, Any]]) -> None:
     """Raise the `ValueError` of the first parameter outside its range, before a node has it."""
     sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (INIT, InitParameters()))
     for node, defaults in sets:
@@ -184,6 +206,7 @@ def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
     sim = with_flattened(SimParameters(), settings.get(SIM.name, {}))
     seated_mount(sim.mount)
     build_excitation(sim)
+    check_sample_rate(settings, [node.name for node in nodes])
     check_control_of_mount(settings)
     chosen_control(settings)
 

@@ -8,14 +8,14 @@ from typing import Protocol
 import numpy as np
 
 from mount_bringup.chosen import Parameters
+from mount_bringup.sample_rate import check_sample_rate
 from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
-from mount_sim.electronics.electronics import STATUS_EVERY, Reading
+from mount_sim.electronics.electronics import Reading, status_every
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
@@ -59,7 +59,8 @@ def run_core(
     With `write_columns` those of the samples go there, many at a time. `excitation` is that of the scenario
     where it is built already.
     """
-    messages = CoreMessages(write, _coil_temperature(_sim_parameters(parameters)), write_columns)
+    sim = _sim_parameters(parameters)
+    messages = CoreMessages(write, _coil_temperature(sim), write_columns, sim.sample_rate)
     return run_core_into(messages, parameters, progress, excitation)
 
 
@@ -70,10 +71,11 @@ def run_core_into(
     excitation: Excitation | None = None,
 ) -> CoreOutcome:
     """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
+    check_sample_rate(parameters)
     sim = _sim_parameters(parameters)
-    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, sim.sample_rate)
     chain = CoreChain(parameters)
-    celsius = _coil_temperature(sim)
+    celsius, with_status = _coil_temperature(sim), status_every(sim.sample_rate)
     samples = Samples(_BLOCK, chain.policy)
     pending: float | None = None
     begin = time.monotonic()
@@ -85,19 +87,19 @@ def run_core_into(
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
-        if mount.sample % STATUS_EVERY == 0:
+        if mount.sample % with_status == 0:
             chain.take_temperature(_stamp(mount), celsius)
         pending = _take_one(mount, chain, samples, pending)
         if chain.result is not None and not chain.controlled:
             messages.write_samples(samples)
-            messages.write_result(_stamp(mount) - SAMPLE_TIME_NS, chain.result)
+            messages.write_result(_stamp(mount) - mount.sample_time, chain.result)
     setpoint = samples.setpoints[samples.count - 1]
     messages.write_samples(samples)
     if chain.controlled and setpoint != OFF:
-        messages.write_off(_stamp(mount) - SAMPLE_TIME_NS)  # as mount_control when it is deactivated
+        messages.write_off(_stamp(mount) - mount.sample_time)  # as mount_control when it is deactivated
     return CoreOutcome(
         samples=mount.sample,
-        excitation_start=mount.run.excitation_start * SAMPLE_TIME,
+        excitation_start=mount.run.excitation_start * (1.0 / sim.sample_rate),
         simulated=mount.time,
         wall_time=time.monotonic() - begin,
         result=chain.result,
@@ -116,7 +118,7 @@ def _coil_temperature(sim: SimParameters) -> float:
 
 
 def _stamp(mount: SimulatedMount) -> int:
-    return mount.sample * SAMPLE_TIME_NS
+    return mount.sample * mount.sample_time
 
 
 def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float | None) -> float:
@@ -156,7 +158,7 @@ def _take_many(
         samples.traces[part],
     )
     if taken:
-        stamps = _stamp(mount) + SAMPLE_TIME_NS * np.arange(taken)
+        stamps = _stamp(mount) + mount.sample_time * np.arange(taken)
         part = slice(samples.count, samples.count + taken)
         samples.stamps[part] = stamps
         samples.traced[part] = True

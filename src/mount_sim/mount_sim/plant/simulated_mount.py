@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.shaking import Shaking
@@ -40,10 +40,11 @@ class BeyondRange:
 
 @dataclass(frozen=True)
 class Run:
-    """Length of a simulated run in samples and where the excitation begins in it."""
+    """Length of a simulated run in samples, where the excitation begins in it, and their rate in Hz."""
 
     samples: int
     excitation_start: int
+    sample_rate: float = SAMPLE_RATE
 
 
 class Ahead(NamedTuple):
@@ -68,15 +69,19 @@ class SimulatedMount:
     one was due, the current goes to 0 A.
     """
 
-    def __init__(self, plant: Plant, excitation: Excitation, seed: int):
+    def __init__(self, plant: Plant, excitation: Excitation, seed: int, sample_rate: float = SAMPLE_RATE):
         self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
         checked_plant(plant, excitation.seat, excitation.step_time)
         self._noise = Noise(seed)
-        self.patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
+        self.sample_rate = sample_rate
+        """Hz"""
+        self.sample_time = sample_time_ns(sample_rate)
+        """ns"""
+        self.patience = round(plant.electronics.setpoint_timeout * sample_rate)
         """Samples without a setpoint after which the current goes to 0 A."""
-        self._shaking = Shaking(excitation)
+        self._shaking = Shaking(excitation, sample_rate)
         self._driver_opens = plant.mount.driver_opens
-        self.run = Run(self._shaking.samples, self._shaking.start)
+        self.run = Run(self._shaking.samples, self._shaking.start, sample_rate)
         self.sample = 0
         self.beyond_range = BeyondRange()
         self._silent = 0
@@ -85,7 +90,7 @@ class SimulatedMount:
     @property
     def time(self) -> float:
         """Simulated time in s."""
-        return self.sample * SAMPLE_TIME
+        return self.sample * (1.0 / self.sample_rate)
 
     @property
     def finished(self) -> bool:
