@@ -55,7 +55,7 @@ def rewritten(source, target, options):
 @pytest.fixture(scope='module', params=['ours', *WRITERS])
 def intact(request, tmp_path_factory):
     """Return the file of a recording and its content, by several writers."""
-    folder = write_drive(tmp_path_factory.mktemp('intact') / 'bag', 20, chunk_size=2500)
+    folder = write_drive(tmp_path_factory.mktemp('intact') / 'bag', 5, chunk_size=700)
     file = folder / 'bag_0.mcap'
     if request.param != 'ours':
         rewritten(file, folder / 'other.mcap', WRITERS[request.param])
@@ -87,6 +87,7 @@ def judged(path):
 
 @ONE_FILE
 @given(SEEDS, st.booleans())
+@example(912, False)  # where chunks have no checksums, a stretch that is not understood puts all in doubt
 def test_what_is_read_of_a_mutated_file_is_what_was_written_or_not_sound(intact, seed, alone):
     file, content, original = intact
     file.write_bytes(mutated(content, seed))

@@ -102,7 +102,9 @@ class McapFile:
     @property
     def damaged(self) -> bool:
         """Whether messages are known to be lost or may be wrong inside of it, not only at a cut-off end."""
-        doubtful = self._data_proof is Proof.WRONG and self._unprotected
+        # What damaged a part that is not understood may have changed a number that nothing protects.
+        touched = self._data_proof is Proof.WRONG or bool(self.unexplained)
+        doubtful = touched and self._unprotected
         return doubtful or bool(self.undeclared) or any(chunk.damaged for chunk in self.chunks)
 
     def message_counts(self) -> dict[int, int]:
