@@ -159,3 +159,20 @@ def test_an_interruption_stands_until_the_next_activation(watch):
     watch.begin(2003 * MS, 0.020, 0.020, 1000.0)
     assert _judge(watch, 1004) == [(Judgement.RESTART, 0)]
     assert watch.counts == SampleCounts(samples=1, restarts=1)
+
+
+def test_a_controller_made_for_another_rate_is_not_activated():
+    stream = SampleWatch()
+    for k in range(200):
+        stream.note(S + k * MS // 2)
+    with pytest.raises(ForceTableError, match='at 2000 Hz, but sample_rate of mount_control is 1000 Hz'):
+        stream.check_rate(1000.0)
+    stream.check_rate(2000.0)
+
+
+def test_samples_at_2_khz_are_bridged_by_their_own_period():
+    stream = SampleWatch()
+    stream.note(600 * MS)
+    stream.begin(600 * MS, 0.020, 0.020, 2000.0)
+    judged = _judge(stream, 0.0, 0.5, 1.5, 2.0)
+    assert judged[1:] == [(Judgement.USE, 0), (Judgement.USE, 1), (Judgement.USE, 0)]

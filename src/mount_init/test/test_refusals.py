@@ -280,3 +280,11 @@ def test_after_the_end_only_zero_is_answered(specimen, simulated_actuator, run_r
 def test_every_refusal_names_a_remedy(refusal):
     for error in (refusal(supply=6.0), refusal(rest_gap=590e-6), refusal(contact_gap=100e-6)):
         assert any(word in str(error) for word in ('check', 'is the coil', 'activate', 'calibrate'))
+
+
+def test_ripple_at_another_rate_than_the_ramp_is_made_for_is_refused(specimen, simulated_actuator):
+    plant, initialisation = simulated_actuator(), Initialisation(specimen, InitParameters())
+    while not initialisation.finished:
+        plant.follow(initialisation.step((plant.number + 1) * 500_000, *plant.sample()))
+    with pytest.raises(UnusableReadingsError, match='at 2000 Hz, but sample_rate of mount_init is 1000 Hz'):
+        initialisation.result()

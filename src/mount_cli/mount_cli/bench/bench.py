@@ -8,7 +8,6 @@ from rich.console import Console
 from rich.table import Table
 
 from mount_cli.bench.comparison import Comparison
-from mount_models.quantity import check_name
 from mount_report.json_file import write_json
 
 Figures = Mapping[str, Comparison]
@@ -29,7 +28,8 @@ class BenchOrder:
 def print_bench(order: BenchOrder, console: Console) -> None:
     """Measure and print the comparisons, and write them to a file; an unknown group raises a `ValueError`."""
     for name in order.only:
-        check_name('bench', name, GROUPS)
+        if name not in GROUPS:
+            raise ValueError(f'{name!r} is no group of bench; known are {", ".join(GROUPS)}')
     table = Table(title='medians, in turn; ratio: ours over the other')
     for title in ('what', 'ours', 'beside', 'other', 'ratio'):
         table.add_column(title, justify='left' if title in ('what', 'beside') else 'right')
