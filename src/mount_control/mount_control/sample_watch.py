@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control.force_to_current import ForceTableError
+from mount_control.parameters import ControlParameters
+from mount_control.plausibility import Plausibility
 from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
 
 _NANOSECONDS = 1e9
@@ -27,6 +29,7 @@ class Judgement(Enum):
     USE = 'use'
     RESTART = 'restart'  # usable, but the past is too far away to be continued
     INVALID = 'invalid'  # NaN or beyond the sensor's range: answered with 0 A
+    IMPLAUSIBLE = 'implausible'  # it moves as no mount does, see `plausibility`: answered with 0 A
     INTERRUPTED = 'interrupted'  # the table may be of another state of the mount: answered with 0 A
     IGNORE = 'ignore'  # repeated or out of order: already answered
     EARLY = 'early'  # not after the activation: mount_init answers
@@ -42,6 +45,7 @@ class SampleCounts:
     restarts: int = 0
     ignored: int = 0
     invalid: int = 0
+    implausible: int = 0
 
 
 class SampleWatch:
@@ -53,6 +57,8 @@ class SampleWatch:
     def __init__(self) -> None:
         self.first: int | None = None
         self.last: int | None = None
+        self.measured_before = False
+        """Whether the measurements are known to have come without a break before the first sample, too."""
         self.interrupted = False  # since the activation
         self.counts = SampleCounts()
         self._used: int | None = None  # stamp of the last sample that the controller took, ns
@@ -60,13 +66,18 @@ class SampleWatch:
         self._longest_bridge = 0  # ns
         self._range = 0.0  # m
         self._period = SAMPLE_TIME_NS  # ns between two samples
-        self._noted = 0  # samples since `first`
+        self._counted_from, self._noted = 0, 0  # stamp (ns) of a sample, and samples from it on
+        self._seen: int | None = None  # stamp of the last sample that was compared with those before, ns
+        self.plausibility = Plausibility(ControlParameters())
 
     def note(self, stamp: int) -> None:
         """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
-        if self.last is None or abs(stamp - self.last) > _STREAM_BREAK:
+        if self.last is None:
+            self.first, self.last = 0 if self.measured_before else stamp, stamp
+            self._counted_from, self._noted = stamp, 1
+        elif abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
-            self._noted = 1
+            self._counted_from, self._noted = stamp, 1
         elif stamp > self.last:
             self.last = stamp
             self._noted += 1
@@ -101,24 +112,23 @@ class SampleWatch:
 
     def check_rate(self, sample_rate: float) -> None:
         """Raise `ForceTableError` if the samples so far did not come at `sample_rate` (Hz)."""
-        if self.first is None or self.last is None or self._noted < _COUNTED:
+        if self.last is None or self._noted < _COUNTED:
             return
-        rate = 1e9 * (self._noted - 1) / (self.last - self.first)
+        rate = 1e9 * (self._noted - 1) / (self.last - self._counted_from)
         if abs(rate - sample_rate) > _RATE_TOLERANCE * sample_rate:
             raise ForceTableError(
                 f'displacement comes at {rate:.0f} Hz, but sample_rate of mount_control is {sample_rate:g} '
                 f'Hz (limit {100.0 * _RATE_TOLERANCE:g} %); start the whole graph with one sample_rate'
             )
 
-    def begin(
-        self, activation: int, longest_bridge: float, displacement_range: float, sample_rate: float
-    ) -> None:
-        """Count anew: what comes after `activation` (ns) is to be answered; limits in s and m, rate in Hz."""
+    def begin(self, activation: int, parameters: ControlParameters) -> None:
+        """Count anew: what comes after `activation` (ns) is to be answered."""
         self._activation = activation
-        self._longest_bridge = round(longest_bridge * _NANOSECONDS)
-        self._range = displacement_range
-        self._period = sample_time_ns(sample_rate)
-        self._used, self.interrupted, self.counts = None, False, SampleCounts()
+        self._longest_bridge = round(parameters.longest_bridge * _NANOSECONDS)
+        self._range = parameters.displacement_range
+        self._period = sample_time_ns(parameters.sample_rate)
+        self.plausibility = Plausibility(parameters)
+        self._used, self._seen, self.interrupted, self.counts = None, None, False, SampleCounts()
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
         """Return the judgement on a noted sample (ns, m), and how many are missing before it."""
@@ -134,13 +144,20 @@ class SampleWatch:
         if not math.fabs(displacement) <= self._range:  # also NaN
             self.counts.invalid += 1
             return Judgement.INVALID, 0
+        if self.plausibility.doubt(
+            displacement, 0 if self._seen is None else self._missing(stamp - self._seen)
+        ):
+            self._seen = stamp
+            self.counts.implausible += 1
+            return Judgement.IMPLAUSIBLE, 0
+        self._seen = stamp
         elapsed = self._longest_bridge + 1 if self._used is None else stamp - self._used
         self._used = stamp
         self.counts.samples += 1
         if elapsed > self._longest_bridge:
             self.counts.restarts += 1
             return Judgement.RESTART, 0
-        missing = max(0, (elapsed + self._period // 2) // self._period - 1)
+        missing = self._missing(elapsed)
         self.counts.bridged += missing
         return Judgement.USE, missing
 
@@ -156,11 +173,24 @@ class SampleWatch:
         follows[1:] = valid[1:] & (steps > 0) & (steps < self._period + self._period // 2)
         return follows
 
+    def believed(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> int:
+        """Note the samples (n,), which follow each other, up to the first in doubt; return how many."""
+        count = self.plausibility.believed(displacement)
+        if count:
+            self.follow(int(stamps[count - 1]), count)
+        return count
+
     def follow(self, last_stamp: int, count: int) -> None:
-        """Note `count` samples that followed each other without a doubt, the last at `last_stamp` (ns)."""
-        self.note(last_stamp)
-        self._used = last_stamp
+        """Note `count` samples that followed each other without a doubt, the last at `last_stamp` (ns).
+
+        They have passed `plausibility`. However long they lasted, nothing was interrupted.
+        """
+        self.last = self._used = self._seen = last_stamp
         self.counts.samples += count
+
+    def _missing(self, elapsed: int) -> int:
+        """Return how many samples are missing between two that are `elapsed` ns apart."""
+        return max(0, (elapsed + self._period // 2) // self._period - 1)
 
 
 def _seconds(stamp: int) -> str:

@@ -3,7 +3,7 @@
 import pytest
 from far_end import sample
 
-from mount_driver.rate_watch import RateWatch
+from mount_driver.watches.rate_watch import RateWatch
 
 REFUSED = (
     'the electronics sample every {} us, but sample_rate ({} Hz) means {} us (limit {} us beside it): '

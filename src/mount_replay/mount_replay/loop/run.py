@@ -16,12 +16,15 @@ from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
 from mount_sim.electronics.electronics import Reading, status_every
+from mount_sim.electronics.faults.schedule import Faults, check_without_bus
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.simulated_car import CarMount
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
-_BLOCK = 1000  # samples, chosen: packed and written together
+BLOCK = 1000
+"""Samples, chosen: packed and written together."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def run_core(
     where it is built already.
     """
     sim = _sim_parameters(parameters)
-    messages = CoreMessages(write, _coil_temperature(sim), write_columns, sim.sample_rate)
+    messages = CoreMessages(write, coil_temperature(sim), write_columns, sim.sample_rate)
     return run_core_into(messages, parameters, progress, excitation)
 
 
@@ -73,30 +76,32 @@ def run_core_into(
     """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
     check_sample_rate(parameters)
     sim = _sim_parameters(parameters)
-    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, sim.sample_rate)
+    check_without_bus(sim.faults)
+    faults = Faults(sim.faults, sim.seed, sim.sample_rate)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, faults, sim.sample_rate)
     chain = CoreChain(parameters)
-    celsius, with_status = _coil_temperature(sim), status_every(sim.sample_rate)
-    samples = Samples(_BLOCK, chain.policy)
+    celsius, with_status = coil_temperature(sim), status_every(sim.sample_rate)
+    samples = Samples(BLOCK, chain.policy)
     pending: float | None = None
     begin = time.monotonic()
     while not mount.finished:
         if not samples.room:
             messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-        if pending is not None and chain.answering.expects(_stamp(mount)):
+        if pending is not None and faults.none_told and chain.answering.expects(stamp_of(mount)):
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
         if mount.sample % with_status == 0:
-            chain.take_temperature(_stamp(mount), celsius)
-        pending = _take_one(mount, chain, samples, pending)
+            chain.take_temperature(stamp_of(mount), celsius)
+        pending = take_one(mount, chain, samples, pending)
         if chain.result is not None and not chain.controlled:
             messages.write_samples(samples)
-            messages.write_result(_stamp(mount) - mount.sample_time, chain.result)
+            messages.write_result(stamp_of(mount) - mount.sample_time, chain.result)
     setpoint = samples.setpoints[samples.count - 1]
     messages.write_samples(samples)
     if chain.controlled and setpoint != OFF:
-        messages.write_off(_stamp(mount) - mount.sample_time)  # as mount_control when it is deactivated
+        messages.write_off(stamp_of(mount) - mount.sample_time)  # as mount_control when it is deactivated
     return CoreOutcome(
         samples=mount.sample,
         excitation_start=mount.run.excitation_start * (1.0 / sim.sample_rate),
@@ -112,18 +117,21 @@ def _sim_parameters(parameters: Parameters) -> SimParameters:
     return with_flattened(SimParameters(), parameters.get('mount_sim', {}))
 
 
-def _coil_temperature(sim: SimParameters) -> float:
+def coil_temperature(sim: SimParameters) -> float:
     """Return the coil temperature (degC) as the electronics' status tells it."""
     return quantised_coil_temperature(sim.electronics.coil_temperature)
 
 
-def _stamp(mount: SimulatedMount) -> int:
+def stamp_of(mount: SimulatedMount | CarMount) -> int:
+    """Return the stamp (ns) of the next sample."""
     return mount.sample * mount.sample_time
 
 
-def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float | None) -> float:
+def take_one(
+    mount: SimulatedMount | CarMount, chain: CoreChain, samples: Samples, pending: float | None
+) -> float:
     """Take one sample and return the setpoint (A) as it arrives for the next."""
-    place, stamp = samples.count, _stamp(mount)
+    place, stamp = samples.count, stamp_of(mount)
     reading = Reading(*loop.over_the_bus(*mount.measure()))
     answer = chain.answer(stamp, reading)
     setpoint = OFF if answer.current is None else answer.current
@@ -145,11 +153,12 @@ def _take_many(
     """Take samples while all of them are plausible; return how many, and the setpoint (A) for the next."""
     controller = chain.answering.controller
     assert controller is not None
-    ahead = mount.ahead(samples.room)
+    plausibility, ahead = chain.answering.watch.plausibility, mount.ahead(samples.room)
     part = slice(samples.count, samples.count + len(ahead.values))
     taken, arrived, last = loop.run_with(chain.policy)(
         ahead,
         controller.memory,
+        (plausibility.limits, plausibility.memory),
         chain.displacement_range,
         pending,
         samples.readings[part],
@@ -158,7 +167,7 @@ def _take_many(
         samples.traces[part],
     )
     if taken:
-        stamps = _stamp(mount) + mount.sample_time * np.arange(taken)
+        stamps = stamp_of(mount) + mount.sample_time * np.arange(taken)
         part = slice(samples.count, samples.count + taken)
         samples.stamps[part] = stamps
         samples.traced[part] = True
