@@ -8,6 +8,7 @@ from typing import Any
 from mount_bringup.settings import SettingError
 from mount_models.plain_yaml import YamlError, yaml_in_file
 from mount_models.quantity import check_name
+from mount_sim.plant.places import general_name
 
 _VALUES = 'ros__parameters'
 
@@ -27,10 +28,12 @@ def settings_of_file(
             raise SettingError(f'{file}: {pattern!r} is no node of the graph; known are {", ".join(known)}')
         for name, value in _flat(values):
             check_name(
-                f'{" or ".join(nodes)} ({file})', name, {name for node in nodes for name in known[node]}
+                f'{" or ".join(nodes)} ({file})',
+                general_name(name),
+                {name for node in nodes for name in known[node]},
             )
             for node in nodes:
-                if name in known[node] and _matches(pattern, f'{namespace.strip("/")}/{node}'):
+                if general_name(name) in known[node] and _matches(pattern, f'{namespace.strip("/")}/{node}'):
                     settings.setdefault(node, {})[name] = value
     return settings
 

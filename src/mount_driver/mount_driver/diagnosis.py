@@ -9,7 +9,7 @@ from mount_driver.e2e_receiver import Outcome
 from mount_driver.exchange import Exchange
 from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
-from mount_models.sampling import HIGHEST_CURRENT
+from mount_models.sampling import HIGHEST_CURRENT, SETPOINT_TIMEOUT
 from mount_ros.nodes.diagnostics import Level, Verdict
 
 _PERIOD = 1.0  # s: rates are taken over this long
@@ -243,7 +243,9 @@ def _setpoint_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParam
         limit = f'{1e3 * parameters.setpoint_timeout:g} ms'
         found.append((Level.WARN, f'coil at 0 A: no setpoint for {limit}; is mount_control active?'))
     if now.driving and earlier.driving and now.unheard and earlier.unheard:
-        found.append((Level.WARN, 'the electronics do not take the setpoints; check the bus'))
+        limit = f'{1e3 * SETPOINT_TIMEOUT:g} ms'
+        text = f'the electronics do not take the setpoints: none in time for {limit}, by their status'
+        found.append((Level.WARN, f'{text}; check the bus'))
     if now.limited > earlier.limited:
         text = (
             f'{now.limited - earlier.limited} setpoints limited to {HIGHEST_CURRENT:g} A in the last second'

@@ -5,6 +5,7 @@ its own node `<name>_io` and goes on receiving during a blocking activation.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -56,9 +57,13 @@ class DataPath:
             self._publishers.append(publisher)
         return publisher
 
-    def sender(self, topic: Topic) -> Callable[[bytes], None]:
-        """Create a publisher of `topic` and return the function that publishes its bytes, no more."""
-        return self.publisher(topic).publish
+    def sender(self, topic: Topic, mount: str = '') -> Callable[[bytes], None]:
+        """Create a publisher of `topic` and return the function that publishes its bytes, no more.
+
+        `mount`: the namespace of one of several mounts, within that of the node.
+        """
+        placed = replace(topic, name=f'{mount}/{topic.name}') if mount else topic
+        return self.publisher(placed).publish
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`.

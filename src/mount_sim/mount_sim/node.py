@@ -6,11 +6,17 @@ from functools import partial
 from typing import Any
 
 import can
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
 from mount_models.quantity import ParameterError, flattened
+from mount_ros import topics
+from mount_ros.data_path import DataPath
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
@@ -22,7 +28,6 @@ from mount_sim.diagnosis import car_verdict, verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults.schedule import Faults, injected_faults, texts_of_mount
 from mount_sim.excitation.scenario import build_excitation
-from mount_sim.instruments import Instruments
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import general_name, mount_names, values_of_mount
@@ -32,6 +37,7 @@ from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
 
+_UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
 _ALONE = ''  # name of the mount where there is one
 
 
@@ -65,7 +71,7 @@ class MountSim(SafeLifecycleNode):
         self._names = mount_names(self._settings.mounts) or (_ALONE,)
         self._excitation = build_excitation(self._settings)
         path = self.open_data_path()
-        self._instruments = {name: Instruments(path, name) for name in self._names}
+        self._instruments = {name: _Instruments(path, name) for name in self._names}
         path.start()
         self._path = path
         self._prepare_mounts()
@@ -220,6 +226,33 @@ def _declare_own(node: SafeLifecycleNode) -> list[str]:
             node.declare_parameter(name, node.get_parameter(general).value)
             own.append(name)
     return own
+
+
+class _Instruments:
+    """Publishes truth, acceleration and force of one mount, the one `name` of several or the only one."""
+
+    def __init__(self, path: DataPath, name: str = ''):
+        self._truth = ScalarsLayout(topics.SIM_TRUTH)
+        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
+        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        self._send_truth = path.sender(topics.SIM_TRUTH, name)
+        self._send_acceleration = path.sender(topics.SIM_CHASSIS_ACCELERATION, name)
+        self._send_force = path.sender(topics.SIM_MOUNT_FORCE, name)
+
+    def publish(self, stamp: int, truth: np.void, truth_bytes: bytes) -> None:
+        """Publish what was true at the time `stamp` (ns)."""
+        self._send_truth(self._truth.pack_record(stamp, truth_bytes))
+        self._send_acceleration(self._acceleration.pack(stamp, truth['chassis_acceleration']))
+        self._send_force(self._force.pack(stamp, truth['mount_force']))
+
+
+def level_imu() -> Imu:
+    """Return the message of an accelerometer that knows neither orientation nor rotation."""
+    message = Imu()
+    message.header.frame_id = 'mount_chassis'
+    message.orientation_covariance[0] = _UNKNOWN_ORIENTATION
+    message.angular_velocity_covariance[0] = _UNKNOWN_ORIENTATION
+    return message
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ Needs the `launch_ros` of a ROS 2 installation; where there is none, `mount_brin
 import contextlib
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from launch.events.process import ProcessExited
 from launch_ros.actions import Node
 
 from mount_bringup.graph.composed import COMPOSED
-from mount_bringup.graph.domain import domain_lock
+from mount_bringup.graph.domain import domain_locks
 from mount_bringup.graph.launched import SUPERVISOR, arguments_of, exit_error
 from mount_bringup.graph.nodes import GraphNode, groups
 from mount_bringup.graph.order import LaunchArgument, LaunchOrder, launch_order
@@ -58,7 +59,8 @@ def _graph(
     inherited = drop_real_time()
     priority = order.settings.priority or inherited
     held = contextlib.ExitStack()  # until the last process has ended
-    held.enter_context(domain_lock(order.settings.domain, order.settings.namespace))
+    mounts = list(dict.fromkeys(node.mount for node in order.nodes if node.mount))
+    held.enter_context(domain_locks(order.settings.domain, order.settings.namespace, mounts))
     grouped = groups(order.nodes, order.settings.grouping)
     respawned = {_name(group): _is_respawned(group, order) for group in grouped}
     processes = [_process(group, order, priority, held) for group in grouped]
@@ -103,10 +105,10 @@ def _process(
         parameters: list[str | dict] = [_parameter_file(nodes, order, held)]
     else:
         place = {'package': first.package, 'executable': first.name, 'name': first.name}
-        parameters = [dict(order.settings.parameters[first.name])]
+        parameters = [dict(order.settings.parameters[first.full_name])]
     return Node(
         **place,
-        namespace=order.settings.namespace,
+        namespace=f'{order.settings.namespace}/{first.mount}'.strip('/'),
         parameters=parameters,
         additional_env=node_environment(nodes, priority),
         ros_arguments=['--log-level', order.log_level],
@@ -118,7 +120,8 @@ def _process(
 
 
 def _name(nodes: Sequence[GraphNode]) -> str:
-    return nodes[0].name if len(nodes) == 1 else COMPOSED
+    first = nodes[0]
+    return first.full_name if len(nodes) == 1 else replace(first, name=COMPOSED).full_name
 
 
 def _is_respawned(nodes: Sequence[GraphNode], order: LaunchOrder) -> bool:

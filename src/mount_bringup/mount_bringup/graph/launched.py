@@ -4,6 +4,7 @@ import argparse
 import signal
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rclpy.logging import get_logger
 
@@ -72,7 +73,7 @@ class LaunchedGraph(Bringup):
 def arguments_of(order: LaunchOrder) -> list[str]:
     """Return the command line by which `main` supervises the graph of `order`."""
     return [
-        *(f'--node={node.name}' for node in order.nodes),
+        *(f'--node={node.full_name}' for node in order.nodes),
         f'--namespace={order.settings.namespace}',
         f'--domain={order.settings.domain}',
         f'--scenario={order.scenario}',
@@ -80,6 +81,13 @@ def arguments_of(order: LaunchOrder) -> list[str]:
         f'--grouping={order.settings.grouping.name}',
         f'--restart-limit={order.settings.restart_limit}',
     ]
+
+
+def _node(text: str) -> GraphNode:
+    """Return the node of a full name such as `left/mount_driver`; raises `ValueError` for another one."""
+    mount, _, name = text.rpartition('/')
+    [node] = (node for node in SIMULATED if node.name == name)
+    return replace(node, mount=mount)
 
 
 def exit_error(name: str, code: int, asked: bool) -> str:
@@ -99,7 +107,7 @@ def main() -> None:
     """Bring the graph to life and watch it; end with code 0 at its end or by a signal, with 1 by a fault."""
     prepare_environment()
     parser = argparse.ArgumentParser(prog=SUPERVISOR, description=__doc__)
-    parser.add_argument('--node', action='append', choices=[node.name for node in SIMULATED], required=True)
+    parser.add_argument('--node', action='append', type=_node, required=True)
     parser.add_argument('--namespace', default='')
     parser.add_argument('--domain', type=int, required=True)
     parser.add_argument('--scenario', required=True)
@@ -107,7 +115,7 @@ def main() -> None:
     parser.add_argument('--grouping', choices=[entry.name for entry in Grouping], required=True)
     parser.add_argument('--restart-limit', type=int, required=True)
     chosen, _ = parser.parse_known_args()  # the rest is of ROS
-    nodes = tuple(node for node in SIMULATED if node.name in chosen.node)
+    nodes = tuple(chosen.node)
     settings = GraphSettings(
         namespace=chosen.namespace,
         domain=chosen.domain,

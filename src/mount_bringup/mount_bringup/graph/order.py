@@ -1,6 +1,7 @@
 """What a launch file takes from the user, and the graph that this makes; `ros2 launch` is not needed here."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,6 +9,7 @@ from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
 from mount_bringup.graph.nodes import (
+    CONTROL,
     DRIVER,
     INIT,
     RECORDER,
@@ -18,11 +20,13 @@ from mount_bringup.graph.nodes import (
     GraphNode,
     GraphSettings,
     Grouping,
+    of_mounts,
 )
 from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
+from mount_bringup.mounts import settings_of_mount
 from mount_bringup.parameter_file import settings_of_file
-from mount_bringup.sample_rate import check_sample_rate
-from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
+from mount_bringup.sample_rate import NODES, check_sample_rate
+from mount_bringup.settings import OF_EACH, SettingError, checked_settings, defaults_of_nodes
 from mount_control.policy.registry import POLICIES
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
@@ -34,6 +38,8 @@ from mount_sim.electronics.faults.schedule import FORM, told_faults
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount
+from mount_sim.plant.places import mount_names
+from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
 _OF_SPECIMEN = ('mount_driver', 'mount_init', 'mount_control')
 """The nodes that load the specimen file."""
@@ -68,6 +74,7 @@ class LaunchOrder(NamedTuple):
 _POLICY_OF_DAMPER = 'switched_viscous'  # the others compute their force without a given damper
 _ANY = (
     LaunchArgument('namespace', 'where the graph lives, such as mount_right; empty: /'),
+    LaunchArgument('mounts', 'mounts with electronics, such as left,right; empty: one, in this namespace'),
     LaunchArgument('record', 'whether the graph records', default='true', choices=('true', 'false')),
     LaunchArgument(
         'recording',
@@ -141,6 +148,7 @@ VEHICLE_ARGUMENTS = (
     _sample_rate(VEHICLE),
     LaunchArgument('interface', 'interface of python-can', ('mount_driver.interface',), default='socketcan'),
     LaunchArgument('channel', 'channel of the interface', ('mount_driver.channel',), default='can0'),
+    LaunchArgument('channels', 'channel of each of several mounts, such as can0,can1'),
     LaunchArgument('port', f'{_PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
     LaunchArgument('duration', 's after which the graph ends; empty: when it is told to end'),
 )
@@ -154,40 +162,103 @@ def launch_order(
     records = given['record'] == 'true'
     if records and not given['recording']:
         raise SettingError('a recording needs a folder: recording:=bags/first; or record:=false')
-    chosen = tuple(node for node in nodes if records or node is not RECORDER)
+    mounts = mount_names(given['mounts'])
+    chosen = of_mounts([node for node in nodes if records or node is not RECORDER], mounts)
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
     known = {name: values for name, values in _known().items() if name in {node.name for node in nodes}}
-    port = {'port': can_port(domain, namespace)}
-    settings: dict[str, dict[str, Any]] = {node.name: dict(port) for node in chosen if node in (DRIVER, SIM)}
-    for layer in (settings_of_file(Path(given['config']), namespace, known), _of_arguments(arguments, given)):
-        for name, values in layer.items():
-            settings.setdefault(name, {}).update(values)
-    settings = with_control_of_mount(checked_settings(settings, known))
-    _check_damper(given['damper'], settings)
-    _check(nodes, settings)
+    given_to = partial(_given_to, arguments, given, known, domain)
+    if mounts:
+        settings = _of_mounts(mounts, given, partial(given_to, namespace))
+    else:
+        settings = with_control_of_mount(checked_settings(given_to(namespace, ''), known))
+        _check_damper(given['damper'], settings)
+        _check(settings)
+    sim = settings.get(SIM.name, {}) if SIM in nodes else {'scenario': 'car'}
     return LaunchOrder(
         nodes=chosen,
         settings=GraphSettings(
             namespace=namespace,
             domain=domain,
-            parameters={node.name: settings.get(node.name, {}) for node in chosen},
+            parameters={node.full_name: settings.get(node.full_name, {}) for node in chosen},
             grouping=Grouping.COMPOSED if given['composed'] == 'true' else Grouping.APART,
             priority=_number('priority', given['priority'], HIGHEST, int),
             restart_limit=_number('restarts', given['restarts'], 1000, int),
         ),
-        scenario=settings.get(SIM.name, {}).get('scenario', SimParameters().scenario)
-        if SIM in nodes
-        else 'car',
+        scenario=sim.get('scenario', SimParameters().scenario),
         duration=_duration(nodes, given),
         log_level=given['log_level'],
     )
+
+
+def _given_to(
+    arguments: Sequence[LaunchArgument],
+    given: Mapping[str, str],
+    known: Mapping[str, Mapping[str, Any]],
+    domain: int,
+    namespace: str,
+    mount: str,
+) -> dict[str, dict[str, Any]]:
+    """Return what file and arguments give the nodes of a mount, or of the graph."""
+    space = f'{namespace}/{mount}'.strip('/')
+    port = {'port': can_port(domain, space)}
+    settings: dict[str, dict[str, Any]] = {
+        node.name: dict(port) for node in (DRIVER, SIM) if node.name in known
+    }
+    for layer in (settings_of_file(Path(given['config']), space, known), _of_arguments(arguments, given)):
+        for name, values in layer.items():
+            settings.setdefault(name, {}).update(values)
+    return settings
+
+
+def _of_mounts(
+    mounts: Sequence[str], given: Mapping[str, str], given_to: Callable[[str], dict[str, dict[str, Any]]]
+) -> dict[str, dict[str, Any]]:
+    """Return the checked settings of a graph of several mounts."""
+    if given['port']:
+        raise SettingError(f'port:={given["port"]} is for one mount; each of several has a port of its own')
+    shared = given_to('')
+    channels = _channels(mounts, given)
+    shared.setdefault(RECORDER.name, {})['mounts'] = ','.join(mounts)
+    settings = {name: values for name, values in shared.items() if name in (RECORDER.name, SIM.name)}
+    if SIM.name in settings:
+        settings[SIM.name]['mounts'] = ','.join(mounts)
+    for mount in mounts:
+        own = given_to(mount)
+        own[DRIVER.name] |= channels.get(mount, {})
+        if SIM.name in settings:
+            settings[SIM.name][f'mount_{mount}.port'] = own[DRIVER.name]['port']
+        settings |= {f'{mount}/{name}': own.get(name, {}) for name in OF_EACH}
+    known = _known()
+    settings = checked_settings(settings, known)
+    for mount in mounts:
+        whole = with_control_of_mount(settings_of_mount(settings, mount))
+        _check_damper(given['damper'], whole)
+        _check(whole)
+        settings[f'{mount}/{CONTROL.name}'] = whole.get(CONTROL.name, {})
+    if SIM.name in settings:
+        values = settings[SIM.name]
+        SimulatedCar(values, build_excitation(mount_parameters(values)))
+    return settings
+
+
+def _channels(mounts: Sequence[str], given: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Return the channel of each mount in the car."""
+    if 'channels' not in given:
+        return {}
+    names = [name.strip() for name in given['channels'].split(',') if name.strip()]
+    if len(names) != len(mounts) or len(set(names)) < len(names):
+        raise SettingError(
+            f'channels:={given["channels"]} must name a channel for each of the mounts {", ".join(mounts)}, '
+            'as in channels:=can0,can1'
+        )
+    return {mount: {'channel': name} for mount, name in zip(mounts, names, strict=True)}
 
 
 def _known() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that a parameter file can set."""
     known, driver = defaults_of_nodes(), DriverParameters()
     known[SIM.name] |= {'interface': 'udp_multicast', 'channel': driver.channel, 'port': driver.port}
-    known[RECORDER.name] |= {'uri': '', 'topics': [topic.name for topic in TOPICS]}
+    known[RECORDER.name] |= {'uri': '', 'mounts': '', 'topics': [topic.name for topic in TOPICS]}
     return known
 
 
@@ -222,7 +293,7 @@ def _check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> Non
         )
 
 
-def _check(nodes: Sequence[GraphNode], settings: Mapping[str, Mapping[str, Any]]) -> None:
+def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
     """Raise the `ValueError` of the first parameter outside its range, before a node has it."""
     sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (INIT, InitParameters()))
     for node, defaults in sets:
@@ -231,7 +302,7 @@ def _check(nodes: Sequence[GraphNode], settings: Mapping[str, Mapping[str, Any]]
     seated_mount(sim.mount)
     told_faults(sim.faults)
     build_excitation(sim)
-    check_sample_rate(settings, [node.name for node in nodes])
+    check_sample_rate(settings, [name for name in NODES if name != SIM.name or name in settings])
     check_control_of_mount(settings)
     chosen_control(settings)
 

@@ -22,7 +22,10 @@ _RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for 
 
 
 class NodeProcess:
-    """One process of the graph with the nodes that live in it; its output goes to a log file."""
+    """One process of the graph with the nodes that live in it; its output goes to a log file.
+
+    It loads what it needs at once, and makes its nodes when it is told to `begin`.
+    """
 
     def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
         self.nodes = tuple(nodes)
@@ -42,18 +45,29 @@ class NodeProcess:
         with self.log_file.open('ab') as log:
             return subprocess.Popen(
                 self._command,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **_environment(self.nodes, self._settings)},
                 start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
             )
 
+    def begin(self) -> None:
+        """Let it make its nodes."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+    @property
+    def begun(self) -> bool:
+        """Whether it was told to."""
+        return self._process.stdin is None or self._process.stdin.closed
+
     def start_again(self) -> None:
         """Kill what is left of the process and start it with the same parameters; its log goes on."""
         self._process.kill()
         self._process.wait()
         self._process = self._start()
+        self.begin()
 
     @property
     def exit_code(self) -> int | None:
@@ -69,7 +83,7 @@ class NodeProcess:
     def ask_to_end(self) -> None:
         """Send SIGINT, to which a node answers by going to 0 A and ending with code 0."""
         if self.exit_code is None:
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(signal.SIGINT if self.begun else signal.SIGKILL)
 
     def wait(self) -> int:
         """Return the exit code; a node that does not end is terminated, then killed."""
@@ -81,12 +95,20 @@ class NodeProcess:
         return self._process.wait()
 
 
-def end_all(processes: list[NodeProcess]) -> list[str]:
-    """End the nodes one after the other, last started first; return a sentence per unclean end."""
+def end_all(processes: list[NodeProcess], at_once: bool = False) -> list[str]:
+    """End the nodes, last started first; return a sentence per unclean end.
+
+    One after the other, so that none drives the coil without those that watch it, or `at_once`.
+    """
     complaints = []
+    died = [process for process in processes if process.exit_code is not None]
+    if at_once:
+        for process in reversed(processes):
+            process.ask_to_end()
     for process in reversed(processes):
-        died_before = process.exit_code is not None
-        process.ask_to_end()
+        died_before = process in died or not process.begun
+        if not at_once:
+            process.ask_to_end()
         begin = time.monotonic()
         code = process.wait()
         if code != 0 and not died_before:
@@ -124,7 +146,8 @@ def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
         classes, imports = ', '.join(creates), f'from functools import partial; {imports}'
     else:
         classes = ', '.join(node.class_name for node in nodes)
-    return f'{imports}; from mount_ros.nodes.process import run_nodes; run_nodes([{classes}])'
+    run = 'from mount_ros.nodes.process import run_nodes'
+    return f'{imports}; {run}; import sys; sys.stdin.read(); run_nodes([{classes}])'
 
 
 def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:

@@ -22,8 +22,10 @@ class Supervisor(Bringup):
         inherited = drop_real_time()
         if inherited:
             self.notes.append(started_in_real_time(inherited))
-        self.refuse_others(own=0)
         self._processes = start_processes(self.nodes, self._settings, self._folder)
+        self.refuse_others(own=0)  # while they load
+        for process in self._processes:
+            process.begin()
 
     def check_processes(self) -> None:
         for process in self._processes:
@@ -40,5 +42,5 @@ class Supervisor(Bringup):
                 process.start_again()
 
     def leave(self) -> list[str]:
-        complaints = end_all(self._processes)
+        complaints = end_all(self._processes, at_once=self.at_rest)
         return [*complaints, *super().leave()]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from mount_bags.run.session import session_text
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.errors import GraphError
-from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, SIMULATED, GraphSettings, Grouping
 from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.sample_rate import with_sample_rate
 from mount_cli.bench.processes import children, memory, processor_time
@@ -51,15 +51,22 @@ class Place(NamedTuple):
     priority: int = 0
 
 
-def run_graph(place: Place, seconds: float, sample_rate: float = SAMPLE_RATE) -> ChainRun:
-    """Drive the bench scenario for `seconds` with every node in a process of its own, without a recorder."""
+def run_graph(
+    place: Place, seconds: float, sample_rate: float = SAMPLE_RATE, *, composed: bool = False
+) -> ChainRun:
+    """Drive the bench scenario for `seconds`, every node in a process or `composed`, without a recorder."""
     port = {'port': can_port(place.domain, '')}
     drive = {'scenario': 'bench', 'timeline.duration': 3600.0, **port}
     parameters = with_sample_rate({DRIVER.name: port, SIM.name: drive}, sample_rate)
     nodes = tuple(node for node in SIMULATED if node is not RECORDER)
     prepare_environment()
     with tempfile.TemporaryDirectory() as folder, domain_lock(place.domain, ''):
-        settings = GraphSettings(domain=place.domain, parameters=parameters, priority=place.priority)
+        settings = GraphSettings(
+            domain=place.domain,
+            parameters=parameters,
+            grouping=Grouping.COMPOSED if composed else Grouping.APART,
+            priority=place.priority,
+        )
         supervisor = Supervisor(nodes, settings, Path(folder))
         begin = time.monotonic()
         try:
@@ -78,12 +85,10 @@ def run_graph(place: Place, seconds: float, sample_rate: float = SAMPLE_RATE) ->
     return ChainRun(latency, found['cpu'], start, found['growth'], 1.0 - answered / max(1, samples))
 
 
-def run_relay(
-    place: Place, seconds: float, sample_rate: float = SAMPLE_RATE, *, composed: bool = False
-) -> ChainRun:
-    """Run the chain of empty nodes for as long, in two processes between the frames or `composed` in one."""
+def run_relay(place: Place, seconds: float, sample_rate: float = SAMPLE_RATE) -> ChainRun:
+    """Run the chain of empty nodes for as long, in two processes between the frames."""
     begin = time.monotonic()
-    with _relay(place, composed) as (port, processes):
+    with _relay(place, composed=False) as (port, processes):
         peer = _peer(port, seconds, sample_rate)
         first = float(_line(peer))
         with _watched(processes) as found:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mount_bags.run.session import session_text
 from mount_bringup.graph.domain import domain_lock
-from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings, Grouping
 from mount_bringup.graph.supervisor import Supervisor
 from mount_cli.bench.chain_runs import ChainRun, Place, relay_in_turn, run_graph, run_relay
 from mount_cli.bench.comparison import Comparison
@@ -26,18 +26,21 @@ Say = Callable[[str], None]
 def graph_figures(place: Place, seconds: float, rounds: int, say: Say) -> dict[str, Comparison]:
     """Return latency, processor time, start and growth of memory, by name; each run lasts `seconds`."""
     graph: list[ChainRun] = []
+    graph_composed: list[ChainRun] = []
     apart: list[ChainRun] = []
-    composed: list[ChainRun] = []
     for number in range(1, rounds + 1):
         say(f'graph and empty nodes in real time, round {number} of {rounds}')
         graph.append(run_graph(place, seconds))
         apart.append(run_relay(place, seconds))
-        composed.append(run_relay(place, seconds, composed=True))
+        graph_composed.append(run_graph(place, seconds, composed=True))
     allowed = seconds * _LARGEST_GROWTH
     return {
         'latency': _compared('setpoint latency', graph, _APART, apart, 'latency'),
-        'latency_composed': _compared('setpoint latency', graph, _COMPOSED, composed, 'latency'),
+        'latency_composed': _compared('setpoint latency, composed', graph_composed, _APART, apart, 'latency'),
         'cpu': _compared('driver, init, control', graph, _APART, apart, 'cpu', 'cores'),
+        'cpu_composed': _compared(
+            'driver, init, control, composed', graph_composed, _APART, apart, 'cpu', 'cores'
+        ),
         'start': _compared('start to first setpoint', graph, _APART, apart, 'start'),
         'memory': Comparison(
             'memory growth of a node', _median(graph, 'growth'), '1 MB in 30 minutes', allowed, 'B'
@@ -85,7 +88,7 @@ def _lockstep(place: Place) -> float:
     parameters['mount_driver'] |= {'interface': 'virtual'}
     parameters['mount_sim'] |= {'interface': 'virtual', **sim}
     parameters['mount_init'] |= {'silence_timeout': 10.0}
-    settings = GraphSettings(domain=place.domain, parameters=parameters, together=True)
+    settings = GraphSettings(domain=place.domain, parameters=parameters, grouping=Grouping.TOGETHER)
     with tempfile.TemporaryDirectory() as folder, domain_lock(place.domain, ''):
         supervisor = Supervisor(nodes, settings, Path(folder))
         try:

@@ -106,8 +106,8 @@ class Guard:
         )
 
     def _restarted(self) -> str:
-        kind = 'counters have jumped' if self._link.jumps else 'counters began anew: they have restarted'
-        return f"the electronics' {kind} ({self._breaks} times, limit 0); check their supply"
+        kind = 'contradict each other' if self._link.jumps else 'have jumped or begun anew, as at a restart'
+        return f"the electronics' counters {kind} ({self._breaks} times, limit 0): check their supply"
 
 
 def _strangers(link: Link) -> int:

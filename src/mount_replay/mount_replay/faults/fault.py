@@ -28,7 +28,7 @@ class FaultCase:
     the bus, or, where `in_electronics`, in what the electronics follow: where frames do not reach them, and
     where others send frames too. After `silent` faults 0 A is due 50 ms after they began. A graph of its own
     is started with `options` where there are any; `clock`: with clocks that can be stepped. `ends_drive`: the
-    graph does not outlive it.
+    graph does not outlive it. `for_good`: it does, but only a new start damps again.
     """
 
     name: str
@@ -40,6 +40,7 @@ class FaultCase:
     in_electronics: bool = False
     silent: bool = False
     ends_drive: bool = False
+    for_good: bool = False
     options: tuple[str, ...] = ()
     clock: bool = False
     loses_samples: bool = False  # the fault itself keeps samples out of the recording

@@ -113,10 +113,10 @@ CLOCKS = (
 SENSORS = (
     _simulated('displacement_invalid', _WHILE, 'displacement', third=True),
     _simulated('displacement_stuck', _WHILE, 'displacement', lasts=1.5),
-    _simulated('displacement_step', _TOLERATED),
+    _simulated('displacement_step', _WHILE, 'displacement'),
     _simulated('displacement_out_of_range', _WHILE, 'displacement|invalid', third=True),
-    _simulated('displacement_noisy', _TOLERATED),
-    _simulated('displacement_inverted', _TOLERATED, third=True),
+    _simulated('displacement_noisy', _WHILE, 'noise of the displacement'),
+    _simulated('displacement_inverted', _TOLD, 'displacement', third=True),
     _simulated('displacement_drifting', _TOLERATED, lasts=1.5, third=True),
     _simulated('displacement_sensor', _WHILE, 'displacement sensor', third=True),
     _simulated('ripple_missing', _TOLERATED),
@@ -192,18 +192,21 @@ OPERATION = (
         _WHILE, 'no setpoint|inactive', silent=True, third=True,
     ),
     FaultCase(
-        'shutdown', 'mount_control is shut down amid damping',
-        Transitioned((('mount_control', Transition.TRANSITION_ACTIVE_SHUTDOWN),)),
-        _INITIALISE, 'no setpoint|shut', silent=True, ends_drive=True,
+        'table_missing', 'mount_control is activated without a table',
+        Transitioned(
+            (
+                ('mount_control', DEACTIVATE), ('mount_control', _CLEANUP),
+                ('mount_init', DEACTIVATE), ('mount_init', _CLEANUP),
+                ('mount_control', _CONFIGURE), ('mount_control', ACTIVATE),
+            ),
+            (('mount_init', _CONFIGURE), ('mount_init', ACTIVATE), ('mount_control', ACTIVATE)),
+        ),
+        _INITIALISE, 'table',
     ),
     FaultCase(
-        'table_missing', 'mount_control is activated without a table',
-        Transitioned((
-            ('mount_control', DEACTIVATE), ('mount_control', _CLEANUP),
-            ('mount_init', DEACTIVATE), ('mount_init', _CLEANUP),
-            ('mount_control', _CONFIGURE), ('mount_control', ACTIVATE),
-        )),
-        _INITIALISE, 'no setpoint|table', ends_drive=True,
+        'shutdown', 'mount_control is shut down amid damping',
+        Transitioned((('mount_control', Transition.TRANSITION_ACTIVE_SHUTDOWN),)),
+        _INITIALISE, 'no setpoint|shut', silent=True, for_good=True,
     ),
     FaultCase(
         'nonsense_parameters', 'parameters of all nodes are set to what makes no sense',

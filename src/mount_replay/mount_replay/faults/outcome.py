@@ -143,8 +143,9 @@ def _note_telling(
 
 
 def _note_recovery(outcome: Outcome, case: FaultCase, course: Course) -> None:
-    if course.ended:
-        outcome.recovery = 'the drive has ended; a new start initialises'
+    if course.ended or case.for_good:
+        what = 'the drive has ended; ' if course.ended else ''
+        outcome.recovery = f'{what}a new start initialises'
     elif not math.isnan(course.damping_again):
         outcome.recovered = True
         after = course.damping_again - course.cleared
@@ -177,7 +178,8 @@ def _check_safe(outcome: Outcome, case: FaultCase, course: Course, told: list[To
     if outcome.detected_s is not None and outcome.zero_s - outcome.detected_s > AFTER_DETECTION:
         late = 1e3 * (outcome.zero_s - outcome.detected_s)
         outcome.late.append(f'0 A {late:.0f} ms after detection; the limit is {1e3 * AFTER_DETECTION:g} ms')
-    if not outcome.recovered and not (course.ended and case.reaction is Reaction.SAFE_UNTIL_INITIALISED):
+    over = course.ended or case.for_good
+    if not outcome.recovered and not (over and case.reaction is Reaction.SAFE_UNTIL_INITIALISED):
         outcome.complaints.append('it does not damp again')
 
 
@@ -198,7 +200,8 @@ def _check_told(outcome: Outcome, case: FaultCase, course: Course, told: list[To
 def _check_tolerated(
     outcome: Outcome, case: FaultCase, course: Course, told: list[Told], wanted: Wanted
 ) -> None:
-    errors = [each for each in told if each.level >= Level.ERROR]
+    there = [each for each in told if not each.time > course.cleared]  # its end may be a step of its own
+    errors = [each for each in there if each.level >= Level.ERROR]
     if errors:
         complaints = outcome.late if _LATENESS.search(errors[0].sentence) else outcome.complaints
         complaints.append(f'{errors[0].node} tells an error: {errors[0].sentence}')

@@ -52,7 +52,7 @@ def run_faults(
 
 def _in_order(cases: Sequence[FaultCase]) -> list[FaultCase]:
     """Return the faults so that those of one graph follow each other, and first those that it outlives."""
-    return sorted(cases, key=lambda case: (_kind(case), case.ends_drive))
+    return sorted(cases, key=lambda case: (_kind(case), case.ends_drive or case.for_good))
 
 
 def _kind(case: FaultCase) -> Kind:
