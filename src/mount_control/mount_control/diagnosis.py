@@ -1,9 +1,24 @@
 """The control node's verdict on itself, from counts alone."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mount_control.sample_watch import SampleCounts
 from mount_ros.nodes.diagnostics import Level, Verdict
+
+
+class Unread(NamedTuple):
+    """How many messages could not be read since the node was configured, and why the last could not."""
+
+    messages: int = 0
+    reason: str = ''
+
+    def and_another(self, error: Exception) -> 'Unread':
+        """Return the count with another one."""
+        return Unread(self.messages + 1, str(error))
+
+
+_ALL_READ = Unread()
 
 
 @dataclass(frozen=True)
@@ -13,7 +28,7 @@ class ControlFigures:
     counts: SampleCounts
     silence: float  # s since the last displacement sample
     longest_silence: float  # s, limit
-    table_refusal: str  # why the table no longer holds, or empty
+    refusal: str  # why every answer is 0 A until the next activation, or empty
     damping_active: bool
     current: float  # A
     step_median: float  # s, sample received to setpoint published
@@ -24,6 +39,9 @@ class ControlFigures:
     policy: str = ''
     damper: str = ''
     parameter_changes: int = 0  # since the node was configured
+    doubt: str = ''  # why every answer is 0 A at present, or empty
+    foreign: bool = False  # whether another node has sent what only one may
+    unread: Unread = _ALL_READ
 
 
 def verdict(figures: ControlFigures) -> Verdict:
@@ -44,14 +62,20 @@ def verdict(figures: ControlFigures) -> Verdict:
         'policy': figures.policy,
         'damper': figures.damper,
         'parameter_changes': figures.parameter_changes,
+        'messages_malformed': figures.unread.messages,
+        'fatal': figures.foreign,  # a supervisor ends the graph: only a new initialisation helps
     }
     level, sentence = _judgement(figures)
     return Verdict(level, sentence, values)
 
 
 def _judgement(figures: ControlFigures) -> tuple[Level, str]:
-    if figures.table_refusal:
-        return Level.ERROR, f'0 A: {figures.table_refusal}'
+    if figures.foreign:
+        return Level.ERROR, f'0 A: {figures.refusal}, then activate mount_init and mount_control again'
+    if figures.refusal:
+        return Level.ERROR, f'0 A: {figures.refusal}'
+    if figures.doubt:
+        return Level.ERROR, f'0 A while this lasts: {figures.doubt}'
     if figures.silence > figures.longest_silence:
         return Level.ERROR, (
             f'0 A: no displacement for {figures.silence:.2f} s (limit {figures.longest_silence:g} s); '
@@ -69,6 +93,11 @@ def _judgement(figures: ControlFigures) -> tuple[Level, str]:
         return Level.WARN, (
             f'{counts.bridged} of {counts.samples} samples were missing and bridged (limit 0.1 %); '
             "look at mount_driver's counts of lost frames"
+        )
+    if figures.unread.messages:
+        return Level.WARN, (
+            f'{figures.unread.messages} messages could not be read and were not answered (limit: none), the '
+            f'last for {figures.unread.reason:.200}; which node publishes them?'
         )
     return Level.OK, 'damping on' if figures.damping_active else 'damping off'
 

@@ -1,6 +1,7 @@
 """Judges each displacement sample by its stamp before the controller sees it; knows no clock."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
@@ -11,6 +12,9 @@ from mount_control.force_to_current import ForceTableError
 from mount_models.sampling import SAMPLE_TIME_NS
 
 _NANOSECONDS = 1e9
+_CLOSEST = SAMPLE_TIME_NS * 3 // 4  # ns, chosen: mount_driver's stamps lie 0.9 of a period apart or more
+_INTRUSIONS = 3  # chosen: samples between those of the stream
+_INTRUSION_PERIOD = 1_000_000_000  # ns, chosen: in it they are those of another sender
 _STREAM_BREAK = 1_000_000_000  # ns, chosen: a longer silence may have been a loss of power
 
 INTERRUPTED = (
@@ -27,6 +31,7 @@ class Judgement(Enum):
     INVALID = 'invalid'  # NaN or beyond the sensor's range: answered with 0 A
     INTERRUPTED = 'interrupted'  # the table may be of another state of the mount: answered with 0 A
     IGNORE = 'ignore'  # repeated or out of order: already answered
+    FOREIGN = 'foreign'  # another sender is or may be there: answered with 0 A
     EARLY = 'early'  # not after the activation: mount_init answers
     INACTIVE = 'inactive'  # nobody asked for an answer
 
@@ -52,7 +57,10 @@ class SampleWatch:
         self.first: int | None = None
         self.last: int | None = None
         self.interrupted = False  # since the activation
+        self.foreign = ''  # which other sender there is, since the activation
+        self.doubt = ''  # which other sender there may be at present
         self.counts = SampleCounts()
+        self._intruded: deque[int] = deque(maxlen=_INTRUSIONS)  # stamps of samples that came too soon, ns
         self._used: int | None = None  # stamp of the last sample that the controller took, ns
         self._activation = 0  # ns
         self._longest_bridge = 0  # ns
@@ -98,7 +106,8 @@ class SampleWatch:
         self._activation = activation
         self._longest_bridge = round(longest_bridge * _NANOSECONDS)
         self._range = displacement_range
-        self._used, self.interrupted, self.counts = None, False, SampleCounts()
+        self._used, self.interrupted, self.foreign, self.counts = None, False, '', SampleCounts()
+        self._intruded.clear()
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
         """Return the judgement on a noted sample (ns, m), and how many are missing before it."""
@@ -108,6 +117,10 @@ class SampleWatch:
             return Judgement.INTERRUPTED, 0
         if stamp <= self._activation:
             return Judgement.EARLY, 0
+        if self._used is not None and stamp - self._used < _CLOSEST:
+            self._note_intrusion(stamp)
+        if self.foreign or self.doubt:
+            return Judgement.FOREIGN, 0
         if self._used is not None and stamp <= self._used:
             self.counts.ignored += 1
             return Judgement.IGNORE, 0
@@ -133,7 +146,7 @@ class SampleWatch:
         valid = np.abs(displacement) <= self._range  # not so for NaN
         follows = np.zeros(len(stamps), bool)
         steps = np.diff(stamps)
-        follows[1:] = valid[1:] & (steps > 0) & (steps < SAMPLE_TIME_NS + SAMPLE_TIME_NS // 2)
+        follows[1:] = valid[1:] & (steps >= _CLOSEST) & (steps < SAMPLE_TIME_NS + SAMPLE_TIME_NS // 2)
         return follows
 
     def follow(self, last_stamp: int, count: int) -> None:
@@ -141,6 +154,16 @@ class SampleWatch:
         self.note(last_stamp)
         self._used = last_stamp
         self.counts.samples += count
+
+    def _note_intrusion(self, stamp: int) -> None:
+        found = self._intruded
+        found.append(stamp)
+        if len(found) == _INTRUSIONS and stamp - found[0] <= _INTRUSION_PERIOD and not self.foreign:
+            self.foreign = (
+                f'{len(found)} displacement samples within {_INTRUSION_PERIOD * 1e-9:g} s were repeated, '
+                f'older than the one before or less than {_CLOSEST * 1e-6:g} ms behind it: end one of the two '
+                'nodes that publish displacement'
+            )
 
 
 def _seconds(stamp: int) -> str:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from mount_control.diagnosis import ControlFigures, verdict
+from mount_control.diagnosis import ControlFigures, Unread, verdict
 from mount_control.sample_watch import SampleCounts
 from mount_ros.nodes.diagnostics import Level
 
@@ -12,7 +12,7 @@ GOOD = ControlFigures(
     counts=SampleCounts(samples=10_000),
     silence=0.001,
     longest_silence=0.020,
-    table_refusal='',
+    refusal='',
     damping_active=False,
     current=0.0,
     step_median=80e-6,
@@ -34,7 +34,7 @@ def test_all_is_well():
 
 
 def test_an_outdated_table_is_an_error_with_its_reason():
-    level, sentence = _judged(table_refusal='the measurements were interrupted', silence=9.0)
+    level, sentence = _judged(refusal='the measurements were interrupted', silence=9.0)
     assert (level, sentence) == (Level.ERROR, '0 A: the measurements were interrupted')
 
 
@@ -78,6 +78,8 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'policy': 'switched_viscous',
         'damper': 'viscous_2000',
         'parameter_changes': 0,
+        'messages_malformed': 0,
+        'fatal': False,
     }
 
 
@@ -85,3 +87,27 @@ def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
     judged = verdict(replace(GOOD, faults=2, damping_active=True))
     assert judged.level is Level.ERROR
     assert judged.sentence.startswith('the controller held what is no finite number, 2 times: damping')
+
+
+def test_another_writer_is_an_error_that_ends_the_graph():
+    judged = verdict(replace(GOOD, refusal='/evil must not publish displacement: end it', foreign=True))
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, True)
+    assert judged.sentence == (
+        '0 A: /evil must not publish displacement: end it, then activate mount_init and mount_control again'
+    )
+
+
+def test_a_writer_in_doubt_is_an_error_while_it_lasts():
+    judged = verdict(replace(GOOD, doubt='two of them: end one'))
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
+    assert judged.sentence == '0 A while this lasts: two of them: end one'
+
+
+def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
+    unread = Unread().and_another(ValueError('first')).and_another(ValueError('cut'))
+    judged = verdict(replace(GOOD, unread=unread))
+    assert (judged.level, judged.figures['messages_malformed']) == (Level.WARN, 2)
+    assert judged.sentence == (
+        '2 messages could not be read and were not answered (limit: none), the last for cut; which node '
+        'publishes them?'
+    )

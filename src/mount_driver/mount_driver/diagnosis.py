@@ -244,6 +244,7 @@ def _figures(now: Snapshot) -> dict[str, object]:
         'error_frames': now.error_frames,
         'unreadable': now.unreadable,
         'switched_off': bool(now.fault),
+        'held': bool(now.held),
         'fatal': bool(now.fault),  # a supervisor ends the graph: only a new initialisation helps
     }
     if now.status is not None:

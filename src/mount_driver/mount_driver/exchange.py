@@ -52,6 +52,8 @@ class Exchange:
         """Why the exchange has ended on its own; empty while it runs."""
         self.trouble = ''
         """What is wrong with the bus at present; empty when nothing is."""
+        self.doubt = ''
+        """Why every answer is lowered to 0 A until this is cleared; empty while none is."""
         self.bus_off = False
         self.recoveries = 0
         self.error_frames = 0
@@ -108,7 +110,17 @@ class Exchange:
                 self.link.refuse(Refusal.BUS_LOST)
                 return False
             setpoint = self.link.answer(stamp, current, self._now())
-            return setpoint is not None and self._send(setpoint)
+            sent = setpoint is not None and self._send(setpoint)
+            if self.link.contradiction and not self.link.fault:
+                self._send(self.link.switch_off(self.link.contradiction))
+                return False
+            return sent
+
+    def switch_off(self, fault: str) -> None:
+        """Send 0 A and let no setpoint pass any more if there is a first fault; from any thread."""
+        if fault and not self.link.fault:
+            with self._sending:
+                self._send(self.link.switch_off(fault))
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
@@ -181,7 +193,7 @@ class Exchange:
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
         if status is not None:
-            self._switch_off(self._health.judge(status, self._now()))
+            self.switch_off(self._health.judge(status, self._now()))
         if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
             return
         # The frame has no time of its own. A second one without a sample between has none at all.
@@ -191,15 +203,9 @@ class Exchange:
 
     def _watch_coil(self, stamped: Stamped, received: int) -> None:
         sample, now = stamped.sample, self._clock.now(received)
-        self.link.held = self._health.hold(now)
+        self.link.held = self._health.hold(now) or self.doubt
         taken = self._clock.taken(received)
-        self._switch_off(self._coil.judge(sample.coil_current, sample.enabled, taken, now))
-
-    def _switch_off(self, fault: str) -> None:
-        """Send 0 A and let no setpoint pass any more if there is a first fault."""
-        if fault and not self.link.fault:
-            with self._sending:
-                self._send(self.link.switch_off(fault))
+        self.switch_off(self._coil.judge(sample.coil_current, sample.enabled, taken, now))
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1

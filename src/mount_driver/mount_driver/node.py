@@ -51,6 +51,7 @@ class MountDriver(SafeLifecycleNode):
     def activate(self) -> None:
         assert self._codec is not None
         self.ending.wait(max(0.0, self._not_before - time.monotonic()))
+        self.wait_for_own_writers()
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
@@ -63,6 +64,7 @@ class MountDriver(SafeLifecycleNode):
         attended = self.lockstep and self._settings.interface == 'virtual'
         exchange.start(threaded=not attended)
         self._exchange = exchange
+        self.tell_writers()
         if attended:
             self._path.attend(exchange.poll)
 
@@ -78,6 +80,12 @@ class MountDriver(SafeLifecycleNode):
 
     def cleanup(self) -> None:
         self._codec = None
+
+    def heed_writers(self, foreign: str, doubt: str) -> None:
+        exchange = self._exchange
+        if exchange is not None:
+            exchange.doubt = doubt
+            exchange.switch_off(foreign)
 
     def judge(self) -> Verdict:
         exchange = self._exchange

@@ -41,5 +41,9 @@ class SpecimenMismatchError(InitialisationError):
     """The parameters of the ramp do not fit the specimen."""
 
 
+class DriverRefusalError(InitialisationError):
+    """The driver keeps the coil at 0 A, so no ramp reaches it."""
+
+
 class CoilBusyError(InitialisationError):
     """Another node sends setpoints to the coil."""

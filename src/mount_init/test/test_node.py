@@ -38,7 +38,9 @@ class Electronics:
         self.node = Node('electronics', context=context)
         self.path = DataPath(self.node, lockstep=True)
         self._publisher = self.path.publisher(topics.COIL_RIPPLE)
-        self.foreign = self.path.publisher(topics.CURRENT_SETPOINT)
+        self._control_node = Node('mount_control', context=context)
+        self._control = DataPath(self._control_node, lockstep=True)
+        self.foreign = self._control.publisher(topics.CURRENT_SETPOINT)
         self._send_temperature = self.path.sender(topics.COIL_TEMPERATURE)
         self.path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
         self.path.subscribe(topics.AIR_GAP, lambda raw: self.results.append(self._air_gap.unpack(raw)))
@@ -82,8 +84,10 @@ class Electronics:
         self.send_sample()
 
     def close(self):
-        self.path.stop()
+        for path in (self.path, self._control):
+            path.stop()
         self.node.destroy_node()
+        self._control_node.destroy_node()
 
 
 class Graph:
