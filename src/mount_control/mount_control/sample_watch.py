@@ -161,8 +161,8 @@ class SampleWatch:
         if len(found) == _INTRUSIONS and stamp - found[0] <= _INTRUSION_PERIOD and not self.foreign:
             self.foreign = (
                 f'{len(found)} displacement samples within {_INTRUSION_PERIOD * 1e-9:g} s were repeated, '
-                f'older than the one before or less than {_CLOSEST * 1e-6:g} ms behind it: end one of the two '
-                'nodes that publish displacement'
+                f'older than the one before or less than {_CLOSEST * 1e-6:g} ms behind it: end one of '
+                'the two nodes that publish displacement'
             )
 
 

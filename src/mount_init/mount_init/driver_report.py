@@ -5,8 +5,7 @@ A ramp that gets no current looks like a broken cable; the driver knows the reas
 
 import threading
 import time
-
-from mount_ros.messages.verdicts import verdicts_of
+from collections.abc import Mapping
 
 _LONGEST_AGE = 2.0  # s, chosen: every node tells its verdict once a second
 _REFUSALS = ('switched_off', 'held')  # figures of the driver
@@ -21,13 +20,12 @@ class DriverReport:
         self._refusal = ''
         self._heard = 0.0  # s, steady clock
 
-    def take(self, raw: bytes) -> None:
-        """Take the serialised verdict of any node."""
-        for told in verdicts_of(raw):
-            if told.node == self._name:
-                refuses = any(told.figures.get(name) == 'True' for name in _REFUSALS)
-                text = f'mount_driver keeps the coil at 0 A: {told.sentence}'
-                self._refusal, self._heard = text if refuses else '', time.monotonic()
+    def take(self, node: str, sentence: str, figures: Mapping[str, str]) -> None:
+        """Take the verdict of any node, by its name with namespace."""
+        if node == self._name:
+            refuses = any(figures.get(name) == 'True' for name in _REFUSALS)
+            self._refusal = f'mount_driver keeps the coil at 0 A: {sentence}' if refuses else ''
+            self._heard = time.monotonic()
 
     @property
     def refusal(self) -> str:

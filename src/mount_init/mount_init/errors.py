@@ -25,6 +25,10 @@ class OutsideCalibrationError(InitialisationError):
     """A gap estimate lies where the specimen was never calibrated."""
 
 
+class WrongCoilError(InitialisationError):
+    """The resistance of the coil is not that of the specimen."""
+
+
 class NoContactError(InitialisationError):
     """The pads never came into contact, or never left it."""
 

@@ -16,6 +16,7 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_of
+from mount_ros.messages.verdicts import verdicts_of
 from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
@@ -112,7 +113,7 @@ class MountInit(SafeLifecycleNode):
     def _subscribe_streams(self, path: DataPath) -> None:
         path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
         path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
-        path.subscribe(topics.DIAGNOSTICS, self._driver.take)
+        path.subscribe(topics.DIAGNOSTICS, self._on_verdicts)
         self._unsubscribed = False
 
     def _resume_streams(self) -> None:
@@ -155,6 +156,10 @@ class MountInit(SafeLifecycleNode):
 
     def _on_temperature(self, raw: bytes) -> None:
         self._temperatures.take(*temperature_of(raw))
+
+    def _on_verdicts(self, raw: bytes) -> None:
+        for told in verdicts_of(raw):
+            self._driver.take(*told)
 
     def _on_setpoint(self, raw: bytes) -> None:
         try:
