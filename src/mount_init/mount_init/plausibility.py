@@ -54,8 +54,8 @@ def check_resistance(
     )
     raise WrongCoilError(
         f'resistance of the coil ({resistance.ohm:.3f} ohm, link voltage {resistance.link_voltage:.1f} V) '
-        f'must lie within {low:.3f} .. {high:.3f} ohm, that of {specimen.name} {where}; {cause} Check coil and '
-        'cable, coil_temperature and the specimen'
+        f'must lie within {low:.3f} .. {high:.3f} ohm, that of {specimen.name} {where}; {cause} Check coil '
+        'and cable, coil_temperature and the specimen'
     )
 
 

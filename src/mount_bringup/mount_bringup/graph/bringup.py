@@ -27,6 +27,7 @@ from mount_bringup.graph.nodes import (
 )
 from mount_bringup.graph.pace import Pace, pace
 from mount_bringup.graph.parameters import parameters_of
+from mount_bringup.graph.shared_memory import remove_abandoned
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.leaving import leave_middleware
 from mount_ros.qos import publisher_qos, recording_qos
@@ -61,6 +62,7 @@ class Bringup:
         self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
     ) -> None:
         """Bring all nodes to life; `session` makes the session text from all parameters of all nodes."""
+        remove_abandoned()
         rclpy.init(
             context=self._context,
             domain_id=self._settings.domain,
@@ -175,6 +177,7 @@ class Bringup:
         """End without a word to the nodes; return a sentence per unclean end."""
         if self._context.ok() and not leave_middleware(self._take_down):
             self.notes.append('the middleware of the supervisor did not come to an end and was left behind')
+        remove_abandoned()
         return []
 
     def _take_down(self) -> None:
