@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from mount_control.plausibility import HOLD
 from mount_control.sample_watch import SampleCounts
 from mount_ros.nodes.diagnostics import Level, Verdict
 
@@ -28,7 +29,7 @@ class ControlFigures:
     counts: SampleCounts
     silence: float  # s since the last displacement sample
     longest_silence: float  # s, limit
-    refusal: str  # why every answer is 0 A until the next activation, or empty
+    table_refusal: str  # why the table no longer holds, or empty
     damping_active: bool
     current: float  # A
     step_median: float  # s, sample received to setpoint published
@@ -39,8 +40,10 @@ class ControlFigures:
     policy: str = ''
     damper: str = ''
     parameter_changes: int = 0  # since the node was configured
-    doubt: str = ''  # why every answer is 0 A at present, or empty
-    foreign: bool = False  # whether another node has sent what only one may
+    doubt: str = ''  # why displacements were not believed last, or empty
+    doubted: bool = False  # whether they are not believed at present
+    foreign: str = ''  # which other node has sent what only one may, or empty
+    writer_doubt: str = ''  # which other node may, at present
     unread: Unread = _ALL_READ
 
 
@@ -52,6 +55,7 @@ def verdict(figures: ControlFigures) -> Verdict:
         'restarts': figures.counts.restarts,
         'ignored': figures.counts.ignored,
         'invalid': figures.counts.invalid,
+        'implausible': figures.counts.implausible,
         'faults': figures.faults,
         'last_fault': figures.last_fault,
         'damping_active': figures.damping_active,
@@ -62,8 +66,9 @@ def verdict(figures: ControlFigures) -> Verdict:
         'policy': figures.policy,
         'damper': figures.damper,
         'parameter_changes': figures.parameter_changes,
+        'needs_initialisation': bool(figures.table_refusal),
         'messages_malformed': figures.unread.messages,
-        'fatal': figures.foreign,  # a supervisor ends the graph: only a new initialisation helps
+        'fatal': bool(figures.foreign),  # a supervisor ends the graph
     }
     level, sentence = _judgement(figures)
     return Verdict(level, sentence, values)
@@ -71,11 +76,11 @@ def verdict(figures: ControlFigures) -> Verdict:
 
 def _judgement(figures: ControlFigures) -> tuple[Level, str]:
     if figures.foreign:
-        return Level.ERROR, f'0 A: {figures.refusal}, then activate mount_init and mount_control again'
-    if figures.refusal:
-        return Level.ERROR, f'0 A: {figures.refusal}'
-    if figures.doubt:
-        return Level.ERROR, f'0 A while this lasts: {figures.doubt}'
+        return Level.ERROR, f'0 A: {figures.foreign}, then activate mount_init and mount_control again'
+    if figures.table_refusal:
+        return Level.ERROR, f'0 A: {figures.table_refusal}'
+    if figures.writer_doubt:
+        return Level.ERROR, f'0 A while this lasts: {figures.writer_doubt}'
     if figures.silence > figures.longest_silence:
         return Level.ERROR, (
             f'0 A: no displacement for {figures.silence:.2f} s (limit {figures.longest_silence:g} s); '
@@ -83,7 +88,14 @@ def _judgement(figures: ControlFigures) -> tuple[Level, str]:
         )
     if figures.faults:
         return Level.ERROR, fault_sentence(figures.faults)
+    if figures.doubted:
+        return Level.ERROR, f'0 A until {HOLD:g} s after the last doubt: {figures.doubt}'
     counts = figures.counts
+    if counts.implausible:
+        return Level.WARN, (
+            f'{counts.implausible} displacement samples were implausible and answered with 0 A; '
+            f'first of the last ones: {figures.doubt}'
+        )
     if counts.invalid:
         return Level.WARN, (
             f'{counts.invalid} of {counts.invalid + counts.samples} displacement samples were invalid '

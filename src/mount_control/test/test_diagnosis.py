@@ -12,7 +12,7 @@ GOOD = ControlFigures(
     counts=SampleCounts(samples=10_000),
     silence=0.001,
     longest_silence=0.020,
-    refusal='',
+    table_refusal='',
     damping_active=False,
     current=0.0,
     step_median=80e-6,
@@ -34,7 +34,7 @@ def test_all_is_well():
 
 
 def test_an_outdated_table_is_an_error_with_its_reason():
-    level, sentence = _judged(refusal='the measurements were interrupted', silence=9.0)
+    level, sentence = _judged(table_refusal='the measurements were interrupted', silence=9.0)
     assert (level, sentence) == (Level.ERROR, '0 A: the measurements were interrupted')
 
 
@@ -50,6 +50,18 @@ def test_invalid_samples_are_a_warning():
     level, sentence = _judged(counts=SampleCounts(samples=90, invalid=10, bridged=50))
     assert level is Level.WARN
     assert sentence.startswith('10 of 100 displacement samples were invalid and answered with 0 A')
+
+
+def test_a_displacement_in_doubt_is_an_error_while_that_lasts_and_a_warning_later():
+    doubt, counts = 'displacement moved at 2.00 m/s (limit 1 m/s)', SampleCounts(samples=90, implausible=10)
+    assert _judged(counts=counts, doubt=doubt, doubted=True) == (
+        Level.ERROR,
+        f'0 A until 1 s after the last doubt: {doubt}',
+    )
+    level, sentence = _judged(counts=counts, doubt=doubt)
+    assert level is Level.WARN
+    assert sentence.startswith('10 displacement samples were implausible and answered with 0 A')
+    assert sentence.endswith(doubt)
 
 
 @pytest.mark.parametrize(('bridged', 'level'), [(0, Level.OK), (10, Level.OK), (11, Level.WARN)])
@@ -68,6 +80,7 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'restarts': 3,
         'ignored': 2,
         'invalid': 1,
+        'implausible': 0,
         'faults': 0,
         'last_fault': 0,
         'damping_active': False,
@@ -78,6 +91,7 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'policy': 'switched_viscous',
         'damper': 'viscous_2000',
         'parameter_changes': 0,
+        'needs_initialisation': False,
         'messages_malformed': 0,
         'fatal': False,
     }
@@ -90,7 +104,7 @@ def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
 
 
 def test_another_writer_is_an_error_that_ends_the_graph():
-    judged = verdict(replace(GOOD, refusal='/evil must not publish displacement: end it', foreign=True))
+    judged = verdict(replace(GOOD, foreign='/evil must not publish displacement: end it'))
     assert (judged.level, judged.figures['fatal']) == (Level.ERROR, True)
     assert judged.sentence == (
         '0 A: /evil must not publish displacement: end it, then activate mount_init and mount_control again'
@@ -98,7 +112,7 @@ def test_another_writer_is_an_error_that_ends_the_graph():
 
 
 def test_a_writer_in_doubt_is_an_error_while_it_lasts():
-    judged = verdict(replace(GOOD, doubt='two of them: end one'))
+    judged = verdict(replace(GOOD, writer_doubt='two of them: end one'))
     assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
     assert judged.sentence == '0 A while this lasts: two of them: end one'
 

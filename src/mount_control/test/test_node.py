@@ -309,12 +309,12 @@ def test_while_a_writer_may_be_one_that_was_killed_control_answers_0_ampere_and_
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
     twin = stranger(topics.DISPLACEMENT, '/surroundings_io')
-    wait_until(lambda: control.answering.watch.doubt, 'the doubt')
+    wait_until(lambda: control.answering.watch.writer_doubt, 'the doubt')
     around.send(401, 0.0)
     assert _answers(around, 401)[-1] == (401.0, 0.0)
     assert control.judge().sentence.startswith('0 A while this lasts: /surroundings_io must not publish')
     twin.destroy_node()
-    wait_until(lambda: not control.answering.watch.doubt, 'the end of the doubt')
+    wait_until(lambda: not control.answering.watch.writer_doubt, 'the end of the doubt')
     around.send(402, 0.0)
     assert _answers(around, 402)[-1][1] > 0.4
 

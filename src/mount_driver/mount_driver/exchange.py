@@ -14,13 +14,13 @@ import can
 
 from mount_driver.bus import CanLinkError, Reception, may_have_frames, open_bus
 from mount_driver.clock import Clock
-from mount_driver.codec import MountCodec, Setpoint
-from mount_driver.coil_watch import CoilWatch
+from mount_driver.codec import MountCodec, Setpoint, WrongCrcError, WrongLengthError
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.frame import Frame
 from mount_driver.link import Arrival, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.status_watch import StatusWatch
+from mount_driver.watches.guard import Fault, Guard
+from mount_driver.watches.heat_watch import HeatWatch
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
 _REOPEN_PERIOD = 0.2  # s, chosen
@@ -34,6 +34,7 @@ class Exchange:
     `on_sample(stamped)` is called in the receiving thread for every new sample, and
     `on_temperature(stamp_ns, celsius)` for a status with a coil temperature, with the last sample's stamp.
     `clock` gives the stamps and says by which time ages are judged; `steady() -> ns` is the steady clock.
+    `heat` is the coil's temperature from before, which an activation does not cool.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class Exchange:
         *,
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
         steady: Callable[[], int] = time.monotonic_ns,
+        heat: HeatWatch | None = None,
     ):
         self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9))
         self.reception = Reception()
@@ -52,8 +54,6 @@ class Exchange:
         """Why the exchange has ended on its own; empty while it runs."""
         self.trouble = ''
         """What is wrong with the bus at present; empty when nothing is."""
-        self.doubt = ''
-        """Why every answer is lowered to 0 A until this is cleared; empty while none is."""
         self.bus_off = False
         self.recoveries = 0
         self.error_frames = 0
@@ -70,9 +70,8 @@ class Exchange:
         self._temperature_stamp: int | None = None  # of the temperature told last
         self._clock = clock
         self._steady = steady
-        self._coil = CoilWatch(parameters.coil)
-        self._health = StatusWatch(parameters.status)
-        self._ids = (codec.measurement.frame_id, codec.status.frame_id)
+        self.guard = Guard(parameters, codec, clock, self.link, heat or HeatWatch(parameters.heating))
+        self._ids = (codec.measurement.frame_id, codec.status.frame_id, codec.setpoint.frame_id)
         self._bus: can.BusABC | None = None
         self._alive = AliveCounter()
         self._frame = Frame(codec.setpoint.frame_id, bytes(codec.setpoint.length))
@@ -111,16 +110,18 @@ class Exchange:
                 return False
             setpoint = self.link.answer(stamp, current, self._now())
             sent = setpoint is not None and self._send(setpoint)
-            if self.link.contradiction and not self.link.fault:
-                self._send(self.link.switch_off(self.link.contradiction))
+            if self.link.double_answer and not self.link.fault:
+                self._send(self.link.switch_off(self.link.double_answer, needs_initialisation=False))
                 return False
             return sent
 
-    def switch_off(self, fault: str) -> None:
-        """Send 0 A and let no setpoint pass any more if there is a first fault; from any thread."""
-        if fault and not self.link.fault:
-            with self._sending:
-                self._send(self.link.switch_off(fault))
+    def switch_off(self, fault: Fault | None) -> None:
+        """Send 0 A and let no setpoint pass any more; the first fault stays, or a graver one."""
+        link = self.link
+        if fault is None or (link.fault and not (link.needs_initialisation > fault.needs_initialisation)):
+            return
+        with self._sending:
+            self._send(link.switch_off(*fault))
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
@@ -177,6 +178,8 @@ class Exchange:
                 self._take_measurement(message, received)
             elif message.arbitration_id == self._ids[1]:
                 self._take_status(message)
+            elif message.arbitration_id == self._ids[2]:
+                self._take_foreign_setpoint(message)
         self.watch()
         return message is not None
 
@@ -185,15 +188,16 @@ class Exchange:
         if stamped is not None:
             self.bus_off = False
             self.last_received = received
-            self._watch_coil(stamped, received)
+            self.switch_off(self.guard.judge_sample(stamped, received))
             self._on_sample(stamped)
-        elif self.link.arrival is Arrival.RESENT:
+            return
+        self.switch_off(self.guard.judge_frame(received))
+        if self.link.arrival is Arrival.RESENT:
             self._answer_again()
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
-        if status is not None:
-            self.switch_off(self._health.judge(status, self._now()))
+        self.switch_off(self.guard.judge_status(status, self._now()))
         if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
             return
         # The frame has no time of its own. A second one without a sample between has none at all.
@@ -201,11 +205,16 @@ class Exchange:
             self._temperature_stamp = latest.stamp
             self._on_temperature(latest.stamp, status.coil_temperature_celsius)
 
-    def _watch_coil(self, stamped: Stamped, received: int) -> None:
-        sample, now = stamped.sample, self._clock.now(received)
-        self.link.held = self._health.hold(now) or self.doubt
-        taken = self._clock.taken(received)
-        self.switch_off(self._coil.judge(sample.coil_current, sample.enabled, taken, now))
+    def _take_foreign_setpoint(self, message: can.Message) -> None:
+        try:
+            _, setpoint = self._codec.decode_setpoint(message.data)
+        except (WrongCrcError, WrongLengthError):
+            return  # nor do the electronics use it; their status tells of it
+        self.switch_off(self.guard.judge_foreign(setpoint, self._now()))
+        with self._sending:
+            # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
+            if self._accepting:
+                self._send(self.link.off())
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
@@ -231,7 +240,7 @@ class Exchange:
             self.unsent_reason = self.trouble
             return False
         try:
-            self._coil.note_sent(setpoint.current, self._now())
+            self.guard.note_sent(setpoint, self._now())
             self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
             bus.send(self._frame)
         except Exception as error:

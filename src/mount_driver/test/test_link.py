@@ -80,6 +80,14 @@ def test_the_same_sample_again_is_resent_and_not_handed_on(link):
     assert link.arrivals[Arrival.RESENT] == 2
 
 
+def test_the_same_sample_again_with_other_values_is_a_contradiction(link):
+    feed(link, [10, 11])
+    link.take(frame(11, alive=2, setpoint_timeout=True), 12 * MS)  # which may come true meanwhile
+    assert link.contradictions == 0
+    link.take(frame(11, alive=3, displacement=0.002), 12 * MS)
+    assert (link.contradictions, link.arrivals[Arrival.RESENT]) == (1, 2)
+
+
 def test_the_same_frame_again_is_no_sample_at_all(link):
     feed(link, [10, 11])
     assert link.take(frame(11, alive=1), 12 * MS) is None
@@ -325,9 +333,9 @@ def _answer_twice(link, index, first, second):
 )
 def test_samples_that_are_answered_twice_and_differently_tell_of_a_second_sender(link, first, second):
     for index in range(3):
-        assert link.contradiction == ''
+        assert link.double_answer == ''
         _answer_twice(link, index, first, second)
-    assert link.contradiction == (
+    assert link.double_answer == (
         f'3 samples within 1 s were answered twice, the last with {first:.3f} A and {second:.3f} A (limit: '
         'one answer each): end one of the two nodes that publish current_setpoint'
     )
@@ -337,7 +345,7 @@ def test_equal_answers_and_a_node_that_ends_now_and_then_are_no_second_sender(li
     for index in range(9):
         _answer_twice(link, 600 * index, 1.0, 0.0)
         _answer_twice(link, 600 * index + 1, 1.0, 1.0)
-    assert link.contradiction == ''
+    assert link.double_answer == ''
 
 
 events = st.lists(

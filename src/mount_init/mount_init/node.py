@@ -60,6 +60,7 @@ class MountInit(SafeLifecycleNode):
 
     def activate(self) -> None:
         assert self._dialogue is not None
+        self.real_time.begin(self)  # the ramp is part of the activation
         self._resume_streams()
         self.wait_for_own_writers()
         parameters = self._init_parameters

@@ -19,13 +19,14 @@ import yaml
 from mount_models.actuator.law import ForceLaw
 from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
+from mount_models.coil.heating import CoilHeating, check_heating
 from mount_models.coil.temperature import CompensationError, TemperatureCompensation, check_compensation
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_coefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.provenance import ProvenanceError, check_provenance
-from mount_models.quantity import Quantity, quantities
+from mount_models.quantity import ParameterError, Quantity, quantities
 from mount_models.sampling import HIGHEST_CURRENT
 
 T = TypeVar('T', bound=NamedTuple)
@@ -45,7 +46,8 @@ class Specimen:
     """One actuator with its coil, springs and pads, as the controller knows it; SI units throughout.
 
     `friction` holds what was identified of `FrictionCoefficients` and `FrictionContact`, by their names; what
-    is not in it keeps its default. Without `temperature` the gap curves hold at one temperature only.
+    is not in it keeps its default. Without `temperature` the gap curves hold at one temperature only; a file
+    without `heating` has its defaults.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Specimen:
     ] = HIGHEST_CURRENT
     coil_resistance: float | None = None  # ohm at 20 degC; None: not known, so not held against the ripple
     temperature: TemperatureCompensation | None = None
+    heating: CoilHeating = field(default_factory=CoilHeating)
     friction: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
 
@@ -179,6 +182,12 @@ def checked_specimen(specimen: Specimen) -> Specimen:
         raise SpecimenError(f'{error}') from error
     if specimen.coil_resistance is not None:
         _check_limits(specimen.coil_resistance, _COIL_RESISTANCE, 'coil_resistance')
+    for name, quantity in quantities(CoilHeating).items():
+        _check_limits(getattr(specimen.heating, name), quantity, f'heating.{name}')
+    try:
+        check_heating(specimen.heating)
+    except ParameterError as error:
+        raise SpecimenError(f'heating: {error}') from error
     _check_friction(specimen.friction)
     try:
         check_provenance(specimen.provenance)
@@ -194,7 +203,7 @@ def checked_specimen(specimen: Specimen) -> Specimen:
 
 _READABLE = 0o644
 _COIL_RESISTANCE = Quantity('ohm', 'resistance of the coil at 20 degC', 0.01, 100.0)
-_OPTIONAL = {'coil_resistance': None}  # calibrations of before do not hold it
+_OPTIONAL = {'coil_resistance': None, 'heating': CoilHeating()._asdict()}  # not in calibrations of before
 
 
 # Several parts of a run load the same file, and to check it takes some 20 ms.
