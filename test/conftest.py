@@ -95,8 +95,19 @@ def command(tmp_path: Path, domain: int) -> Iterator[Command]:
             process.wait(30)
 
 
+@pytest.fixture(scope='session')
+def skip_if_late() -> Callable[[str], None]:
+    """Skip the test if two processes that only keep time are late too; the text says what was wrong."""
+
+    def skip(what: str) -> None:
+        if (late := lateness_of_machine()) > LATE:
+            pytest.skip(f'without us too this machine is {late * 1e3:.0f} ms late at 1 kHz; {what}')
+
+    return skip
+
+
 @pytest.fixture
-def drive_in_time(command: Command) -> Callable[..., Result]:
+def drive_in_time(command: Command, skip_if_late: Callable[[str], None]) -> Callable[..., Result]:
     """Drive in real time, once more if something was late; a machine too late by itself skips the test."""
 
     def drive(*options: str) -> Result:
@@ -104,10 +115,7 @@ def drive_in_time(command: Command) -> Callable[..., Result]:
             result = command.drive(*options, report=True)
             if result.code == 0 and result.figures['lost_samples'] == 0:
                 return result
-        if (late := lateness_of_machine()) > LATE:
-            pytest.skip(
-                f'without us too this machine is {late * 1e3:.0f} ms late at 1 kHz ({LATE * 1e3:g} ms)'
-            )
+        skip_if_late(f'code {result.code}')
         return result
 
     return drive

@@ -19,5 +19,10 @@ setup(
     ],
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
-    entry_points={'console_scripts': ['mount_supervisor = mount_bringup.graph.launched:main']},
+    entry_points={
+        'console_scripts': [
+            'mount_supervisor = mount_bringup.graph.launched:main',
+            'mount_composed = mount_bringup.graph.composed:main',
+        ]
+    },
 )

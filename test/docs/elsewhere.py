@@ -8,6 +8,7 @@ _SET = 'on a running node in test/replay/test_parameter_changes.py'
 
 ELSEWHERE = {
     'make drive': 'in real time by test/graph/test_drive.py',
+    'engine-mount faults': 'in real time by test/graph/test_faults.py',
     'make test': 'it is what runs this',
     'make setup-dev': 'it made the environment that this runs in',
     'make lint': 'by .ci/run',

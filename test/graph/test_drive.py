@@ -23,7 +23,8 @@ DATA_TOPICS = (
     'sim/mount_force',
 )
 PROMISED_FIGURES = {
-    'recording', 'scenario', 'lost_samples', 'unanswered_samples', 'faults', 'real_time_factor',
+    'recording', 'recordings', 'restarts', 'scenario',
+    'lost_samples', 'unanswered_samples', 'faults', 'real_time_factor',
     'rest_gap_m', 'contact_gap_m',
     'true_rest_gap_m', 'true_contact_gap_m', 'switch_on_s', 'switch_off_s', 'peak_displacement_m',
     'peak_current_a', 'tracking_error_rms', 'latency_median_s', 'latency_p99_s',

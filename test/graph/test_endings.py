@@ -157,8 +157,7 @@ def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
     result = command.drive(
         '--lockstep', '--scenario', 'bench', '--duration', '5',
         '--set', 'mount_sim.answer_patience=2.0',
-        '--set', 'mount_sim.fault.kind=silence',
-        '--set', 'mount_sim.fault.start=4.0',
+        '--fault', 'can_silent@4:0.5',
     )  # fmt: skip
     assert result.code == 1
     assert 'was not answered within 2 s' in result.output
@@ -170,15 +169,16 @@ def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
     ('fault', 'sentence'),
     [
         ('coil_half', r'coil switched off: coil current \(0\.\d+ A\) must lie within .* about its setpoint'),
-        ('hot_coil', r'coil temperature \(250\.0 degC\) must not exceed 180 degC: let the coil cool down'),
+        (
+            'temperature_250',
+            r'coil temperature \(250\.0 degC\) must not exceed 180 degC: let the coil cool down',
+        ),
     ],
 )
 def test_a_coil_at_fault_is_switched_off_and_ends_a_run_in_lock_step(command, fault, sentence):
     result = command.drive(
         '--lockstep', '--scenario', 'bench', '--duration', '3',
-        '--set', f'mount_sim.fault.kind={fault}',
-        '--set', 'mount_sim.fault.start=5.2',
-        '--set', 'mount_sim.fault.duration=100.0',
+        '--fault', f'{fault}@5.2',
     )  # fmt: skip
     assert result.code == 1
     assert re.search(rf'mount_driver: .*{sentence}', result.output)

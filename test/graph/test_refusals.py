@@ -89,7 +89,8 @@ def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words)
         ((*PAPER, '--set', 'mount_control.damper=soft'), ("'soft'", 'viscous_2000')),
         ((*PAPER, '--set', 'mount_control.switch_off_level=0.0009'), ('switch_off_level (0.9 mm)', 'below')),
         (('--set', 'mount_sim.mechanics.contact_gap=0.0006'), ('contact_gap (600.0 um)', 'rest_gap')),
-        (('--set', 'mount_sim.fault.kind=flat_tyre'), ("fault 'flat_tyre' is unknown",)),
+        (('--fault', 'flat_tyre@3'), ("fault 'flat_tyre' is unknown",)),
+        (('--core', '--fault', 'lost_5@3'), ('fault lost_5 shows on the CAN bus only',)),
         (('--domain', '400'), ("ROS domain '400'", '0 .. 101')),
     ],
 )

@@ -12,7 +12,11 @@ MOTION = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 1.5, 
 NARROW = 0.0010  # m
 CASES = {
     'nothing doubtful': ({}, {}),
-    'single samples out of range': ({'electronics.displacement_noise': 3e-4}, {'displacement_range': 0.0018}),
+    'single samples out of range': (
+        {'electronics.displacement_noise': 3e-4},
+        {'displacement_range': 0.0018, 'displacement_noise': 0.01, 'displacement_velocity': 100.0},
+    ),
+    'a noise that is not believed': ({'electronics.displacement_noise': 3e-4}, {}),
     'longer than is bridged': ({'bench.frequency': 3.0}, {'displacement_range': NARROW}),
     'an excitation on the chassis': ({'scenario': 'motorway'}, {}),
 }

@@ -1,6 +1,7 @@
 """The node `mount_recorder`: records the topics of the graph into rosbag2 MCAP bags."""
 
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -27,12 +28,14 @@ from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import Urgent
 from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
 NAME = 'mount_recorder'
 _FAMILY = 'mount_record'  # all recorders are called so or something longer
 _PLACES = {
     'uri': ('', 'folder that the recording creates; it must not exist'),
+    'mounts': ('', 'namespaces of the mounts to record, as in left,right; empty: one mount in its own'),
     'topics': ([entry.name for entry in TOPICS], 'names of registered topics to record'),
 }
 
@@ -41,6 +44,7 @@ class MountRecorder(SafeLifecycleNode):
     """Receives from `configure` on, records from `activate` to `deactivate`."""
 
     run_time_parameters = frozenset({'mark_text'})
+    urgent = Urgent(frozenset({f'{NAME}_io'}), interpreter=False)  # the collector; its queues hold seconds
 
     def __init__(self, name: str = NAME, **arguments):
         super().__init__(name, **arguments)
@@ -63,6 +67,7 @@ class MountRecorder(SafeLifecycleNode):
         parameters = read(self, RecorderParameters())
         self._on_full = _on_full(parameters.on_full)
         topics = [_registered(name) for name in self.get_parameter('topics').value]
+        mounts = [name.strip() for name in self.get_parameter('mounts').value.split(',')]
         uri = self.get_parameter('uri').value
         if not uri:
             raise RecordingError('parameter uri is empty; name the folder that the recording shall create')
@@ -86,7 +91,11 @@ class MountRecorder(SafeLifecycleNode):
         self._announced_failure = ''
         self._announced_malformed = set()
         for entry in topics:
-            self._record(data_path, entry)
+            common = entry.name.startswith('/') or mounts == ['']
+            for mount in [''] if common else mounts:
+                self._record(data_path, entry, mount)
+        if mounts != [''] and EVENT in topics:
+            self._record(data_path, EVENT, '')  # marks of the recorder itself, which concern all mounts
         if self.lockstep:
             data_path.attend(self._recorder.poll)
         data_path.start()
@@ -163,15 +172,16 @@ class MountRecorder(SafeLifecycleNode):
         self.data_path = collector = Collector(self, thread=thread, on_failure=self.tell_failure)
         return collector
 
-    def _record(self, data_path: Collector, entry: Topic) -> None:
+    def _record(self, data_path: Collector, entry: Topic, mount: str) -> None:
         sink, recorder, marks = self._present_sink(), self._present_recorder(), self._marks
         assert marks is not None
-        name = data_path.node.resolve_topic_name(entry.name)
+        placed = replace(entry, name=f'{mount}/{entry.name}') if mount else entry
+        name = data_path.node.resolve_topic_name(placed.name)
         latched = entry.delivery is Delivery.LATCHED
         sink.add_topic(name, entry.type, partial(_offers, data_path, name), latched=latched)
         watch_topic(recorder, entry, name, marks, self.get_namespace(), self._present_time)
         receive = recorder.latched_receiver(name) if latched else recorder.receiver(name)
-        self._subscriptions_by_topic[name] = data_path.collect(entry, receive)
+        self._subscriptions_by_topic[name] = data_path.collect(placed, receive)
 
     # Marks.
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_bags.messages.stamps import StampWatch, misdated, redated, stamp_statistics
+from mount_bags.messages.stamps import StampWatch, misdated, missing_samples, redated, stamp_statistics
 
 RATE = 1000.0
 PERIOD = 1_000_000
@@ -189,3 +189,9 @@ def test_watch_goes_on_behind_a_pause_and_behind_a_clock_that_was_set():
     for index in range(1000):
         watch.add(START - 10**15 + PERIOD * index)
     assert (watch.misdated, watch.lost, watch.out_of_order) == (1, 60_000, 0)
+
+
+def test_samples_missing_for_a_year_are_counted_without_a_list_of_them():
+    year = 365 * 86_400
+    streams = [np.array([0, year * 1_000_000_000]), np.array([0, 1_000_000, year * 1_000_000_000])]
+    assert missing_samples(streams, 1000.0) == 1000 * year - 1

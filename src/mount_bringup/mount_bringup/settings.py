@@ -12,6 +12,10 @@ from mount_models.damper import damper_text
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, check_name, flattened
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.places import general_name
+
+OF_EACH = ('mount_driver', 'mount_init', 'mount_control')
+"""Nodes that each mount of a car has."""
 
 
 class SettingError(ParameterError):
@@ -21,8 +25,8 @@ class SettingError(ParameterError):
 def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
     return {
-        'mount_driver': flattened(DriverParameters()),
-        'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0},
+        'mount_driver': {**flattened(DriverParameters()), 'parameters_file': '', 'specimen': ''},
+        'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0, 'inject': ''},
         'mount_init': {**flattened(InitParameters()), 'parameters_file': '', 'specimen': ''},
         'mount_control': control.defaults(),
         'mount_recorder': flattened(RecorderParameters()),
@@ -67,15 +71,21 @@ def checked_settings(
         known = defaults_of_nodes()
     checked: dict[str, dict[str, Any]] = {}
     for node, values in settings.items():
-        if node not in known:
+        kind = node.rpartition('/')[2]  # of a node of one mount, as in left/mount_control
+        if kind not in known or (kind != node and kind not in OF_EACH):
             raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
         for name in values:
-            check_name(node, name, known[node])
+            check_name(node, _general(kind, name), known[kind])
         checked[node] = {
-            name: _typed(f'{node}.{name}', value, known[node][name])
-            for name, value in _with_damper_text(node, values).items()
+            name: _typed(f'{node}.{name}', value, known[kind][_general(kind, name)])
+            for name, value in _with_damper_text(kind, values).items()
         }
     return checked
+
+
+def _general(node: str, name: str) -> str:
+    """Return the parameter behind that of one mount, as in mount_sim.mount_left.friction.scale."""
+    return general_name(name) if node == 'mount_sim' else name
 
 
 def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -86,10 +96,20 @@ def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]
     return {**values, 'damper': damper_text(damper)}
 
 
+def _texts(name: str, value: Any) -> list[str]:
+    if isinstance(value, (list, tuple)) and value and all(isinstance(text, str) for text in value):
+        return list(value)
+    raise ParameterError(
+        f'{name} must be a list of at least one text, or be left out; instead received {value!r}'
+    )
+
+
 def _typed(name: str, value: Any, default: Any) -> Any:
     if isinstance(default, float) and not isinstance(value, bool):
         with contextlib.suppress(TypeError, ValueError):
             return float(value)  # of 3e-5 too, which is text in YAML
+    if isinstance(default, tuple):
+        return _texts(name, value)
     if not isinstance(value, type(default)):
         raise ParameterError(
             f'{name} must be a {type(default).__name__} such as {default!r}; instead received {value!r}'

@@ -1,5 +1,9 @@
 """One graph and one simulated CAN bus for each ROS domain and namespace."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from mount_bringup.graph import domain
@@ -7,8 +11,8 @@ from mount_bringup.graph.domain import DomainError, can_port, domain_lock
 
 
 @pytest.fixture(autouse=True)
-def own_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(domain.tempfile, 'gettempdir', lambda: str(tmp_path))
+def own_places(monkeypatch):
+    monkeypatch.setattr(domain, '_PLACE', f'\0engine_mount_test_{os.getpid()}')
 
 
 def test_each_domain_and_namespace_has_a_port_of_its_own_where_nobody_else_is_given_one():
@@ -34,6 +38,24 @@ def test_a_second_graph_in_a_namespace_is_refused_until_the_first_has_ended():
         domain_lock(3, '/left').__enter__()
     with domain_lock(3, 'left'):
         pass
+
+
+def test_a_graph_that_was_killed_holds_its_place_no_more_and_leaves_no_file(tmp_path):
+    hold = (
+        f'from mount_bringup.graph import domain; domain._PLACE = {domain._PLACE!r}; '
+        'lock = domain.domain_lock(5, "left"); lock.__enter__(); print("held", flush=True); input()'
+    )
+    environment = {**os.environ, 'TMPDIR': str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, '-c', hold], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as holder:
+        assert holder.stdout.readline() == b'held\n'
+        with pytest.raises(DomainError, match=rf'namespace /left \(process {holder.pid}\)'):
+            domain_lock(5, 'left').__enter__()
+        holder.kill()
+        holder.wait()
+    with domain_lock(5, 'left'):
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_namespaces_that_would_share_a_can_bus_do_not_run_at_the_same_time(monkeypatch):

@@ -1,12 +1,14 @@
 """What the launch files hand to `launch`, which is not needed here: the test stands in for it."""
 
 import importlib
+import os
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import pytest
+import yaml
 
 import mount_bringup
 from mount_bringup.graph import domain
@@ -49,13 +51,13 @@ class Launched:
 
 
 @pytest.fixture
-def launch(monkeypatch, tmp_path):
+def launch(monkeypatch):
     for name in MODULES:
         monkeypatch.setitem(sys.modules, name, MagicMock())
     monkeypatch.delitem(sys.modules, 'mount_bringup.graph.launch', raising=False)
     module = importlib.import_module('mount_bringup.graph.launch')
     monkeypatch.setattr(module, 'get_package_share_directory', lambda _: str(PACKAGE))
-    monkeypatch.setattr(domain.tempfile, 'gettempdir', lambda: str(tmp_path))
+    monkeypatch.setattr(domain, '_PLACE', f'\0engine_mount_test_{os.getpid()}')
     monkeypatch.setenv('ROS_DOMAIN_ID', '5')
     yield module
     sys.modules.pop('mount_bringup.graph.launch')
@@ -67,7 +69,7 @@ def test_every_argument_has_a_description_and_the_common_ones_are_there(launch, 
     assert all(declared['description'] for declared in launched.declared.values())
     assert {
         'namespace', 'config', 'record', 'recording', 'policy', 'damper', 'parameters_file', 'specimen',
-        'port', 'duration', 'priority', 'log_level',
+        'port', 'duration', 'priority', 'composed', 'restarts', 'log_level',
     } < set(launched.declared)  # fmt: skip
     launched.end_all()
 
@@ -87,6 +89,18 @@ def test_nodes_and_their_supervisor_end_with_launch_and_run_at_the_priority_aske
     launched.end_all()
 
 
+def test_the_real_time_priority_that_launch_runs_at_is_the_loops_and_not_that_of_the_start(
+    launch, monkeypatch
+):
+    monkeypatch.setattr(launch, 'drop_real_time', lambda: 20)
+    launched = Launched(launch, 'sim', recording='bags/first', namespace='left')
+    told = {name: process['additional_env'] for name, process in launched.processes.items()}
+    assert told['mount_control']['ENGINE_MOUNT_PRIORITY'] == '20'
+    assert told['mount_recorder']['ENGINE_MOUNT_PRIORITY'] == '10'
+    assert 'priority 20, now ordinary' in launch.LogInfo.call_args.kwargs['msg']
+    launched.end_all()
+
+
 def test_a_second_launch_in_the_namespace_is_refused_until_the_last_process_of_the_first_has_ended(launch):
     first = Launched(launch, 'sim', recording='bags/first', namespace='left')
     other = Launched(launch, 'vehicle', recording='bags/first', namespace='right')
@@ -98,11 +112,44 @@ def test_a_second_launch_in_the_namespace_is_refused_until_the_last_process_of_t
     other.end_all()
 
 
-def test_a_process_that_ends_by_itself_ends_launch_as_a_failure_that_names_it(launch):
+def test_the_end_of_the_simulated_electronics_ends_launch_as_a_failure_that_names_them(launch):
     launched = Launched(launch, 'sim', recording='bags/first')
+    assert not launched.processes['mount_sim']['respawn']
+    with pytest.raises(RuntimeError, match='mount_sim ended with code -9'):
+        launched.end('mount_sim', -9)
+    launched.end_all()
+
+
+def test_a_node_that_ends_by_itself_is_respawned_and_its_supervisor_is_told_how_often(launch):
+    launched = Launched(launch, 'sim', recording='bags/first', restarts='2')
+    assert launched.processes['mount_control']['respawn']
+    assert launched.end('mount_control', -9) is None
+    assert '--restart-limit=2' in launched.processes['mount_supervisor']['arguments']
+    assert 'respawn' not in launched.processes['mount_supervisor']
+    launched.end_all()
+
+
+def test_without_restarts_the_end_of_a_node_ends_launch(launch):
+    launched = Launched(launch, 'sim', recording='bags/first', restarts='0')
     with pytest.raises(RuntimeError, match='mount_control ended with code -9'):
         launched.end('mount_control', -9)
     launched.end_all()
+
+
+def test_composed_nodes_share_a_process_with_the_parameters_of_each_until_all_have_ended(launch):
+    launched = Launched(launch, 'sim', recording='bags/first', composed='true', policy='continuous_viscous')
+    assert list(launched.processes) == ['mount_recorder', 'mount_composed', 'mount_sim', 'mount_supervisor']
+    process = launched.processes['mount_composed']
+    assert 'name' not in process  # it would rename all three
+    assert process['additional_env']['ENGINE_MOUNT_NODES'] == 'mount_driver mount_init mount_control'
+    [file] = map(Path, process['parameters'])
+    parameters = yaml.safe_load(file.read_text())
+    assert [*parameters] == ['/**/mount_control', '/**/mount_driver', '/**/mount_init']
+    assert parameters['/**/mount_control']['ros__parameters']['policy'] == 'continuous_viscous'
+    assert '--grouping=COMPOSED' in launched.processes['mount_supervisor']['arguments']
+    assert launched.end('mount_composed', -9) is None
+    launched.end_all()
+    assert not file.exists()
 
 
 def test_the_end_of_a_drive_ends_launch_as_a_success(launch):

@@ -1,13 +1,18 @@
 """When the end of a process ends a launched graph as a fault, and what its supervisor says."""
 
+import os
 import signal
+import subprocess
 
 import pytest
 
-from mount_bringup.graph import launched
+from mount_bringup.graph import launched, siblings
 from mount_bringup.graph.errors import GraphError, Interrupted
 from mount_bringup.graph.launched import SUPERVISOR, LaunchedGraph, exit_error
-from mount_bringup.graph.nodes import VEHICLE, GraphSettings
+from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, VEHICLE, GraphSettings
+from mount_bringup.graph.processes import NODES_OF_PROCESS
+from mount_bringup.graph.restarts import Loss, Remedy, Restart
+from mount_ros.testing import wait_until
 
 
 @pytest.mark.parametrize(
@@ -30,6 +35,7 @@ class Graph:
     """A graph whose bring-up ends in `outcome`; notes what it is told."""
 
     notes = ('mount_init refused; it was activated again',)
+    restarts = ()
 
     def __init__(self, outcome=None):
         self.outcome, self.told = outcome, []
@@ -70,6 +76,37 @@ def test_a_refusal_is_told_and_ends_with_code_1(capfd, outcome, code, told, said
     assert said in ''.join(capfd.readouterr())
     assert 'eigenfrequency: 9.0' in graph.session
     assert 'versions:' in graph.session
+
+
+def test_a_drive_in_which_a_node_was_lost_ends_with_code_1_and_tells_it(capfd):
+    graph = Graph()
+    graph.restarts = (Restart(0, Loss((CONTROL,), 'mount_control has ended'), Remedy.DAMP_ON, 1.5),)
+    assert launched._supervise(graph, 'car', float('inf')) == 1
+    assert 'mount_control has ended; it is started again' in ''.join(capfd.readouterr())
+
+
+@pytest.fixture
+def child():
+    environment = {**os.environ, NODES_OF_PROCESS: 'mount_driver mount_init'}
+    process = subprocess.Popen(['sleep', '100'], env=environment)
+    yield process
+    process.kill()
+    process.wait()
+
+
+def test_a_supervisor_knows_the_processes_of_its_starter_by_their_nodes_and_no_others(child, monkeypatch):
+    monkeypatch.setattr(siblings.os, 'getppid', os.getpid)
+    wait_until(lambda: siblings.sibling_of([DRIVER, INIT]), 'the environment of the child', 10.0)
+    assert siblings.sibling_of([DRIVER]) is None
+    sibling = siblings.sibling_of([DRIVER, INIT])
+    assert (sibling.pid, sibling.ended) == (child.pid, False)
+    monkeypatch.setattr(siblings.os, 'getppid', lambda: 1)
+    assert siblings.sibling_of([DRIVER, INIT]) is None
+    child.send_signal(signal.SIGSTOP)
+    sibling.kill()
+    assert child.wait(10) == -signal.SIGKILL
+    assert sibling.ended
+    sibling.close()
 
 
 def test_the_supervisor_of_a_launch_that_was_killed_ends(monkeypatch):

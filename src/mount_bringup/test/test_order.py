@@ -62,6 +62,13 @@ def test_texts_stay_texts():
     assert sim(recording='2026').settings.parameters['mount_recorder']['uri'] == '2026'
 
 
+def test_faults_are_given_with_commas_between_them_and_checked():
+    parameters = sim(fault='coil_open@8, lost_5@6:2').settings.parameters
+    assert parameters['mount_sim']['faults'] == ['coil_open@8', 'lost_5@6:2']
+    with pytest.raises(ParameterError, match="fault 'fire' is unknown"):
+        sim(fault='fire@2')
+
+
 def test_a_mount_that_damps_always_takes_its_control_along():
     assert sim(mount='friction_always_on').settings.parameters['mount_control']['switching'] == 'always'
 
@@ -76,7 +83,8 @@ def test_the_supervisor_is_told_what_it_supervises():
     order = vehicle(namespace='right', record='false', duration='30')
     assert arguments_of(order) == [
         '--node=mount_driver', '--node=mount_init', '--node=mount_control',
-        '--namespace=right', '--domain=7', '--scenario=car', '--duration=30.0',
+        '--namespace=right', '--domain=7', '--scenario=car', '--duration=30.0', '--grouping=APART',
+        '--restart-limit=3',
     ]  # fmt: skip
     assert '--duration=inf' in arguments_of(vehicle())
     assert '--scenario=bench' in arguments_of(sim(scenario='bench'))
@@ -95,7 +103,7 @@ def test_the_supervisor_is_told_what_it_supervises():
         ({'port': '['}, r'^port:=\[ is not valid YAML'),
         ({'duration': 'long'}, 'timeline.duration must be a float'),
         ({'port': '80'}, r'port \(80 1\) must lie within 1024'),
-        ({'priority': '-1'}, r'priority:=-1 must be a number within 0 \.\. 99'),
+        ({'priority': '-1'}, r'priority:=-1 must be a number within 0 \.\. 98'),
         ({'parameters_file': 'none.yaml'}, 'none.yaml'),
         ({'config': 'none.yaml'}, 'none.yaml cannot be read'),
     ],

@@ -27,16 +27,16 @@ class Refused(Supervisor):
     def figures(self, node):
         return {name: str(count * self.asked) for name, count in self.each[node.name].items()}
 
-    def _serve_for(self, duration):
+    def serve_for(self, duration):
         pass
 
-    def activate(self):
-        self._activate(INIT, lambda text: None)
+    def activate_init(self):
+        Supervisor.activate(self, INIT, lambda text: None)
 
 
 def test_a_refusal_in_time_is_asked_for_once_more(tmp_path):
     graph = Refused(tmp_path, 1)
-    graph.activate()
+    graph.activate_init()
     assert graph.asked == 2
     assert graph.notes == ['mount_init refused; it was activated again']
 
@@ -45,14 +45,14 @@ def test_a_refusal_in_time_is_asked_for_once_more(tmp_path):
 def test_a_node_that_refuses_in_time_is_given_up(tmp_path, pace):
     graph = Refused(tmp_path, 9, **pace)
     with pytest.raises(GraphError):
-        graph.activate()
+        graph.activate_init()
     assert graph.asked == 2
 
 
 @pytest.mark.parametrize('pace', [{'overruns': 51}, {'timeouts': 1}])
 def test_refusals_of_a_machine_that_was_late_do_not_count(tmp_path, pace):
     graph = Refused(tmp_path, 9, **pace)
-    graph.activate()
+    graph.activate_init()
     assert graph.asked == 10
     assert 'this machine was too late for 1 kHz' in graph.notes[0]
 
@@ -61,7 +61,7 @@ def test_a_machine_that_stays_late_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(bringup, '_LATE_PATIENCE', 0.0)
     graph = Refused(tmp_path, 9, timeouts=1)
     with pytest.raises(GraphError):
-        graph.activate()
+        graph.activate_init()
     assert graph.asked == 1
 
 

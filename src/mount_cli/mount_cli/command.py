@@ -13,6 +13,7 @@ from mount_cli.commands import (
     cut,
     drive,
     experiment,
+    faults,
     identify,
     merge,
     record,
@@ -32,8 +33,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode='markdown',
 )
-
-_INTERRUPTED = 130  # as a shell reports SIGINT
 
 
 @app.callback()
@@ -76,6 +75,7 @@ app.command(name='status', epilog=view.STATUS_EPILOG)(view.status)
 app.command(name='cut', epilog=cut.EPILOG)(cut.cut)
 app.command(name='merge', epilog=merge.EPILOG)(merge.merge)
 app.command(name='experiment', epilog=experiment.EPILOG)(experiment.experiment)
+app.command(name='faults', epilog=faults.EPILOG)(faults.faults)
 app.add_typer(identify.app, name='identify')
 app.command(name='accept', epilog=accept.EPILOG)(accept.accept)
 app.add_typer(calibrate.app)
@@ -83,11 +83,11 @@ app.add_typer(calibrate.app)
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; every refusal is one sentence and a non-zero exit code."""
-    prepare_environment()
-    from mount_bringup.graph.errors import GraphError, Interrupted
+    from mount_bringup.graph.errors import INTERRUPTED, GraphError, Interrupted
     from mount_ros.nodes.leaving import end_process
 
     try:
+        prepare_environment()
         app(args=with_repeated_options(sys.argv[1:] if arguments is None else arguments))
     except SystemExit as end:
         if not isinstance(end.code, int):
@@ -95,7 +95,7 @@ def main(arguments: list[str] | None = None) -> None:
         end_process(end.code)
     except (KeyboardInterrupt, Interrupted):
         terminal(stderr=True).print('interrupted; the coil is at 0 A')
-        end_process(_INTERRUPTED)
+        end_process(INTERRUPTED)
     except (ValueError, GraphError, OSError) as error:
         refuse(error)
         end_process(1)

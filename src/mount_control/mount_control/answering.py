@@ -43,6 +43,7 @@ _WITHOUT_STEP = {
     reason: Answer(current, None, reason)
     for reason, current in {
         Judgement.INVALID: OFF,
+        Judgement.IMPLAUSIBLE: OFF,
         Judgement.INTERRUPTED: OFF,
         Judgement.IGNORE: None,
         Judgement.EARLY: None,
@@ -91,8 +92,7 @@ class Answering:
     def begin(self, settings: ControlSettings, table: CurrentTable, activation: int) -> None:
         """Answer what comes after `activation` (ns), the stamp of the table."""
         controller = Controller(ControlLaw(settings, table))
-        parameters = settings.parameters
-        self.watch.begin(activation, parameters.longest_bridge, parameters.displacement_range)
+        self.watch.begin(activation, settings.parameters)
         self._table, self._faults, self.last_fault = table, 0, 0
         self._changes.clear()
         self.controller = controller
@@ -141,11 +141,10 @@ class Answering:
         for begin, end in zip(begins, [*begins[1:], count], strict=True):
             for settings in changes.get(begin, ()):
                 self.change(settings)
-            place = self._answer_doubtful(stamps, displacements, answers, begin, end)
-            if place < end and self.controller is not None:
-                self.controller.run(displacements[place:end], answers.traces[place:end])
-                self.watch.follow(int(stamps[end - 1]), end - place)
-                answers.traced[place:end] = True
+            place = begin
+            while place < end:
+                place = self._answer_doubtful(stamps, displacements, answers, place, end)
+                place += self._answer_believed(stamps, displacements, answers, place, end)
         answers.currents[answers.traced] = answers.traces['current'][answers.traced]
         return answers
 
@@ -164,6 +163,17 @@ class Answering:
                 answers.traces[place] = np.frombuffer(answer.trace, self.trace_type)[0]
                 return place + 1
         return end
+
+    def _answer_believed(self, stamps, displacements, answers: Answers, begin: int, end: int) -> int:
+        """Answer samples that follow each other up to the first in doubt; return how many."""
+        if begin >= end or self.controller is None:
+            return 0
+        count = self.watch.believed(stamps[begin:end], displacements[begin:end])
+        part = slice(begin, begin + count)
+        if count:
+            self.controller.run(displacements[part], answers.traces[part])
+            answers.traced[part] = True
+        return count
 
     def _take_changes(self, controller: Controller) -> tuple[str, ...]:
         """Go on with the newest law from this sample on; return what is told of it."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from mount_control.plausibility import HOLD
 from mount_control.sample_watch import SampleCounts
 from mount_ros.nodes.diagnostics import Level, Verdict
 
@@ -24,6 +25,8 @@ class ControlFigures:
     policy: str = ''
     damper: str = ''
     parameter_changes: int = 0  # since the node was configured
+    doubt: str = ''  # why displacements were not believed last, or empty
+    doubted: bool = False  # whether they are not believed at present
 
 
 def verdict(figures: ControlFigures) -> Verdict:
@@ -34,6 +37,7 @@ def verdict(figures: ControlFigures) -> Verdict:
         'restarts': figures.counts.restarts,
         'ignored': figures.counts.ignored,
         'invalid': figures.counts.invalid,
+        'implausible': figures.counts.implausible,
         'faults': figures.faults,
         'last_fault': figures.last_fault,
         'damping_active': figures.damping_active,
@@ -44,6 +48,7 @@ def verdict(figures: ControlFigures) -> Verdict:
         'policy': figures.policy,
         'damper': figures.damper,
         'parameter_changes': figures.parameter_changes,
+        'needs_initialisation': bool(figures.table_refusal),
     }
     level, sentence = _judgement(figures)
     return Verdict(level, sentence, values)
@@ -59,7 +64,14 @@ def _judgement(figures: ControlFigures) -> tuple[Level, str]:
         )
     if figures.faults:
         return Level.ERROR, fault_sentence(figures.faults)
+    if figures.doubted:
+        return Level.ERROR, f'0 A until {HOLD:g} s after the last doubt: {figures.doubt}'
     counts = figures.counts
+    if counts.implausible:
+        return Level.WARN, (
+            f'{counts.implausible} displacement samples were implausible and answered with 0 A; '
+            f'first of the last ones: {figures.doubt}'
+        )
     if counts.invalid:
         return Level.WARN, (
             f'{counts.invalid} of {counts.invalid + counts.samples} displacement samples were invalid '

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
 
@@ -18,6 +19,7 @@ from mount_control.sample_watch import Judgement
 from mount_control.settings import (
     FILES,
     FRICTION,
+    check_policies,
     control_settings,
     defaults,
     parameter_sets,
@@ -38,6 +40,15 @@ from mount_ros.nodes.parameters import SpecimenValues, declare
 from mount_ros.nodes.process import run_node
 from mount_ros.timing import LatencyHistogram
 
+_MEASURED_BEFORE = (
+    'measured_before',
+    False,
+    ParameterDescriptor(
+        description='for a supervisor that starts this node again: the measurements have come without a '
+        'break since before the present table was made, so that it holds'
+    ),
+)
+
 
 class MountControl(SafeLifecycleNode):
     """Answers each displacement sample with a current setpoint, while active."""
@@ -50,6 +61,7 @@ class MountControl(SafeLifecycleNode):
             declare(self, parameters, prefix)
         for name, text in FILES.items():
             self.declare_parameter(name, text)
+        self.declare_parameter(*_MEASURED_BEFORE)
         self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)
         self.answering = Answering()
@@ -74,6 +86,7 @@ class MountControl(SafeLifecycleNode):
         self._trace = ScalarsLayout(self.trace_topic)
         self._gap_layout = ScalarsLayout(topics.AIR_GAP)
         load_compiled_law(self._settings)
+        self.answering.watch.measured_before = bool(self.get_parameter(_MEASURED_BEFORE[0]).value)
         path = self.open_data_path()
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
         self._send_trace = path.sender(topics.CONTROL_TRACE)
@@ -103,6 +116,7 @@ class MountControl(SafeLifecycleNode):
 
     def check_parameters(self, values: Mapping[str, Any]) -> None:
         control_settings(values, self._specimen)
+        check_policies(values)  # what has no effect now stands in event and session all the same
 
     def take_changes(self, changes: Mapping[str, Change]) -> None:
         self._settings = control_settings(self._values(), self._specimen)
@@ -132,6 +146,8 @@ class MountControl(SafeLifecycleNode):
                 policy=self._settings.parameters.policy,
                 damper=self.get_parameter('damper').value,
                 parameter_changes=self._parameter_changes,
+                doubt=answering.watch.plausibility.sentence,
+                doubted=answering.watch.plausibility.held,
             )
         )
 

@@ -24,6 +24,15 @@ class ControlParameters(NamedTuple):
     displacement_range: Annotated[
         float, Quantity('m', 'largest believable displacement to either side', 1e-3, 0.1, 'chosen')
     ] = 0.020
+    displacement_velocity: Annotated[
+        float, Quantity('m/s', 'largest believable velocity of the displacement', 0.1, 100.0, 'chosen')
+    ] = 1.0
+    displacement_noise: Annotated[
+        float, Quantity('m', 'largest believable noise of the displacement', 1e-6, 0.1, 'chosen')
+    ] = 5e-5
+    displacement_stuck: Annotated[
+        float, Quantity('s', 'a noisy displacement that repeats for so long is stuck', 0.01, 10.0, 'chosen')
+    ] = 0.05
     highest_current: Annotated[
         float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')
     ] = HIGHEST_CURRENT

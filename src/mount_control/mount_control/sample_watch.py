@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control.force_to_current import ForceTableError
+from mount_control.parameters import ControlParameters
+from mount_control.plausibility import Plausibility
 from mount_models.sampling import SAMPLE_TIME_NS
 
 _NANOSECONDS = 1e9
@@ -25,6 +27,7 @@ class Judgement(Enum):
     USE = 'use'
     RESTART = 'restart'  # usable, but the past is too far away to be continued
     INVALID = 'invalid'  # NaN or beyond the sensor's range: answered with 0 A
+    IMPLAUSIBLE = 'implausible'  # it moves as no mount does, see `plausibility`: answered with 0 A
     INTERRUPTED = 'interrupted'  # the table may be of another state of the mount: answered with 0 A
     IGNORE = 'ignore'  # repeated or out of order: already answered
     EARLY = 'early'  # not after the activation: mount_init answers
@@ -40,6 +43,7 @@ class SampleCounts:
     restarts: int = 0
     ignored: int = 0
     invalid: int = 0
+    implausible: int = 0
 
 
 class SampleWatch:
@@ -51,16 +55,22 @@ class SampleWatch:
     def __init__(self) -> None:
         self.first: int | None = None
         self.last: int | None = None
+        self.measured_before = False
+        """Whether the measurements are known to have come without a break before the first sample, too."""
         self.interrupted = False  # since the activation
         self.counts = SampleCounts()
         self._used: int | None = None  # stamp of the last sample that the controller took, ns
         self._activation = 0  # ns
         self._longest_bridge = 0  # ns
         self._range = 0.0  # m
+        self._seen: int | None = None  # stamp of the last sample that was compared with those before, ns
+        self.plausibility = Plausibility(ControlParameters())
 
     def note(self, stamp: int) -> None:
         """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
-        if self.last is None or abs(stamp - self.last) > _STREAM_BREAK:
+        if self.last is None:
+            self.first, self.last = 0 if self.measured_before else stamp, stamp
+        elif abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
         elif stamp > self.last:
             self.last = stamp
@@ -93,12 +103,13 @@ class SampleWatch:
                 f'{remedy}'
             )
 
-    def begin(self, activation: int, longest_bridge: float, displacement_range: float) -> None:
-        """Count anew: what comes after `activation` (ns) is to be answered; limits in s and m."""
+    def begin(self, activation: int, parameters: ControlParameters) -> None:
+        """Count anew: what comes after `activation` (ns) is to be answered."""
         self._activation = activation
-        self._longest_bridge = round(longest_bridge * _NANOSECONDS)
-        self._range = displacement_range
-        self._used, self.interrupted, self.counts = None, False, SampleCounts()
+        self._longest_bridge = round(parameters.longest_bridge * _NANOSECONDS)
+        self._range = parameters.displacement_range
+        self.plausibility = Plausibility(parameters)
+        self._used, self._seen, self.interrupted, self.counts = None, None, False, SampleCounts()
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
         """Return the judgement on a noted sample (ns, m), and how many are missing before it."""
@@ -114,13 +125,18 @@ class SampleWatch:
         if not math.fabs(displacement) <= self._range:  # also NaN
             self.counts.invalid += 1
             return Judgement.INVALID, 0
+        if self.plausibility.doubt(displacement, 0 if self._seen is None else _missing(stamp - self._seen)):
+            self._seen = stamp
+            self.counts.implausible += 1
+            return Judgement.IMPLAUSIBLE, 0
+        self._seen = stamp
         elapsed = self._longest_bridge + 1 if self._used is None else stamp - self._used
         self._used = stamp
         self.counts.samples += 1
         if elapsed > self._longest_bridge:
             self.counts.restarts += 1
             return Judgement.RESTART, 0
-        missing = max(0, (elapsed + SAMPLE_TIME_NS // 2) // SAMPLE_TIME_NS - 1)
+        missing = _missing(elapsed)
         self.counts.bridged += missing
         return Judgement.USE, missing
 
@@ -136,11 +152,25 @@ class SampleWatch:
         follows[1:] = valid[1:] & (steps > 0) & (steps < SAMPLE_TIME_NS + SAMPLE_TIME_NS // 2)
         return follows
 
+    def believed(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> int:
+        """Note the samples (n,), which follow each other, up to the first in doubt; return how many."""
+        count = self.plausibility.believed(displacement)
+        if count:
+            self.follow(int(stamps[count - 1]), count)
+        return count
+
     def follow(self, last_stamp: int, count: int) -> None:
-        """Note `count` samples that followed each other without a doubt, the last at `last_stamp` (ns)."""
-        self.note(last_stamp)
-        self._used = last_stamp
+        """Note `count` samples that followed each other without a doubt, the last at `last_stamp` (ns).
+
+        They have passed `plausibility`. However long they lasted, nothing was interrupted.
+        """
+        self.last = self._used = self._seen = last_stamp
         self.counts.samples += count
+
+
+def _missing(elapsed: int) -> int:
+    """Return how many samples are missing between two that are `elapsed` ns apart."""
+    return max(0, (elapsed + SAMPLE_TIME_NS // 2) // SAMPLE_TIME_NS - 1)
 
 
 def _seconds(stamp: int) -> str:

@@ -73,6 +73,12 @@ def control_settings(values: Mapping[str, Any], specimen: Specimen) -> ControlSe
     return ControlSettings(parameters, policy, design, friction, contact)
 
 
+def check_policies(values: Mapping[str, Any]) -> None:
+    """Raise a `ValueError` if a policy, chosen or not, could not go on with its {parameter: value}."""
+    for name, policy in POLICIES.items():
+        policy.design(with_flattened(policy.Parameters(), values, prefix_of(name)), SAMPLE_TIME)
+
+
 def policy_parameters(values: Mapping[str, Any]) -> tuple[Policy, Any]:
     """Return the policy that {parameter: value} choose, and its own parameters, each within its range."""
     name = with_flattened(ControlParameters(), values).policy

@@ -20,8 +20,8 @@ ODD = [-3.0, -0.5, 0.0, 0.2, 1.5, 2.0, 5.0, 19.9, 21.0, 30.0, 1000.001, -1500.0]
 def make_answering(make_settings, table_rows):
     """Return a function that begins to answer at `START`."""
 
-    def make():
-        answering, chosen = Answering(), make_settings(switching='always')
+    def make(**parameters):
+        answering, chosen = Answering(), make_settings(switching='always', **parameters)
         answering.watch.note(START)
         answering.begin(chosen, chosen.table(*table_rows), START)
         return answering
@@ -41,12 +41,18 @@ def samples(draw):
     return stamps, numbers
 
 
+ANY_MOTION = {'displacement_velocity': 100.0, 'displacement_noise': 0.1}
+"""So that what the samples are drawn from is believed."""
+
+
 @settings(deadline=None, max_examples=200)
-@given(samples(), st.lists(st.integers(0, 59), max_size=3))
-def test_many_answers_are_single_answers_to_the_bit(make_answering, make_settings, given_samples, places):
+@given(samples(), st.lists(st.integers(0, 59), max_size=3), st.sampled_from([{}, ANY_MOTION]))
+def test_many_answers_are_single_answers_to_the_bit(
+    make_answering, make_settings, given_samples, places, limits
+):
     stamps, displacements = given_samples
     changes = {place: [make_settings('viscous_4000', quality=0.7)] for place in places if place < len(stamps)}
-    single, many = make_answering(), make_answering()
+    single, many = make_answering(**limits), make_answering(**limits)
     answers = many.answer_many(stamps, displacements, changes)
     for place, (stamp, displacement) in enumerate(zip(stamps.tolist(), displacements.tolist(), strict=True)):
         for changed in changes.get(place, ()):
@@ -63,6 +69,20 @@ def test_many_answers_are_single_answers_to_the_bit(make_answering, make_setting
     following = int(stamps.max()) + MS
     assert many.expects(following) == single.expects(following)
     assert many.answer(following, 0.001) == single.answer(following, 0.001)
+
+
+@pytest.mark.parametrize('odd', [math.nan, 0.01])
+def test_a_doubt_after_more_than_a_second_without_one_is_no_interruption(make_answering, sine, odd):
+    stamps, displacements = START + MS * np.arange(1, 4001), sine(8.0, 1e-3, 4.0)
+    displacements[2000] = odd
+    single, many = make_answering(), make_answering()
+    answers = many.answer_many(stamps, displacements)
+    pairs = zip(stamps, displacements, strict=True)
+    expected = [single.answer(int(stamp), float(x)).current for stamp, x in pairs]
+    np.testing.assert_array_equal(answers.currents, expected)
+    assert many.watch.counts == single.watch.counts
+    assert many.refusal == ''
+    assert max(expected[3100:]) > 0.4
 
 
 def test_two_parts_are_the_whole(make_answering, sine):

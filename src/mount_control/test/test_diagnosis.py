@@ -52,6 +52,18 @@ def test_invalid_samples_are_a_warning():
     assert sentence.startswith('10 of 100 displacement samples were invalid and answered with 0 A')
 
 
+def test_a_displacement_in_doubt_is_an_error_while_that_lasts_and_a_warning_later():
+    doubt, counts = 'displacement moved at 2.00 m/s (limit 1 m/s)', SampleCounts(samples=90, implausible=10)
+    assert _judged(counts=counts, doubt=doubt, doubted=True) == (
+        Level.ERROR,
+        f'0 A until 1 s after the last doubt: {doubt}',
+    )
+    level, sentence = _judged(counts=counts, doubt=doubt)
+    assert level is Level.WARN
+    assert sentence.startswith('10 displacement samples were implausible and answered with 0 A')
+    assert sentence.endswith(doubt)
+
+
 @pytest.mark.parametrize(('bridged', 'level'), [(0, Level.OK), (10, Level.OK), (11, Level.WARN)])
 def test_more_than_one_bridged_sample_in_a_thousand_is_a_warning(bridged, level):
     judged = _judged(counts=SampleCounts(samples=10_000, bridged=bridged))
@@ -68,6 +80,7 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'restarts': 3,
         'ignored': 2,
         'invalid': 1,
+        'implausible': 0,
         'faults': 0,
         'last_fault': 0,
         'damping_active': False,
@@ -78,6 +91,7 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'policy': 'switched_viscous',
         'damper': 'viscous_2000',
         'parameter_changes': 0,
+        'needs_initialisation': False,
     }
 
 

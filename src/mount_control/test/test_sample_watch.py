@@ -5,6 +5,7 @@ import math
 import pytest
 
 from mount_control.force_to_current import ForceTableError
+from mount_control.parameters import ControlParameters
 from mount_control.sample_watch import Judgement, SampleCounts, SampleWatch
 
 MS, S = 1_000_000, 1_000_000_000  # ns
@@ -14,7 +15,7 @@ MS, S = 1_000_000, 1_000_000_000  # ns
 def watch():
     watch = SampleWatch()
     watch.note(600 * MS)
-    watch.begin(600 * MS, 0.020, 0.020)
+    watch.begin(600 * MS, ControlParameters())
     assert _judge(watch, 0) == [(Judgement.RESTART, 0)]  # the first one has no past
     return watch
 
@@ -67,7 +68,8 @@ def test_what_no_sensor_can_mean_is_invalid(watch, displacement):
 
 @pytest.mark.parametrize('displacement', [0.020, -0.020])
 def test_the_end_of_the_range_still_counts(watch, displacement):
-    assert _judge(watch, 1, displacement=displacement) == [(Judgement.USE, 0)]
+    _judge(watch, *range(1, 20), displacement=math.nan)  # so that it can have moved there
+    assert _judge(watch, 20, displacement=displacement) == [(Judgement.USE, 19)]
 
 
 def test_invalid_samples_are_bridged_like_missing_ones(watch):
@@ -149,13 +151,13 @@ def test_a_sample_is_answered_only_where_the_table_was_made_during_the_present_m
         (3 * S + 1, Judgement.INTERRUPTED),
     ):
         stream = _stream(S, 2 * S, 3 * S)
-        stream.begin(activation, 0.020, 0.020)
+        stream.begin(activation, ControlParameters())
         assert stream.judge(3 * S, 0.0) == (expected, 0)
         assert stream.interrupted == (expected is Judgement.INTERRUPTED)
 
 
 def test_an_interruption_stands_until_the_next_activation(watch):
     assert _judge(watch, 1, 1002, 1003) == [(Judgement.USE, 0), *[(Judgement.INTERRUPTED, 0)] * 2]
-    watch.begin(2003 * MS, 0.020, 0.020)
+    watch.begin(2003 * MS, ControlParameters())
     assert _judge(watch, 1004) == [(Judgement.RESTART, 0)]
     assert watch.counts == SampleCounts(samples=1, restarts=1)

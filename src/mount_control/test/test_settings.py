@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mount_control import band_pass
-from mount_control.settings import control_settings, defaults
+from mount_control.settings import check_policies, control_settings, defaults
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
@@ -39,6 +39,13 @@ def test_what_is_not_named_is_the_specimen_s():
 def test_what_cannot_be_is_refused(values, reason):
     with pytest.raises(ValueError, match=reason):
         control_settings({**PAPER, **values}, default_specimen())
+
+
+def test_what_no_policy_could_work_with_is_refused_also_of_one_that_is_not_chosen():
+    check_policies(defaults())
+    assert control_settings({'damper': 'soft'}, default_specimen()).parameters.policy != PAPER['policy']
+    with pytest.raises(ValueError, match="no damper curve is called 'soft'"):
+        check_policies({**defaults(), 'damper': 'soft'})
 
 
 def test_more_current_than_was_calibrated_is_refused():

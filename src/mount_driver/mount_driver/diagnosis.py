@@ -1,5 +1,6 @@
 """The verdict on the link, from what was counted now and a second ago."""
 
+import math
 from collections import deque
 from typing import NamedTuple
 
@@ -34,6 +35,7 @@ class Snapshot(NamedTuple):
     unsent: int = 0
     unsent_reason: str = ''
     restarts: int = 0
+    jumps: int = 0
     gaps: int = 0
     recoveries: int = 0
     error_frames: int = 0
@@ -47,6 +49,12 @@ class Snapshot(NamedTuple):
     trouble: str = ''
     failure: str = ''
     fault: str = ''  # keeps the coil off until the next activation
+    needs_initialisation: bool = False  # and nothing else
+    other_senders: int = 0  # frames that neither our electronics nor we have sent
+    other_sender_age: float = math.inf  # s, since the last of them
+    celsius: float = math.nan  # degC, the coil by the thermal model
+    current_limit: float = HIGHEST_CURRENT  # A, what it may carry
+    derated: int = 0  # setpoints that were lowered to that
     held: str = ''  # keeps it at 0 A at present
     status: Status | None = None
     setpoint_errors: int = 0  # statuses that report setpoint frames with a failed check
@@ -54,7 +62,8 @@ class Snapshot(NamedTuple):
 
 def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
     """Return what `exchange` has counted; `now_ns` and `started_ns` are on the steady clock."""
-    link, latest = exchange.link, exchange.link.latest
+    link, latest, guard = exchange.link, exchange.link.latest, exchange.guard
+    seen = guard.other_sender_at
     return Snapshot(
         time=now_ns * 1e-9,
         frame_age=(now_ns - (exchange.last_received or started_ns)) * 1e-9,
@@ -75,6 +84,7 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         unsent=exchange.unsent,
         unsent_reason=exchange.unsent_reason,
         restarts=link.clock.restarts,
+        jumps=link.jumps,
         gaps=link.clock.gaps,
         recoveries=exchange.recoveries,
         error_frames=exchange.error_frames,
@@ -88,6 +98,12 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         trouble=exchange.trouble,
         failure=exchange.failure,
         fault=link.fault,
+        needs_initialisation=link.needs_initialisation,
+        other_senders=guard.other_senders,
+        other_sender_age=math.inf if seen is None else (link.clock.now(now_ns) - seen) * 1e-9,
+        celsius=guard.heat.celsius,
+        current_limit=guard.heat.current_limit,
+        derated=link.derated,
         held=link.held,
         status=link.status,
         setpoint_errors=link.setpoint_errors,
@@ -116,6 +132,7 @@ def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, loc
         *_safety_findings(now),
         *(() if lockstep else _silence_findings(now, where, parameters)),
         *_fault_findings(now, earlier, parameters),
+        *_heat_findings(now, parameters),
         *_quality_findings(now, earlier, parameters),
         *_setpoint_findings(now, earlier, parameters),
     ):
@@ -141,8 +158,14 @@ def _bus_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Fi
 def _safety_findings(now: Snapshot) -> Findings:
     if now.fault:
         again = 'then activate mount_driver, mount_init and mount_control again'
-        return [(Level.ERROR, f'coil switched off: {now.fault}, {again}')]
+        return [(Level.ERROR, f'coil switched off: {now.fault}, {again}{_other_sender(now)}')]
     return [(Level.ERROR, f'coil at 0 A while this lasts: {now.held}')] if now.held else []
+
+
+def _other_sender(now: Snapshot) -> str:
+    if not now.other_senders:
+        return ''
+    return '; it still sends' if now.other_sender_age <= _PERIOD else f'; silent for more than {_PERIOD:g} s'
 
 
 def _silence_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Findings:
@@ -170,6 +193,16 @@ def _fault_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParamete
     return found
 
 
+def _heat_findings(now: Snapshot, parameters: DriverParameters) -> Findings:
+    heating = parameters.heating
+    if not now.celsius > heating.derating_celsius:
+        return []
+    # Rounded, so that the sentence does not change with every look.
+    text = f'coil at about {now.celsius:.0f} degC by the thermal model: current limited to'
+    limits = f'lowered from {heating.derating_celsius:g} degC on, 0 A at {heating.limit_celsius:g} degC'
+    return [(Level.WARN, f'{text} {now.current_limit:.1f} A ({limits}); damp less or cool the mount')]
+
+
 def _quality_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
     samples = now.samples - earlier.samples
     lost, corrupt = now.lost - earlier.lost, now.corrupt - earlier.corrupt
@@ -183,8 +216,6 @@ def _quality_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParame
     if invalid:
         text = f'displacement not valid in {invalid} samples of the last second'
         found.append((Level.WARN, f'{text}; check the displacement sensor'))
-    if now.restarts > earlier.restarts:
-        found.append((Level.WARN, 'the electronics have restarted; activate the graph again'))
     if now.gaps > earlier.gaps:
         text = 'the electronics sent no samples for more than 1 s'
         found.append((Level.WARN, f'{text}; check their supply and the bus, activate the graph again'))
@@ -239,12 +270,19 @@ def _figures(now: Snapshot) -> dict[str, object]:
         'setpoint_timeouts': now.timeouts,
         'unsent': now.unsent,
         'restarts': now.restarts,
+        'jumps': now.jumps,
         'gaps': now.gaps,
         'recoveries': now.recoveries,
         'error_frames': now.error_frames,
         'unreadable': now.unreadable,
         'switched_off': bool(now.fault),
-        'fatal': bool(now.fault),  # a supervisor ends the graph: only a new initialisation helps
+        # A supervisor ends the graph on the one, and initialises it anew on the other.
+        'fatal': bool(now.fault) and not now.needs_initialisation,
+        'needs_initialisation': bool(now.fault) and now.needs_initialisation,
+        'other_senders': now.other_senders,
+        'coil_model_celsius': round(now.celsius, 1),
+        'current_limit': round(now.current_limit, 3),
+        'derated': now.derated,
     }
     if now.status is not None:
         figures['supply_voltage'] = now.status.supply_voltage

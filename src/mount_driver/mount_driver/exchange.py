@@ -14,13 +14,13 @@ import can
 
 from mount_driver.bus import CanLinkError, Reception, may_have_frames, open_bus
 from mount_driver.clock import Clock
-from mount_driver.codec import MountCodec, Setpoint
-from mount_driver.coil_watch import CoilWatch
+from mount_driver.codec import MountCodec, Setpoint, WrongCrcError, WrongLengthError
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.frame import Frame
 from mount_driver.link import Arrival, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.status_watch import StatusWatch
+from mount_driver.watches.guard import Fault, Guard
+from mount_driver.watches.heat_watch import HeatWatch
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
 _REOPEN_PERIOD = 0.2  # s, chosen
@@ -34,6 +34,7 @@ class Exchange:
     `on_sample(stamped)` is called in the receiving thread for every new sample, and
     `on_temperature(stamp_ns, celsius)` for a status with a coil temperature, with the last sample's stamp.
     `clock` gives the stamps and says by which time ages are judged; `steady() -> ns` is the steady clock.
+    `heat` is the coil's temperature from before, which an activation does not cool.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class Exchange:
         *,
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
         steady: Callable[[], int] = time.monotonic_ns,
+        heat: HeatWatch | None = None,
     ):
         self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9))
         self.reception = Reception()
@@ -68,9 +70,8 @@ class Exchange:
         self._temperature_stamp: int | None = None  # of the temperature told last
         self._clock = clock
         self._steady = steady
-        self._coil = CoilWatch(parameters.coil)
-        self._health = StatusWatch(parameters.status)
-        self._ids = (codec.measurement.frame_id, codec.status.frame_id)
+        self.guard = Guard(parameters, codec, clock, self.link, heat or HeatWatch(parameters.heating))
+        self._ids = (codec.measurement.frame_id, codec.status.frame_id, codec.setpoint.frame_id)
         self._bus: can.BusABC | None = None
         self._alive = AliveCounter()
         self._frame = Frame(codec.setpoint.frame_id, bytes(codec.setpoint.length))
@@ -165,6 +166,8 @@ class Exchange:
                 self._take_measurement(message, received)
             elif message.arbitration_id == self._ids[1]:
                 self._take_status(message)
+            elif message.arbitration_id == self._ids[2]:
+                self._take_foreign_setpoint(message)
         self.watch()
         return message is not None
 
@@ -173,15 +176,16 @@ class Exchange:
         if stamped is not None:
             self.bus_off = False
             self.last_received = received
-            self._watch_coil(stamped, received)
+            self._switch_off(self.guard.judge_sample(stamped, received))
             self._on_sample(stamped)
-        elif self.link.arrival is Arrival.RESENT:
+            return
+        self._switch_off(self.guard.judge_frame(received))
+        if self.link.arrival is Arrival.RESENT:
             self._answer_again()
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
-        if status is not None:
-            self._switch_off(self._health.judge(status, self._now()))
+        self._switch_off(self.guard.judge_status(status, self._now()))
         if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
             return
         # The frame has no time of its own. A second one without a sample between has none at all.
@@ -189,17 +193,24 @@ class Exchange:
             self._temperature_stamp = latest.stamp
             self._on_temperature(latest.stamp, status.coil_temperature_celsius)
 
-    def _watch_coil(self, stamped: Stamped, received: int) -> None:
-        sample, now = stamped.sample, self._clock.now(received)
-        self.link.held = self._health.hold(now)
-        taken = self._clock.taken(received)
-        self._switch_off(self._coil.judge(sample.coil_current, sample.enabled, taken, now))
+    def _take_foreign_setpoint(self, message: can.Message) -> None:
+        try:
+            _, setpoint = self._codec.decode_setpoint(message.data)
+        except (WrongCrcError, WrongLengthError):
+            return  # nor do the electronics use it; their status tells of it
+        self._switch_off(self.guard.judge_foreign(setpoint, self._now()))
+        with self._sending:
+            # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
+            if self._accepting:
+                self._send(self.link.off())
 
-    def _switch_off(self, fault: str) -> None:
-        """Send 0 A and let no setpoint pass any more if there is a first fault."""
-        if fault and not self.link.fault:
-            with self._sending:
-                self._send(self.link.switch_off(fault))
+    def _switch_off(self, fault: Fault | None) -> None:
+        """Send 0 A and let no setpoint pass any more; the first fault stays, but for a graver one."""
+        link = self.link
+        if fault is None or (link.fault and not (link.needs_initialisation > fault.needs_initialisation)):
+            return
+        with self._sending:
+            self._send(link.switch_off(*fault))
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
@@ -225,7 +236,7 @@ class Exchange:
             self.unsent_reason = self.trouble
             return False
         try:
-            self._coil.note_sent(setpoint.current, self._now())
+            self.guard.note_sent(setpoint, self._now())
             self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
             bus.send(self._frame)
         except Exception as error:

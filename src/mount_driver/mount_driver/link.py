@@ -18,8 +18,10 @@ from mount_models.sampling import SAMPLE_TIME_NS
 _REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 20 ms are refused anyway
 _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFF_FFFF
+_DISAGREEMENT_US = 10_000  # chosen: from one sample to the next its two counters agree to this
 _LATE_US = 1_000_000  # chosen: beyond it a step of the clock back is a restart, forward a pause
 _SAMPLE_TIME_US = SAMPLE_TIME_NS // 1000
+_MEASURED = 6  # fields of a measurement, without its status bits: when sent again these are the same
 _SLACK = 2  # samples, chosen: more may have been taken in a time than fit in by the clock's steps
 
 
@@ -66,6 +68,10 @@ class Link:
         """Measurement frames by `Arrival`."""
         self.lost = 0
         """Samples missing by their SampleCounter."""
+        self.jumps = 0
+        """Samples at which SampleCounter and Microseconds contradict each other, within a second."""
+        self.contradictions = 0
+        """Samples that came once more with another content."""
         self.invalid_displacements = 0
         self.latest: Stamped | None = None
         """The newest sample."""
@@ -75,12 +81,18 @@ class Link:
 
         self.fault = ''
         """Why the coil is off for as long as this link lasts; empty while it may be on."""
+        self.needs_initialisation = False
+        """Whether nothing but a new initialisation is needed to end the fault."""
         self.held = ''
         """Why every answer is lowered to 0 A at present; empty while none is."""
+        self.current_limit = codec.current.high
+        """What the coil may carry at present, A."""
         self.setpoints = 0
         """Setpoints that were let through."""
         self.limited = 0
         """Of these, limited to the greatest current."""
+        self.derated = 0
+        """Of these, limited further because the coil is warm."""
         self.refusals = dict.fromkeys(Refusal, 0)
         self.last_refusal: Refusal | None = None
         self.timeouts = 0
@@ -143,6 +155,9 @@ class Link:
         if current > self._highest_current:
             self.limited += 1
             current = self._highest_current
+        if current > self.current_limit:
+            self.derated += 1
+            current = self.current_limit
         if self.held:
             current = 0.0
         self.setpoints += 1
@@ -156,9 +171,9 @@ class Link:
         self.refusals[reason] += 1
         self.last_refusal = reason
 
-    def switch_off(self, fault: str) -> Setpoint:
+    def switch_off(self, fault: str, needs_initialisation: bool) -> Setpoint:
         """Refuse all setpoints from now on; return the one that switches the coil off."""
-        self.fault = fault
+        self.fault, self.needs_initialisation = fault, needs_initialisation
         return self.off()
 
     def answer_again(self, sample_counter: int, now: int) -> Setpoint | None:
@@ -220,15 +235,23 @@ class Link:
         last = self.latest.sample
         step = (sample.sample_counter - last.sample_counter) & _COUNTER_MASK
         step_us = (sample.microseconds - last.microseconds) & _MICROSECOND_MASK
-        if step == 1 and step_us < _LATE_US:
+        if step == 1 and 0 < step_us < _DISAGREEMENT_US:
             return Arrival.NEW
         if step == 0 and step_us == 0:
+            self.contradictions += sample[:_MEASURED] != last[:_MEASURED]
             return Arrival.RESENT
         back_us = _MICROSECOND_MASK + 1 - step_us
         if back_us < _LATE_US and _COUNTER_MASK + 1 - step <= _REMEMBERED:
             return Arrival.LATE
-        # Behind a restart or a pause the counters say nothing: the clock counts it, once. Nor were more
-        # samples taken than there was time for.
+        # Behind a restart or a pause the counters say nothing: the clock counts it, once.
+        if step_us < _LATE_US and not self._agree(step, step_us):
+            self.jumps += 1
+        # Nor were more samples taken than there was time for.
         if step > 1 and (step - _SLACK) * _SAMPLE_TIME_US <= step_us < _LATE_US:
             self.lost += step - 1
         return Arrival.NEW
+
+    @staticmethod
+    def _agree(step: int, step_us: int) -> bool:
+        """Whether so many samples fit into so many microseconds; neither counter may stand still alone."""
+        return step > 0 and step_us > 0 and abs(step_us - step * _SAMPLE_TIME_US) < _DISAGREEMENT_US

@@ -9,12 +9,15 @@ from mount_driver.diagnosis import LinkWatch, judge, snapshot
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal, Stamped
 from mount_driver.parameters import DriverParameters
+from mount_driver.watches.heat_watch import HeatWatch
+from mount_models.coil.heating import check_heating
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
-from mount_ros.nodes.parameters import declare, read
+from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import Urgent
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
@@ -23,9 +26,14 @@ _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses
 class MountDriver(SafeLifecycleNode):
     """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
 
+    urgent = Urgent(frozenset({'data', 'can_receive'}))
+
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
         declare(self, DriverParameters())
+        self.declare_parameter('parameters_file', '')
+        self.declare_parameter('specimen', '')
+        self._of_specimen = SpecimenValues(self)
         self._settings = DriverParameters()
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
@@ -38,7 +46,10 @@ class MountDriver(SafeLifecycleNode):
         self._setpoint_layout = ScalarsLayout(CURRENT_SETPOINT)
 
     def configure(self) -> None:
+        self._take_specimen()
         self._settings = read(self, DriverParameters())
+        check_heating(self._settings.heating)
+        self._heat = HeatWatch(self._settings.heating)
         self._codec = MountCodec()
         path = self.open_data_path()
         self._publish_displacement = path.sender(DISPLACEMENT)
@@ -55,7 +66,12 @@ class MountDriver(SafeLifecycleNode):
         epoch_offset = time.time_ns() - time.monotonic_ns()
         clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
         exchange = Exchange(
-            self._settings, self._codec, clock, self._on_sample, on_temperature=self._on_temperature
+            self._settings,
+            self._codec,
+            clock,
+            self._on_sample,
+            on_temperature=self._on_temperature,
+            heat=self._heat,
         )
         self._watch = LinkWatch()
         self._started_ns = time.monotonic_ns()
@@ -85,6 +101,15 @@ class MountDriver(SafeLifecycleNode):
             return Verdict(Level.OK, 'inactive')
         now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
         return judge(now, self._watch.earlier(now), self._settings, lockstep=self.lockstep)
+
+    def _take_specimen(self) -> None:
+        file = str(self.get_parameter('parameters_file').value)
+        if not file:
+            return  # the defaults are the shipped specimen's, and its other parts take a second to load
+        from mount_models.specimen import chosen_specimen
+
+        specimen = chosen_specimen(file, str(self.get_parameter('specimen').value))
+        self._of_specimen.give(DriverParameters().heating, 'heating', specimen.heating._asdict())
 
     def _on_sample(self, stamped: Stamped) -> None:
         stamp, sample = stamped

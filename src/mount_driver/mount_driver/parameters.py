@@ -3,8 +3,10 @@
 from typing import Annotated, NamedTuple
 
 from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
-from mount_driver.coil_watch import CoilWatchParameters
-from mount_driver.status_watch import StatusLimits
+from mount_driver.watches.coil_watch import CoilWatchParameters
+from mount_driver.watches.sender_watch import SenderLimits
+from mount_driver.watches.status_watch import StatusLimits
+from mount_models.coil.heating import CoilHeating
 from mount_models.quantity import Quantity
 from mount_models.sampling import SETPOINT_TIMEOUT
 
@@ -46,3 +48,5 @@ class DriverParameters(NamedTuple):
     ] = 120.0
     coil: CoilWatchParameters = CoilWatchParameters()
     status: StatusLimits = StatusLimits()
+    senders: SenderLimits = SenderLimits()
+    heating: CoilHeating = CoilHeating()

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from mount_driver.coil_watch import CoilWatch, CoilWatchParameters
 from mount_driver.quantisation import quantised_coil_current
+from mount_driver.watches.coil_watch import CoilWatch, CoilWatchParameters
 
 MS = 1_000_000
 LIMITS = CoilWatchParameters()

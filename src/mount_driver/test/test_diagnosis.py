@@ -48,7 +48,21 @@ def test_a_sound_link_is_ok_with_its_figures():
         ({'corrupt': 5}, Level.WARN, '0 samples lost and 5 frames corrupt'),
         ({'invalid_displacements': 3}, Level.WARN, 'not valid in 3 samples'),
         ({'gaps': 1}, Level.WARN, 'no samples for more than 1 s; check their supply .* activate the graph'),
-        ({'restarts': 1}, Level.WARN, 'have restarted'),
+        (
+            {'fault': 'x', 'other_senders': 3, 'other_sender_age': 0.1},
+            Level.ERROR,
+            'x, then .* again; it still sends',
+        ),
+        (
+            {'fault': 'x', 'other_senders': 3, 'other_sender_age': 9.0},
+            Level.ERROR,
+            'again; silent for more than 1 s',
+        ),
+        (
+            {'celsius': 150.04, 'current_limit': 2.0},
+            Level.WARN,
+            r'about 150 degC by the thermal model: .* 2\.0 A \(lowered from 140 .* 170 degC\); damp less',
+        ),
         ({'repeated': 7}, Level.WARN, '7 frames repeated and 0 of wrong sequence'),
         ({'wrong_sequence': 1}, Level.WARN, '1 of wrong sequence .* not used; did the electronics restart'),
         (
@@ -78,6 +92,13 @@ def test_a_fault_of_the_coil_ends_a_supervised_run(lockstep):
     figures = verdict(fault='too hot', lockstep=lockstep).figures
     assert (figures['switched_off'], figures['fatal']) == (True, True)
     assert not verdict(lockstep=True).figures['fatal']
+
+
+def test_a_fault_that_an_initialisation_alone_mends_says_so_and_ends_nothing():
+    figures = verdict(fault='restarted', needs_initialisation=True).figures
+    assert (figures['switched_off'], figures['fatal'], figures['needs_initialisation']) == (True, False, True)
+    for figures in (verdict().figures, verdict(fault='too hot').figures):
+        assert not figures['needs_initialisation']
 
 
 def test_setpoints_that_do_not_reach_the_electronics_are_noticed():

@@ -1,10 +1,10 @@
 """How long a current stands on the bus: time is told by the test, so no machine is too slow for it."""
 
-import itertools
 import re
 
 import pytest
-from far_end import CODEC, FarEnd, sample
+from car import GOOD, MS, Car
+from far_end import CODEC, sample
 
 from mount_driver import exchange as exchange_module
 from mount_driver.clock import ElectronicsClock
@@ -16,68 +16,7 @@ from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
 from mount_ros.testing import wait_until
 
-MS = 1_000_000
 HOLD = 20 * MS
-GOOD = 100  # samples that are answered as they should be, before something goes wrong
-_channels = itertools.count()
-
-
-class Car:
-    """Electronics, driver and a node on a virtual bus, sample by sample, by a steady clock of its own."""
-
-    def __init__(self):
-        channel = f'test_hold_{next(_channels)}'
-        self.now = 0
-        self.far = FarEnd('virtual', channel, 0)
-        self.stamps, self.sent = [], []  # of the samples that arrived; (time, setpoint) on the bus
-        self.exchange = Exchange(
-            DriverParameters(interface='virtual', channel=channel),
-            CODEC,
-            ElectronicsClock(10**18),
-            lambda stamped: self.stamps.append(stamped.stamp),
-            steady=lambda: self.now,
-        )
-        self.exchange.start(threaded=False)
-
-    def drive(self, milliseconds, node, electronics=None):
-        """Each ms `electronics(index)` send, the driver takes it and looks at the clock, `node()` answers."""
-        for _ in range(milliseconds):
-            self.now += MS
-            (electronics or self.send_sample)(self.now // MS)
-            while self.exchange.poll():
-                pass
-            node()
-            self.look()
-            self.now += 1  # what ends behind 20 ms ends here
-            self.exchange.watch()
-            self.look()
-            self.now -= 1
-
-    def send_sample(self, index):
-        self.far.send(sample(index, coil_current=self.on_bus().current if self.sent else 0.0))
-        if index % 100 == 0:
-            self.far.send_status(Status(14.0, 20.0))
-
-    def answer(self):
-        """Answer the newest sample with 3 A."""
-        self.exchange.send_setpoint(self.stamps[-1], 3.0)
-
-    def look(self):
-        """Note what is on the bus."""
-        while (frame := self.far.bus.recv(0.0)) is not None:
-            self.sent.append((self.now, CODEC.decode_setpoint(frame.data)[1]))
-
-    def on_bus(self):
-        """Return the setpoint that stands on the bus."""
-        return self.sent[-1][1]
-
-    def went_off(self):
-        """Return how long after the last good sample the current went to 0 A for good."""
-        current = [index for index, (_, setpoint) in enumerate(self.sent) if setpoint.current > 0.0]
-        assert len(current) == GOOD
-        time, off = self.sent[current[-1] + 1]
-        assert off == Setpoint(0.0, GOOD, False)
-        return time - GOOD * MS
 
 
 @pytest.fixture
@@ -117,10 +56,10 @@ def test_a_frozen_measurement_frame_feeds_nothing(car):
 
 
 def test_a_frozen_sample_in_frames_that_live_feeds_nothing(car):
-    car.drive(15, car.answer, electronics=lambda _: car.far.send(sample(GOOD)))
+    car.drive(15, car.answer, electronics=lambda _: car.far.send(sample(GOOD, coil_current=3.0)))
     again, car.sent = [setpoint for _, setpoint in car.sent[GOOD:]], car.sent[:GOOD]
     assert set(again) == {Setpoint(3.0, GOOD, True)}  # the answer once more, for electronics that missed it
-    car.drive(3000, car.answer, electronics=lambda _: car.far.send(sample(GOOD)))
+    car.drive(3000, car.answer, electronics=lambda _: car.far.send(sample(GOOD, coil_current=3.0)))
     later = [(time, setpoint) for time, setpoint in car.sent if setpoint.enable]
     assert later[-1][0] <= GOOD * MS + HOLD
     assert not car.on_bus().enable

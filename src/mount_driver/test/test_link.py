@@ -80,6 +80,14 @@ def test_the_same_sample_again_is_resent_and_not_handed_on(link):
     assert link.arrivals[Arrival.RESENT] == 2
 
 
+def test_the_same_sample_again_with_other_values_is_a_contradiction(link):
+    feed(link, [10, 11])
+    link.take(frame(11, alive=2, setpoint_timeout=True), 12 * MS)  # which may come true meanwhile
+    assert link.contradictions == 0
+    link.take(frame(11, alive=3, displacement=0.002), 12 * MS)
+    assert (link.contradictions, link.arrivals[Arrival.RESENT]) == (1, 2)
+
+
 def test_the_same_frame_again_is_no_sample_at_all(link):
     feed(link, [10, 11])
     assert link.take(frame(11, alive=1), 12 * MS) is None

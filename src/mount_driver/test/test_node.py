@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from dataclasses import replace
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -21,6 +23,8 @@ from rclpy.parameter import Parameter
 from mount_driver.codec import Setpoint, Status
 from mount_driver.link import Arrival, Refusal
 from mount_driver.node import MountDriver
+from mount_models.coil.heating import CoilHeating
+from mount_models.specimen import default_specimen, save_specimen
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.messages.temperature import temperature_of
@@ -124,6 +128,40 @@ def test_frames_become_topics_with_true_stamps_and_values(active, controller, fa
     for k, (stamp, (current, flux), slopes) in enumerate(controller.received[COIL_RIPPLE]):
         assert (stamp, current, slopes) == (k * MS, pytest.approx(0.02 * k, abs=1e-12), (250.0, 80.0))
         assert math.isnan(flux)
+
+
+def test_a_data_thread_that_stands_still_costs_the_current_for_the_watch_has_a_thread_of_its_own(
+    active, controller, far, monkeypatch
+):
+    """As in composed nodes, where control and driver stand still with the same thread."""
+    driver = active(lockstep=False)
+    answer = controller._take
+
+    def answering(topic, raw):
+        answer(topic, raw)
+        if topic is DISPLACEMENT:
+            controller.setpoint(stamp_of(raw), 0.05)  # below what the watch of the coil would miss
+
+    monkeypatch.setattr(controller, '_take', answering)
+    far.stream()
+    far.setpoint_where(lambda setpoint: setpoint.current > 0.0)
+    standing, release = threading.Event(), threading.Event()
+
+    def stand_still():
+        standing.set()
+        release.wait(LIMIT)
+
+    blocker = threading.Thread(target=driver.data_path._thread.change, args=(stand_still,))
+    blocker.start()
+    try:
+        assert standing.wait(LIMIT)
+        off = [far.setpoint_where(lambda setpoint: not setpoint.enable) for _ in range(5)]
+        assert {setpoint.current for setpoint in off} == {0.0}
+        assert not release.is_set()
+        assert driver.judge().figures['setpoint_timeouts'] >= 1
+    finally:
+        release.set()
+        blocker.join()
 
 
 def test_the_coil_temperature_of_a_status_has_the_stamp_of_the_last_sample(active, controller, far):
@@ -357,3 +395,15 @@ def test_the_codec_of_the_far_end_is_that_of_the_driver(make_driver):
     driver = make_driver()
     assert driver.trigger_configure() == SUCCESS
     assert driver._codec.measurement.data_id == CODEC.measurement.data_id
+
+
+def test_the_driver_takes_the_heating_of_a_specimen_file(make_driver, tmp_path):
+    file = tmp_path / 'left.yaml'
+    save_specimen(replace(default_specimen(), heating=CoilHeating(time_constant=100.0)), file)
+    driver = make_driver(**{'parameters_file': str(file), 'heating.ambient_celsius': 60.0})
+    assert driver.trigger_configure() == SUCCESS
+    assert driver._settings.heating == CoilHeating(time_constant=100.0, ambient_celsius=60.0)
+
+
+def test_a_heating_that_makes_no_sense_is_refused(make_driver):
+    assert make_driver(**{'heating.limit_celsius': 130.0}).trigger_configure() == FAILURE

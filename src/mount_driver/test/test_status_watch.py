@@ -6,7 +6,7 @@ import re
 import pytest
 
 from mount_driver.codec import Status
-from mount_driver.status_watch import StatusLimits, StatusWatch
+from mount_driver.watches.status_watch import StatusLimits, StatusWatch
 
 MS = 1_000_000
 SOUND = Status(14.0, 60.0)

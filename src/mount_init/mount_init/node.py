@@ -54,6 +54,7 @@ class MountInit(SafeLifecycleNode):
 
     def activate(self) -> None:
         assert self._dialogue is not None
+        self.real_time.begin(self)  # the ramp is part of the activation
         self._resume_streams()
         parameters = self._init_parameters
         self._dialogue.await_quiet(parameters.quiet_duration, self.ending)

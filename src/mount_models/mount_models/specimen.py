@@ -19,13 +19,14 @@ import yaml
 from mount_models.actuator.law import ForceLaw
 from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
+from mount_models.coil.heating import CoilHeating, check_heating
 from mount_models.coil.temperature import CompensationError, TemperatureCompensation, check_compensation
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_coefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.provenance import ProvenanceError, check_provenance
-from mount_models.quantity import Quantity, quantities
+from mount_models.quantity import ParameterError, Quantity, quantities
 from mount_models.sampling import HIGHEST_CURRENT
 
 T = TypeVar('T', bound=NamedTuple)
@@ -45,7 +46,8 @@ class Specimen:
     """One actuator with its coil, springs and pads, as the controller knows it; SI units throughout.
 
     `friction` holds what was identified of `FrictionCoefficients` and `FrictionContact`, by their names; what
-    is not in it keeps its default. Without `temperature` the gap curves hold at one temperature only.
+    is not in it keeps its default. Without `temperature` the gap curves hold at one temperature only; a file
+    without `heating` has its defaults.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Specimen:
         float, Quantity('A', 'largest current of the coil', 0.1, 20.0, 'section 3.2')
     ] = HIGHEST_CURRENT
     temperature: TemperatureCompensation | None = None
+    heating: CoilHeating = field(default_factory=CoilHeating)
     friction: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
 
@@ -150,6 +153,8 @@ def specimen_from_mapping(content: Any) -> Specimen:
     """Return the checked specimen described by plain dictionaries and lists, or raise `SpecimenError`."""
     hints = get_type_hints(Specimen)
     _check_version(content)
+    if isinstance(content, Mapping):
+        content = {'heating': CoilHeating()._asdict(), **content}
     values = _complete(content, ['schema_version', *hints], 'specimen')
     del values['schema_version']
     for name, kind in hints.items():
@@ -174,6 +179,12 @@ def checked_specimen(specimen: Specimen) -> Specimen:
             check_compensation(specimen.temperature, specimen.gap_curves)
     except (ForceLawRefusedError, GapCurvesRefusedError, CompensationError) as error:
         raise SpecimenError(f'{error}') from error
+    for name, quantity in quantities(CoilHeating).items():
+        _check_limits(getattr(specimen.heating, name), quantity, f'heating.{name}')
+    try:
+        check_heating(specimen.heating)
+    except ParameterError as error:
+        raise SpecimenError(f'heating: {error}') from error
     _check_friction(specimen.friction)
     try:
         check_provenance(specimen.provenance)

@@ -8,7 +8,7 @@ from typing import Any
 
 from mount_bags.bag.recording import Recording
 from mount_bags.run.folder import RunFolder, make_run_folder
-from mount_bags.run.place import open_run
+from mount_bags.run.place import open_mount
 from mount_bags.run.session import session_parameters, time_text
 from mount_bags.run.versions import versions
 from mount_bringup.chosen import (
@@ -42,7 +42,8 @@ REPLAYED_NODES = ('mount_control', 'mount_init')
 class ReplayOrder:
     """What the user orders; `changes` are parameters other than those recorded, {node: {parameter: value}}.
 
-    `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one.
+    `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one. `mount` is which
+    of several mounts is replayed.
     """
 
     recording: Path
@@ -52,6 +53,7 @@ class ReplayOrder:
     foreign: ForeignOrder | None = None
     out: Path | None = None
     domain: int = 0
+    mount: str = ''
 
 
 @dataclass
@@ -174,7 +176,7 @@ def _read(order: ReplayOrder) -> tuple[ReplayInput, float, float]:
         given.notes.insert(0, sentence)
         return given, time.perf_counter() - begin, 0.0
     begin = time.perf_counter()
-    recording = open_run(order.recording)
+    recording = open_mount(order.recording, order.mount)
     decoding_time = _load_displacement(recording)
     reading_time = time.perf_counter() - begin
     gap, sentence = chosen_gap(order.table, {}) if order.table else (None, '')

@@ -19,7 +19,7 @@ class Graph:
     """A graph whose recorder has failed, looked at a thousand times until the simulator has finished."""
 
     def __init__(self, *_):
-        self.notes = []
+        self.notes, self.restarts = [], []
 
     def start(self, session, status):
         pass

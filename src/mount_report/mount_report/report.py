@@ -117,6 +117,9 @@ def _names(recordings: Sequence[Recording]) -> list[str]:
     names = [recording.path.absolute() for recording in recordings]
     for parts in (1, 2, 3):
         short = ['/'.join([each for each in path.parts if each != 'recording'][-parts:]) for path in names]
+        short = [
+            f'{name} {recording.mount}'.strip() for name, recording in zip(short, recordings, strict=True)
+        ]
         if len(set(short)) == len(short):
             return short
     return [f'{number}: {path}' for number, path in enumerate(names, 1)]

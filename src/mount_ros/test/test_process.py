@@ -130,11 +130,13 @@ def test_nodes_whose_starter_is_killed_are_closed_and_say_so(start, monkeypatch,
             starter.kill()
             starter.wait()
         process = start(1, environment=environment)
-        process.wait_for('one served')
+        if not ends_before:
+            process.wait_for('one served')
         starter.kill()
         code, errors = process.end()
     assert code == 0
-    assert errors == '[ERROR] [one]: the process that started this one has ended, so this one ends too\n'
+    who = f'the process that started this one ({starter.pid})'
+    assert errors == f'[ERROR] [one]: {who} has ended, so this one ends too, at 0 A: start the graph again\n'
     assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
 
 
@@ -181,6 +183,7 @@ def test_the_end_of_the_data_thread_ends_the_process_with_the_reason_and_code_1(
 SLEEPER = """
 import signal, threading
 from mount_ros.nodes.process import _Ending
+from mount_ros.nodes.real_time import RealTime
 over = _Ending()
 over.listen(signal.SIGTERM)
 
@@ -188,7 +191,7 @@ def take_the_signal():  # the main thread is asleep and is not interrupted
     signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
 
 threading.Timer(0.2, take_the_signal).start()
-over.wait()
+over.wait(RealTime(0), print)
 print('awake')
 """
 

@@ -1,19 +1,109 @@
-"""Threads of the middleware that spin must not run in real time."""
+"""The names by which the threads of the data are found, and real time that a process was started in."""
 
 import os
+import subprocess
+import sys
 
 import pytest
 
-from mount_ros.nodes.scheduling import calm_resending, resending_threads
+from mount_ros.nodes.scheduling import Threads
+from mount_ros.testing import LIMIT
 
 
-def test_threads_that_send_again_are_taken_out_of_real_time(context):
-    threads = resending_threads()
-    assert threads, 'the middleware names its threads otherwise: mount_ros.nodes.scheduling must know'
-    try:
-        for thread in threads:
-            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(1))
-    except PermissionError:
-        pytest.skip('real-time scheduling is not permitted here')
-    calm_resending()
-    assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_OTHER}
+def may_be_urgent():
+    """Return whether this process may run in real time, tried by a process of its own."""
+    program = 'import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(12))'
+    return subprocess.run([sys.executable, '-c', program], capture_output=True).returncode == 0
+
+
+needs_real_time = pytest.mark.skipif(
+    not may_be_urgent(),
+    reason='SCHED_FIFO is not permitted here: root, CAP_SYS_NICE or RLIMIT_RTPRIO is needed',
+)
+
+
+def test_the_middleware_names_its_threads_as_those_that_carry_the_data_are_told_by(context):
+    from rclpy.node import Node
+
+    node = Node('named', context=context)
+    names = set(Threads().names().values())
+    node.destroy_node()
+    for beginning in ('dds.shm.wdog', 'dds.shm.', 'dds.asyn', 'dds.ev'):
+        assert any(name.startswith(beginning) for name in names), f'{beginning} is not among {sorted(names)}'
+
+
+def test_threads_of_python_are_found_by_their_own_names():
+    threads = Threads()
+    assert threads.names()[threads.own] == 'MainThread'
+    assert 0.0 < threads.processor_time(threads.own) < 3600.0
+
+
+INHERITING = """
+import os, threading
+from mount_ros.nodes.scheduling import drop_real_time
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+print(drop_real_time(), {os.sched_getscheduler(int(task)) for task in os.listdir('/proc/self/task')})
+"""
+
+
+@needs_real_time
+def test_a_process_started_in_real_time_becomes_ordinary_with_all_its_threads():
+    def start_urgent():
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(3))
+
+    process = subprocess.run(
+        [sys.executable, '-c', INHERITING],
+        preexec_fn=start_urgent,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert process.stdout == f'3 {{{os.SCHED_OTHER}}}\n'
+
+
+SPINNING = """
+import os, threading
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.process import run_nodes
+
+def policy(name):
+    thread, = (thread for thread in threading.enumerate() if thread.name == name)
+    policy = os.sched_getscheduler(thread.native_id) & ~os.SCHED_RESET_ON_FORK
+    return policy, os.sched_getparam(thread.native_id).sched_priority
+
+class Spinning(SafeLifecycleNode):
+    def __init__(self):
+        super().__init__('spinning')
+        self.create_timer(0.1, self._turn)
+        self.turn = iter(['configure', 'activate'])
+    def configure(self):
+        path = self.open_data_path()
+        path.attend(lambda: True)  # never sleeps: there is always something to do
+    def _turn(self):
+        getattr(self, 'trigger_' + next(self.turn, 'nothing'), lambda: None)()
+        if self.real_time.held:
+            self.active_policy = policy('data')
+        if self.active and self.real_time.given_back:
+            print(self.active_policy, policy('data'), policy('MainThread'), flush=True)
+            print(self.sentence, flush=True)
+            os.kill(os.getpid(), 15)
+
+run_nodes([Spinning])
+"""
+
+
+@needs_real_time
+def test_a_loop_that_spins_in_real_time_is_stepped_down_and_the_process_ends_as_any_other(domain):
+    process = subprocess.run(
+        [sys.executable, '-c', SPINNING],
+        env={**os.environ, 'ROS_DOMAIN_ID': str(domain), 'ENGINE_MOUNT_PRIORITY': '10'},
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert process.returncode == 0, process.stderr
+    policies, sentence = process.stdout.splitlines()[:2]
+    fast, ordinary = (int(os.SCHED_FIFO), 10), (int(os.SCHED_OTHER), 0)
+    assert policies == f'{fast} {ordinary} {ordinary}'
+    assert sentence.startswith('real-time priority 10 given back: ')
+    assert sentence in process.stderr

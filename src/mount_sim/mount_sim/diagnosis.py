@@ -1,11 +1,15 @@
 """The simulator's verdict on itself, from figures alone."""
 
+import math
+from collections.abc import Mapping
+
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.simulated_mount import FARTHEST_DISPLACEMENT, Run
 
 DRIVING, FINISHED = 'driving', 'finished'
+_OF_EACH = ('answered', 'latency_median_s', 'latency_p99_s', 'beyond_range', 'first_beyond_range_s')
 LATE_SHARE = 0.05  # chosen: of the samples; beyond it the machine is too busy for real time
 
 
@@ -43,6 +47,28 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
             values,
         )
     return Verdict(Level.OK, DRIVING, values)
+
+
+def car_verdict(figures: Mapping[str, LoopFigures], run: Run, *, lockstep: bool) -> Verdict:
+    """Return the verdict on several mounts: the worst of them by name, and their figures as `left.answered`.
+
+    Of common figures that of the mount with the fewest samples or the greatest latency counts.
+    """
+    verdicts = {name: verdict(each, run, lockstep=lockstep) for name, each in figures.items()}
+    last = min(verdicts.values(), key=lambda each: int(str(each.figures['samples'])))
+    values = dict(last.figures)
+    for name, each in verdicts.items():
+        values |= {f'{name}.{key}': each.figures[key] for key in _OF_EACH}
+    values['answered'] = sum(each.answered for each in figures.values())
+    for key in ('latency_median_s', 'latency_p99_s'):
+        values[key] = max(str(each.figures[key]) for each in verdicts.values())
+    beyond = [each.beyond_range for each in figures.values() if each.beyond_range.samples]
+    values['beyond_range'] = sum(each.samples for each in beyond)
+    values['first_beyond_range_s'] = f'{min((each.first for each in beyond), default=math.nan):.3f}'
+    name, worst = max(verdicts.items(), key=lambda item: item[1].level)
+    if worst.level is Level.OK or worst.figures['fatal']:
+        return Verdict(worst.level, worst.sentence if worst.figures['fatal'] else last.sentence, values)
+    return Verdict(worst.level, f'{name}: {worst.sentence}', values)
 
 
 def beyond_range_sentence(samples: int, first: float) -> str:

@@ -11,10 +11,12 @@ from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import STATUS_EVERY, ElectronicsParameters
-from mount_sim.electronics.faults import Fault
+from mount_sim.plant.simulated_car import CarMount
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
-_LOCKSTEP_WAIT = 0.1  # s: how often it looks whether it shall end
+LOCKSTEP_WAIT = 0.1
+"""Seconds: how often a loop in lock-step looks whether it shall end."""
+
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
 
@@ -41,20 +43,19 @@ class ElectronicsLoop:
 
     def __init__(
         self,
-        mount: SimulatedMount,
+        mount: SimulatedMount | CarMount,
         can_end: CanEnd,
         electronics: ElectronicsParameters,
-        fault: Fault,
         publish: Callable[[int], None],
     ):
         self._mount = mount
         self._can_end = can_end
         self._electronics = electronics
-        self._fault = fault
         self._publish = publish
         self._sent_at = [math.nan] * _REMEMBERED
         self._asked: int | None = None  # lock-step: the sample that waits for its answer
         self._answer: ReceivedSetpoint | None = None
+        self._counted = 0  # the newest sample as the electronics count it, not yet cut to its width
         self._asked_at = 0.0
         self._answered_first = math.nan
         self._failed_told = 0  # setpoint frames that had failed their check by the last status
@@ -85,7 +86,7 @@ class ElectronicsLoop:
     def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
         """Sample as fast as the answers come; raise `NoAnswerError` after `patience` s without one."""
         while not self.finished and not ending.is_set():
-            self.step_in_lockstep(patience, _LOCKSTEP_WAIT)
+            self.step_in_lockstep(patience, LOCKSTEP_WAIT)
 
     def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
         """Take the next sample if the last one is answered within `wait` s; return whether it was.
@@ -101,9 +102,9 @@ class ElectronicsLoop:
             self._take_answer(answer)
         if self._mount.finished:
             return False
-        self._asked, self._asked_at = self._mount.sample, time.monotonic()
         answer, self._answer = self._answer, None
         self._tick(answer)
+        self._asked, self._asked_at = self._counted, time.monotonic()
         return True
 
     @property
@@ -112,27 +113,42 @@ class ElectronicsLoop:
         return self._mount.finished and self._asked is None
 
     def _tick(self, received: ReceivedSetpoint | None) -> None:
-        mount, number, now = self._mount, self._mount.sample, self._mount.time
-        taken = self._valid(received, now)
-        reading = self._fault.reading(now, mount.measure())
-        frame = self._can_end.measurement_frame(
-            number, number * SAMPLE_TIME_NS // _NS, reading, mount.driver_on
-        )
-        arriving = self._fault.frame(now, number, frame)
-        self._sent_at[number % _REMEMBERED] = time.time()
-        if arriving is not None:
-            self._can_end.send_frame(arriving)
+        mount, number = self._mount, self._mount.sample
+        reading = mount.measure()
+        microseconds = self._count(number)
+        taken = self._valid(received)
+        frames = [
+            self._can_end.measurement_frame(
+                self._counted, microseconds, reading, enabled=mount.driver_on, unheard=not mount.enabled
+            )
+        ]
         if number % STATUS_EVERY == 0:
-            self._can_end.send_status(self._fault.status(now, self._status()))
+            frames.append(self._can_end.status_frame(mount.faults.status(self._status())))
+        if mount.faults.present:
+            frames = mount.faults.on_bus(frames)
+        self._sent_at[self._counted % _REMEMBERED] = time.time()
+        for frame in frames:
+            self._can_end.send_frame(frame)
         self._publish(number)
-        mount.advance(*taken, lambda wanted: self._fault.driven(now, wanted))
+        mount.advance(*taken)
         self.figures.samples += 1
 
-    def _valid(self, received: ReceivedSetpoint | None, now: float) -> tuple[float | None, int]:
+    def _count(self, number: int) -> int:
+        """Note sample `number` as the electronics count it; return their clock in us."""
+        faults, microseconds = self._mount.faults, number * SAMPLE_TIME_NS // _NS
+        self._counted = number
+        if faults.present:
+            self._counted, microseconds = faults.counted(number, microseconds)
+            if faults.restarts:
+                self._can_end.restart()
+                self._mount.forget()
+        return microseconds
+
+    def _valid(self, received: ReceivedSetpoint | None) -> tuple[float | None, int]:
         """Return the current (A) to take over, None if there is none, and how many samples late it is."""
-        if received is None or self._fault.deaf(now):
+        if received is None or self._mount.faults.deaf:
             return None, 0
-        late = received.late(self._mount.sample)
+        late = received.late(self._counted)
         if late >= self._mount.patience:
             return None, 0  # an answer to a sample of the past must not keep the coil on
         self._note(received)

@@ -5,13 +5,13 @@ from typing import Annotated, NamedTuple
 from mount_models.actuator.closing import ClosingMechanics
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.ripple import RippleCoil
+from mount_models.engine_body import RigidEngine
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.hydromount import Hydromount
 from mount_models.quantity import Quantity
 from mount_models.vehicle import Engine, Vehicle
 from mount_sim.electronics.electronics import ElectronicsParameters
-from mount_sim.electronics.faults import FaultParameters
 from mount_sim.electronics.warm_coil import TemperatureCoefficients
 from mount_sim.excitation.scenario import (
     BenchScenario,
@@ -22,6 +22,7 @@ from mount_sim.excitation.scenario import (
     Timeline,
 )
 from mount_sim.plant.mounts import seated_mount
+from mount_sim.plant.places import Places
 from mount_sim.plant.plant import Plant
 
 
@@ -30,6 +31,7 @@ class SimParameters(NamedTuple):
 
     scenario: str = 'motorway'
     mount: str = 'friction'
+    mounts: str = ''
     seed: Annotated[int, Quantity('1', 'seed of noise and road', 0, 2**31 - 1, 'chosen')] = 1
     timeline: Timeline = Timeline()
     bench: BenchScenario = BenchScenario()
@@ -44,9 +46,11 @@ class SimParameters(NamedTuple):
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
     vehicle: Vehicle = Vehicle()
+    engine: RigidEngine = RigidEngine()
+    places: Places = Places()
     hydromount: Hydromount = Hydromount()
     electronics: ElectronicsParameters = ElectronicsParameters()
-    fault: FaultParameters = FaultParameters()
+    faults: tuple[str, ...] = ()
 
     @property
     def plant(self) -> Plant:

@@ -9,6 +9,7 @@ import pytest
 
 from mount_models.arithmetic.series import series_of
 from mount_models.quantity import with_flattened
+from mount_sim.electronics.faults.schedule import Faults
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.simulated_mount import SimulatedMount
@@ -41,7 +42,8 @@ def make_mount() -> Callable[..., SimulatedMount]:
             values = excitation.values[:]
             spoil(values)
             excitation = replace(excitation, values=series_of(values))
-        return SimulatedMount(chosen.plant, excitation, chosen.seed)
+        faults = Faults(chosen.faults, chosen.seed)
+        return SimulatedMount(chosen.plant, excitation, chosen.seed, faults)
 
     return make
 

@@ -9,13 +9,12 @@ import pytest
 
 from mount_driver.bus import open_bus
 from mount_driver.clock import ElectronicsClock
-from mount_driver.codec import MountCodec
+from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.exchange import Exchange
 from mount_driver.frame import Frame
 from mount_driver.parameters import DriverParameters
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters
-from mount_sim.electronics.faults import Fault, FaultParameters
 from mount_sim.loop import ElectronicsLoop
 
 CODEC = MountCodec()
@@ -37,7 +36,6 @@ class Car:
             mount,
             self._end,
             ElectronicsParameters(),
-            Fault(FaultParameters()),
             lambda number: self.setpoints.append(mount.truth['current_setpoint']),
         )
         self._tap = self.bus()  # hears what the driver sends
@@ -147,3 +145,39 @@ def test_a_driver_that_stood_still_and_answers_what_lay_in_its_queue(car):
         car.drive(1, lambda: None, driver_lives=False)
     assert car.held() == HOLD
     gateway.shutdown()
+
+
+class Host:
+    """Sends setpoints that answer the newest sample, with counters of its own from `first` on."""
+
+    def __init__(self, car, first, current):
+        self._car, self._bus, self._alive, self._current = car, car.bus(), itertools.count(first), current
+
+    def send(self):
+        setpoint = Setpoint(self._current, (self._car.mount.sample - 1) & 0xFFFF, True)
+        data = CODEC.encode_setpoint(setpoint, next(self._alive) & 0xFF)
+        self._bus.send(Frame(CODEC.setpoint.frame_id, data))
+
+    def close(self):
+        self._bus.shutdown()
+
+
+@pytest.mark.parametrize(('every', 'first'), [(1, 77), (3, 77), (10, 77), (1, GOOD)])
+def test_electronics_that_hear_two_hosts_are_at_0_ampere_until_one_was_quiet_for_1_s(car, every, first):
+    """A second host with few frames, or with the counters of the first one, would not end the current."""
+    one, other = Host(car, GOOD, 2.0), Host(car, first, 1.0)
+    begin = len(car.setpoints)
+
+    def both():
+        if car.mount.sample % every == 0:
+            other.send()
+        one.send()
+
+    car.drive(400, both, driver_lives=False)
+    assert set(car.setpoints[begin + 5 * every + 5 :]) == {0.0}
+    car.drive(980, one.send, driver_lives=False)
+    assert set(car.setpoints[begin + 5 * every + 5 :]) == {0.0}
+    car.drive(100, one.send, driver_lives=False)
+    assert car.setpoints[-1] == 2.0
+    one.close()
+    other.close()

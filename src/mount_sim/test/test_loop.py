@@ -15,7 +15,6 @@ from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters, Reading
-from mount_sim.electronics.faults import Fault, FaultParameters
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.plant.simulated_mount import DivergedError
 
@@ -80,10 +79,10 @@ def ends():
     host.bus.shutdown()
 
 
-def _loop(mount, end, fault='none', published=None, **electronics):
+def _loop(mount, end, published=None, **electronics):
     parameters = ElectronicsParameters(**electronics)
     publish = (published if published is not None else []).append
-    return ElectronicsLoop(mount, end, parameters, Fault(FaultParameters(fault, 0.0, 10.0)), publish)
+    return ElectronicsLoop(mount, end, parameters, publish)
 
 
 def _in_thread(target, *arguments):
@@ -219,7 +218,6 @@ def test_lock_step_over_the_bus_equals_plain_function_calls(ends, make_mount):
         over_bus,
         end,
         ElectronicsParameters(),
-        Fault(FaultParameters()),
         lambda number: truths.append(over_bus.truth_bytes),
     )
     answering = _in_thread(host.answer_each, 300, lambda sample: 1.0)
@@ -384,13 +382,14 @@ def test_an_answer_of_the_past_changes_nothing_while_a_good_one_holds(ends, make
 
 def test_a_deaf_end_switches_off_on_its_own_and_says_so(ends, make_mount):
     end, host = ends
-    mount = make_mount()
+    mount = make_mount(faults=('deaf@0',))
     answering = _in_thread(host.answer_each, 300, lambda sample: 1.0)
-    loop = _loop(mount, end, 'deaf')
+    loop = _loop(mount, end)
     loop.run_in_lockstep(threading.Event(), LIMIT)
     answering.join()
     assert mount.truth['coil_current'] == 0.0
     assert [sample.enabled for sample in host.samples] == [True] * 20 + [False] * 280
+    assert [sample.setpoint_timeout for sample in host.samples] == [False] * 20 + [True] * 280
     assert [status.setpoint_timeout for status in host.statuses[:3]] == [False, True, True]
     assert loop.figures.answered == 1  # the last one, after the run
 

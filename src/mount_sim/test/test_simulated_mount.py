@@ -83,9 +83,10 @@ def test_a_driver_that_opens_says_that_it_is_off(make_mount):
 
 
 def test_a_faulty_driver_gives_what_it_likes(make_mount):
-    mount = make_mount()
+    mount = make_mount(faults=('coil_half@0',))
     for _ in range(100):
-        mount.advance(1.0, driven=lambda wanted: 0.5 * wanted)
+        mount.measure()
+        mount.advance(1.0)
     mount.measure()
     assert mount.truth['coil_current'] == pytest.approx(0.5, abs=1e-3)
 

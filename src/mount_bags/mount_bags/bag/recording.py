@@ -1,5 +1,6 @@
 """Opens recordings: those of this project and genuine rosbag2 bags, whole or in part."""
 
+import copy
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -29,6 +30,7 @@ from mount_bags.messages.definitions import Definition
 from mount_bags.messages.series import Column, Payloads, Series, Times
 from mount_bags.messages.time_axis import Arrivals, TimeAxis, axis_of
 from mount_bags.messages.topic_times import TimesCollector, TopicTimes
+from mount_ros.topics import DISPLACEMENT
 
 
 class ReadingError(ValueError):
@@ -49,6 +51,8 @@ class Recording:
 
     def __init__(self, path: Path):
         self.path = path
+        self.mount = ''
+        """Of which of several mounts these are the topics; empty: of all."""
         self.warnings: list[str] = []
         self.information: BagInformation | None = None
         self.files: list[StoredFile] = self._open()
@@ -61,6 +65,30 @@ class Recording:
         self._check_topics()
         self._series: dict[str, Series] = {}
         self._time_axis: TimeAxis | None = None
+
+    @property
+    def mounts(self) -> list[str]:
+        """The namespaces of the mounts, without slashes at their ends: those that have a displacement."""
+        ends = [name.removesuffix(DISPLACEMENT.name) for name in self.topics]
+        return [end.strip('/') for end, name in zip(ends, self.topics, strict=True) if end != name]
+
+    def by_mount(self) -> list['Recording']:
+        """Return the recording of each mount, or this one alone where there are not several."""
+        return [self.of_mount(mount) for mount in self.mounts] if len(self.mounts) > 1 else [self]
+
+    def of_mount(self, mount: str) -> 'Recording':
+        """Return the same recording with the topics of one of `mounts` and those that belong to none.
+
+        What was read of either is read again for the other; `warnings` are common.
+        """
+        others = [f'/{other}/' for other in self.mounts if other != mount]
+        part = copy.copy(self)
+        part.mount = mount
+        part.topics = {
+            name: topic for name, topic in self.topics.items() if not name.startswith(tuple(others))
+        }
+        part._series, part._time_axis = {}, None
+        return part
 
     @property
     def message_count(self) -> int:
@@ -239,8 +267,8 @@ class Recording:
     def times(self) -> dict[str, TopicTimes]:
         """Return the times of all topics: one pass through the files, no message is kept."""
         collectors = {
-            name: TimesCollector(name, declared.information.type, *self._definitions[name])
-            for name, declared in self._declared.items()
+            name: TimesCollector(name, topic.type, *self._definitions[name])
+            for name, topic in self.topics.items()
         }
         for name, block in self._blocks(list(self.topics)):
             collectors[name].add(block)

@@ -103,11 +103,21 @@ def missing_samples(streams: Sequence[NDArray[np.int64]], rate: float) -> int:
         return 0
     grid = np.unique(np.concatenate(known))
     numbers = np.cumsum(np.rint(np.diff(grid, prepend=grid[0]) * (rate / _NANOSECONDS)).astype(np.int64))
-    holes = []
+    begins, ends = [], []
     for stamps in known:
         own = numbers[np.searchsorted(grid, stamps)]
-        holes.append(np.setdiff1d(np.arange(own[0], own[-1] + 1), own))
-    return len(np.unique(np.concatenate(holes)))
+        before_hole = np.flatnonzero(np.diff(own) > 1)
+        begins.append(own[before_hole] + 1)
+        ends.append(own[before_hole + 1])
+    return _covered(np.concatenate(begins), np.concatenate(ends))
+
+
+def _covered(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> int:
+    """Return how many whole numbers lie in at least one interval, whose ends do not belong to it."""
+    order = np.argsort(begins)
+    begins, ends = begins[order], ends[order]
+    reached = np.concatenate([begins[:1], np.maximum.accumulate(ends)[:-1]])
+    return int(np.maximum(ends - np.maximum(begins, reached), 0).sum())
 
 
 def _places(stamps: NDArray[np.int64], rate: float) -> tuple[int, int]:

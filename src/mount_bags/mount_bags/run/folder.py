@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import count, takewhile
 from pathlib import Path
 
 
@@ -65,3 +66,18 @@ def make_run_folder(wanted: Path | None, scenario: str) -> RunFolder:
             f'{wanted} cannot be created: {error.strerror}; choose another with --out'
         ) from None
     return folder
+
+
+def recordings_of(first: Path) -> list[Path]:
+    """Return the recordings of a run: `first`, and one for each time that the recorder was started again."""
+    places = (_recording(first, number) for number in count(1))
+    return list(takewhile(Path.exists, places))
+
+
+def next_recording(first: Path) -> Path:
+    """Return the folder for the recording behind those there are: `first`_restarted_2, _3, ..."""
+    return _recording(first, len(recordings_of(first)) + 1)
+
+
+def _recording(first: Path, number: int) -> Path:
+    return first if number == 1 else first.with_name(f'{first.name}_restarted_{number}')

@@ -3,12 +3,24 @@
 import hashlib
 from pathlib import Path
 
-from mount_bags.bag.recording import Recording, open_recording
+from mount_bags.bag.recording import ReadingError, Recording, open_recording
 
 
 def open_run(path: Path) -> Recording:
     """Open the recording at `path` or, for the folder of a run, the one in it; raises `ReadingError`."""
     return open_recording(recording_place(path))
+
+
+def open_mount(path: Path, mount: str = '') -> Recording:
+    """Open the recording at `path` for one mount, the only one or `mount`; raises `ReadingError`."""
+    recording = open_run(path)
+    if not mount and len(recording.mounts) < 2:
+        return recording
+    if mount.strip('/') not in recording.mounts:
+        what = f'no mount {mount!r}' if mount else 'several mounts'
+        known = ', '.join(recording.mounts) or 'none with a name'
+        raise ReadingError(f'{path} has {what}; it has {known}: choose one with --mount')
+    return recording.of_mount(mount.strip('/'))
 
 
 def recording_place(path: Path) -> Path:

@@ -1,7 +1,9 @@
 """Brings the nodes of a graph to life and watches them, whoever has started their processes."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import groupby
+from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -16,21 +18,28 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from mount_bringup.graph.errors import GraphError, Interrupted
+from mount_bringup.graph.liveliness import SILENCE_LIMIT
+from mount_bringup.graph.matches import unmatched
 from mount_bringup.graph.nodes import (
-    CONTROL,
     DRIVER,
     RECORDER,
     SIM,
     GraphNode,
     GraphSettings,
     ending_order,
+    groups,
 )
 from mount_bringup.graph.pace import Pace, pace
 from mount_bringup.graph.parameters import parameters_of
+from mount_bringup.graph.recovery import Recovery
+from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
+from mount_bringup.graph.verdicts import Verdicts
+from mount_bringup.mounts import settings_of_mount
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.leaving import leave_middleware
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, SESSION
+from mount_sim.diagnosis import FINISHED
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
@@ -42,16 +51,24 @@ _TRANSITION_LIMIT = 60.0  # s, chosen: activation of mount_init includes its cur
 class Bringup:
     """The nodes of a graph as one thing: `start`, `wait_until`, and `stop`.
 
-    Who also has their processes overrides `start_nodes` and `check_processes`.
+    Once started, in real time, it makes good the loss of a node as `restarts.py` says. Who has the processes
+    of the nodes overrides `start_nodes`, `check_processes` and `start_again`.
     """
 
     def __init__(self, nodes: tuple[GraphNode, ...], settings: GraphSettings):
-        self._nodes = nodes
-        self._settings = settings
-        self._interrupted = False  # no lock: a second signal may come amid the first
-        self._verdicts: dict[str, dict[str, str]] = {}
-        self._context = Context()
+        self.nodes = nodes
+        self.parameters: dict[str, dict[str, object]] = {}
+        """All parameters of all nodes, as they were at the start."""
         self.notes: list[str] = []
+        self.verdicts = Verdicts(nodes, settings.namespace)
+        self.tell_loss: Callable[[str], None] = lambda text: None
+        self._settings = settings
+        self._groups = groups(nodes, settings.grouping)
+        self._mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
+        self._interrupted = False  # no lock: a second signal may come amid the first
+        self._context = Context()
+        self._recovery = Recovery(self, settings.restart_limit)
+        self._makes_good = False
 
     def interrupt(self) -> None:
         """Make every wait of the supervisor end with `Interrupted`; safe from a signal handler."""
@@ -60,7 +77,7 @@ class Bringup:
     def start(
         self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
     ) -> None:
-        """Bring all nodes to life; `session` makes the session text from all parameters of all nodes."""
+        """Bring all nodes to life; `session` makes the session text of a mount from its nodes' parameters."""
         rclpy.init(
             context=self._context,
             domain_id=self._settings.domain,
@@ -71,73 +88,157 @@ class Bringup:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._node.create_subscription(
-            DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, recording_qos(DIAGNOSTICS)
+            DiagnosticArray, DIAGNOSTICS.name, self.verdicts.take, recording_qos(DIAGNOSTICS)
         )
-        publisher = self._node.create_publisher(String, SESSION.name, publisher_qos(SESSION))
+        qos = publisher_qos(SESSION)
+        publishers = {
+            mount: self._node.create_publisher(String, f'{mount}/{SESSION.name}'.lstrip('/'), qos)
+            for mount in self._mounts
+        }
         say('starting the nodes')
         self.start_nodes()
-        for node in self._nodes:
+        for node in self.nodes:
             self.transition(node, Transition.TRANSITION_CONFIGURE)
-        publisher.publish(
-            String(data=session({node.name: parameters_of(node.name, self._call) for node in self._nodes}))
-        )
-        self._wait_for_matches()
-        for node in self._nodes:
-            say(f'activating {node.name}')
-            self._activate(node, say)
+        self.parameters = {node.full_name: parameters_of(node.full_name, self.call) for node in self.nodes}
+        for mount, publisher in publishers.items():
+            publisher.publish(String(data=session(settings_of_mount(self.parameters, mount))))
+        self.wait_for_matches()
+        for _, side_by_side in groupby(self.nodes, lambda node: node.name):
+            self._activate_all(list(side_by_side), say)
+        self._makes_good = not any(values.get('lockstep') for values in self.parameters.values())
+        self.verdicts.liveliness.pause()
 
     def start_nodes(self) -> None:
         """See to it that the nodes of this graph, and no others of their names, are there."""
-        for node in self._nodes:
+        for node in self.nodes:
             self._wait_for_service(node)
         self.refuse_others(own=1)
 
     def check_processes(self) -> None:
-        """Raise `GraphError` if a process is no more what it was."""
+        """Raise `NodesLostError` if a process is no more what it was."""
 
-    def _activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
+    def start_again(self, nodes: Sequence[GraphNode]) -> None:
+        """End what is left of the processes of `nodes`, and start them again."""
+        raise GraphError(f'{" + ".join(node.name for node in nodes)} cannot be started again from here')
+
+    @property
+    def restarts(self) -> list[Restart]:
+        """The losses that were made good, in order."""
+        return self._recovery.restarts
+
+    def activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
         """Activate a node; one that refuses is asked as often as the graph declares.
 
         If the machine was late, the refusal tells nothing of the mount: it is asked again for a minute.
         """
         begin, asked = time.monotonic(), 0
         while True:
-            before = self._pace()
+            before = self._pace(node.mount)
             try:
                 self.transition(node, Transition.TRANSITION_ACTIVATE)
+                self.verdicts.note_active(node)
                 return
             except GraphError as error:
-                self._serve_for(_FRESH_DIAGNOSTICS)
-                was_late = self._pace().was_late_since(before)
-                asked += not was_late
+                asked += not self._was_late(node, before)
                 if asked >= node.activations or time.monotonic() - begin > _LATE_PATIENCE:
                     raise
-                reason = ' (this machine was too late for 1 kHz)' if was_late else ''
-                self.notes.append(f'{error}{reason}; it was activated again')
-                say(f'activating {node.name} again{reason}')
+                self._tell_again(node, error, before, say)
 
-    def _pace(self) -> Pace:
-        return pace(self.figures(DRIVER), self.figures(SIM))
+    def _was_late(self, node: GraphNode, before: Pace) -> bool:
+        """Return whether this machine has been too late since `before`, by fresh figures."""
+        self.serve_for(_FRESH_DIAGNOSTICS)
+        return self._pace(node.mount).was_late_since(before)
 
-    def _serve_for(self, duration: float) -> None:
+    def _tell_again(
+        self, node: GraphNode, error: GraphError, before: Pace, say: Callable[[str], None]
+    ) -> None:
+        was_late = self._pace(node.mount).was_late_since(before)
+        reason = ' (this machine was too late for 1 kHz)' if was_late else ''
+        self.notes.append(f'{error}{reason}; it was activated again')
+        say(f'activating {node.full_name} again{reason}')
+
+    def _activate_all(self, nodes: Sequence[GraphNode], say: Callable[[str], None]) -> None:
+        """Activate one node, or those of all mounts at the same time; one that refuses is asked by itself."""
+        say(f'activating {", ".join(node.full_name for node in nodes)}')
+        if len(nodes) == 1:
+            self.activate(nodes[0], say)
+            return
+        before = {node: self._pace(node.mount) for node in nodes}
+        clients = {node: self._wait_for_service(node) for node in nodes}
+        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
+        answers = {node: client.call_async(request) for node, client in clients.items()}
+        names = ', '.join(node.full_name for node in nodes)
+
+        def all_done() -> bool:
+            return all(answer.done() for answer in answers.values())
+
+        self.wait_until(all_done, _TRANSITION_LIMIT, f'activate of {names}')
+        for node, client in clients.items():
+            self._node.destroy_client(client)
+            if answers[node].result().success:
+                self.verdicts.note_active(node)
+        for node in nodes:
+            if not answers[node].result().success:
+                error = self._refusal(node, 'activate')
+                if not self._was_late(node, before[node]) and node.activations == 1:
+                    raise error
+                self._tell_again(node, error, before[node], say)
+                self.activate(node, say)
+
+    def _pace(self, mount: str) -> Pace:
+        driver = next((node for node in self.nodes if node.is_a(DRIVER) and node.mount == mount), DRIVER)
+        return pace(self.figures(driver), self.figures(SIM))
+
+    def serve_for(self, duration: float) -> None:
+        """Serve the graph for so many s."""
         end = time.monotonic() + duration
         self.wait_until(lambda: time.monotonic() >= end, duration + 1.0, 'a pause')
 
     def figures(self, node: GraphNode) -> dict[str, str]:
         """Return the last diagnostics of a node: its figures, `level` and `sentence`; empty if none came."""
-        return self._verdicts.get(node.name, {})
+        return self.verdicts.figures(node)
 
     def wait_until(self, condition: Callable[[], bool], limit: float, what: str) -> None:
-        """Serve the graph until `condition`; raise `GraphError` if a node dies or `limit` s pass."""
+        """Serve the graph until `condition`; raise `GraphError` if it breaks down or `limit` s pass."""
         begin = time.monotonic()
         while not condition():
             if self._interrupted:
                 raise Interrupted
-            self.check_processes()
-            self._check_verdicts()
+            try:
+                self.check_processes()
+                self.verdicts.check_fatal()
+                if self._makes_good:
+                    self._check_work()
+            except NodesLostError as lost:
+                if not self._makes_good:
+                    raise
+                self._make_good(lost.loss)
             if time.monotonic() - begin > limit:
-                raise GraphError(f'{what} did not happen within {limit:g} s; {self._complaints()}')
+                raise GraphError(f'{what} did not happen within {limit:g} s; {self.verdicts.complaints()}')
             self._executor.spin_once(0.05)
+
+    def _check_work(self) -> None:
+        """Raise `NodesLostError` if a node hangs, or the electronics have lost their initialisation."""
+        if silent := self.verdicts.liveliness.silent(time.monotonic()):
+            hanging = [group for group in self._groups if {node.full_name for node in group} & {*silent}]
+            nodes = tuple(node for group in hanging for node in group)
+            reason = f'{", ".join(silent)} told nothing for {SILENCE_LIMIT:g} s and counts as dead'
+            raise NodesLostError(Loss(nodes, reason))
+        if reason := self.verdicts.needing_initialisation():
+            raise NodesLostError(Loss((), reason))
+
+    def _make_good(self, loss: Loss) -> None:
+        self.tell_loss(loss.reason)
+        self._makes_good = False
+        try:
+            self._recovery.make_good(loss)
+        except GraphError as error:
+            if self.figures(SIM).get('sentence') != FINISHED:
+                raise
+            self.notes.append(f'{error}, at the end of the drive')
+        finally:
+            self._makes_good = True
+            self.verdicts.liveliness.pause()
 
     def mark_setter(self, say: Callable[[str], None]) -> Callable[[], None]:
         """Return the function that asks the recorder to mark this moment; `say` takes its answer."""
@@ -160,14 +261,14 @@ class Bringup:
         request = ChangeState.Request(transition=Transition(id=transition))
         answer = client.call_async(request)
         label = {1: 'configure', 3: 'activate', 4: 'deactivate'}.get(transition, str(transition))
-        self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.name}')
+        self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.full_name}')
         self._node.destroy_client(client)
         if not answer.result().success:
-            raise GraphError(f'{node.name} refused to {label}: {self._reason(node)}')
+            raise self._refusal(node, label)
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
-        for node in ending_order(self._nodes):
+        for node in ending_order(self.nodes):
             self._try_to_deactivate(node)
         return self.leave()
 
@@ -183,9 +284,12 @@ class Bringup:
         rclpy.try_shutdown(context=self._context)
 
     def _wait_for_service(self, node: GraphNode) -> Client:
-        client = self._node.create_client(ChangeState, f'{node.name}/change_state')
-        self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.name}')
+        client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
+        self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.full_name}')
         return client
+
+    def _refusal(self, node: GraphNode, label: str) -> GraphError:
+        return GraphError(f'{node.full_name} refused to {label}: {self._reason(node)}')
 
     def _reason(self, node: GraphNode) -> str:
         """Return what the node says of its refusal; it may come after the answer."""
@@ -198,7 +302,7 @@ class Bringup:
         # A node that cannot is ended by a signal, to which it answers in the same way.
         if self.figures(node).get('state') != 'active':
             return
-        client = self._node.create_client(ChangeState, f'{node.name}/change_state')
+        client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
         if client.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
             self._executor.spin_until_future_complete(client.call_async(request), timeout_sec=2.0)
@@ -211,83 +315,42 @@ class Bringup:
             self._executor.spin_once(0.05)
             space = self._node.get_namespace()
             present = self._node.get_node_names_and_namespaces()
-            for node in self._nodes:
-                if present.count((node.name, space)) > own:
+            for node in self.nodes:
+                own_space = f'{space.rstrip("/")}/{node.mount}'.rstrip('/') or '/'
+                if present.count((node.name, own_space)) > own:
                     raise GraphError(
-                        f'{node.name} already runs in ROS domain {self._settings.domain}, namespace {space}: '
-                        'end that graph, or choose another domain or namespace'
+                        f'{node.name} already runs in ROS domain {self._settings.domain}, namespace '
+                        f'{own_space}: end that graph, or choose another domain or namespace'
                     )
 
-    def _wait_for_matches(self) -> None:
+    def wait_for_matches(self) -> None:
+        """Return when every topic that a node needs has found its other side."""
+
         def all_matched() -> bool:
-            return all(not self._unmatched(node) for node in self._nodes)
+            return all(not self._unmatched(node) for node in self.nodes)
 
         try:
             self.wait_until(all_matched, _MATCH_LIMIT, 'connection of all topics')
         except GraphError as error:
             alone = '; '.join(
-                f'{node.name} waits for {", ".join(self._unmatched(node))}'
-                for node in self._nodes
+                f'{node.full_name} waits for {", ".join(self._unmatched(node))}'
+                for node in self.nodes
                 if self._unmatched(node)
             )
             raise GraphError(f'{error}: {alone}') from None
 
     def _unmatched(self, node: GraphNode) -> list[str]:
-        figures = self.figures(node)
-        if 'unmatched' not in figures:
-            return ['its first diagnostics']
-        names = {name.rsplit(self._prefix(), 1)[-1] for name in figures['unmatched'].split(', ') if name}
-        return sorted(names & self._needed(node))
+        return unmatched(node, self.figures(node), self.nodes, self._node.get_namespace())
 
-    def _needed(self, node: GraphNode) -> set[str]:
-        if node.name != 'mount_recorder':
-            return set(node.needs)
-        return {name for other in self._nodes for name in other.needs} | {SESSION.name}
+    def client(self, kind: Any, service: str) -> Client:
+        """Return a client of a service; to be destroyed by who asked for it."""
+        return self._node.create_client(kind, service)
 
-    def _prefix(self) -> str:
-        return self._node.get_namespace().rstrip('/') + '/'
-
-    def _call(self, kind, service, request):
-        client = self._node.create_client(kind, service)
+    def call(self, kind: Any, service: str, request: Any) -> Any:
+        """Return the answer of a service."""
+        client = self.client(kind, service)
         self.wait_until(client.service_is_ready, _START_LIMIT, f'service {service}')
         answer = client.call_async(request)
         self.wait_until(answer.done, _TRANSITION_LIMIT, f'answer of {service}')
         self._node.destroy_client(client)
         return answer.result()
-
-    def _check_verdicts(self) -> None:
-        for node in self._nodes:
-            figures = self.figures(node)
-            if figures.get('fatal') == 'True':
-                raise GraphError(f'{node.name}: {figures["sentence"]}{self._who_is_silent(figures)}')
-
-    def _who_is_silent(self, figures: dict[str, str]) -> str:
-        """Return the first node of the chain that has not handled the sample which waits for its answer."""
-        waiting = figures.get('waiting_stamp', '')
-        if not waiting.isdigit():
-            return ''
-        for node in self._nodes:
-            handled = self.figures(node).get('last_stamp', '')
-            if node in (DRIVER, CONTROL) and (not handled.isdigit() or int(handled) < int(waiting)):
-                return f'; {node.name} does not answer'
-        return ''
-
-    def _complaints(self) -> str:
-        said = [
-            f'{name}: {figures["sentence"]}'
-            for name, figures in self._verdicts.items()
-            if int(figures['level']) >= Level.WARN
-        ]
-        return '; '.join(said) or 'no node complains'
-
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            # /diagnostics belongs to all mounts of the car
-            space, _, name = status.name.rpartition('/')
-            if space != self._settings.namespace.strip('/'):
-                continue
-            self._verdicts[name] = {
-                **{value.key: value.value for value in status.values},
-                'level': str(status.level[0]),
-                'sentence': status.message,
-            }

@@ -1,11 +1,11 @@
 """One graph, with one CAN bus, per ROS domain and namespace: a second one would drive the same coil."""
 
 import contextlib
-import fcntl
 import os
-import tempfile
+import socket
+import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 HIGHEST_DOMAIN = 101  # above, the ports of Fast DDS run into those of other programs on Linux
@@ -15,6 +15,10 @@ HIGHEST_DOMAIN = 101  # above, the ports of Fast DDS run into those of other pro
 # would not open.
 _FIRST_PORT, _PORTS_OF_DOMAIN = 7530, 250  # behind 59 participants
 _PLACES = 119  # namespaces told apart by their ports
+
+_PLACE = '\0engine_mount_port'  # the zero: a name of its own, no file
+_SOCKETS = Path('/proc/net/unix')
+_CREDENTIALS = struct.Struct('3i')  # struct ucred: process, user, group
 
 
 class DomainError(ValueError):
@@ -41,28 +45,51 @@ def can_port(domain: int, namespace: str) -> int:
 
 @contextlib.contextmanager
 def domain_lock(domain: int, namespace: str) -> Iterator[None]:
-    """Hold the place of the one graph of this machine in a domain and namespace, or raise `DomainError`."""
+    """Hold the place of the one graph of this machine in a domain and namespace, or raise `DomainError`.
+
+    By a name among the sockets of Linux that stands in no file system: nothing is left behind, whatever ends
+    the process.
+    """
     port, name = can_port(domain, namespace), f'/{namespace.strip("/")}'
-    path = Path(tempfile.gettempdir()) / f'engine_mount_port_{port}.lock'
-    with open(path, 'a+', opener=_open_for_all) as file:
+    with socket.socket(socket.AF_UNIX) as place, socket.socket(socket.AF_UNIX) as told:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            place.bind(f'{_PLACE}_{port}')
+            place.listen()
         except OSError:
-            file.seek(0)
-            process, _, other = (file.read().strip() or f'unknown {name}').partition(' ')
-            raise DomainError(_occupied(domain, name, process, other, port)) from None
-        file.truncate(0)
-        file.write(f'{os.getpid()} {name}')
-        file.flush()
-        yield  # the lock ends with the file, so also with the process
+            raise DomainError(_occupied(domain, name, port)) from None
+        told.bind(f'{_PLACE}_{port} {name}')
+        yield
 
 
-def _occupied(domain: int, name: str, process: str, other: str, port: int) -> str:
-    running = f'a graph already runs in ROS domain {domain}, namespace {other} (process {process})'
+@contextlib.contextmanager
+def domain_locks(domain: int, namespace: str, mounts: Sequence[str]) -> Iterator[None]:
+    """Hold the places of a graph and of each of its mounts, whose namespaces are within its own."""
+    with contextlib.ExitStack() as held:
+        for mount in ('', *mounts):
+            held.enter_context(domain_lock(domain, f'{namespace}/{mount}'))
+        yield
+
+
+def _occupied(domain: int, name: str, port: int) -> str:
+    other = _namespace_on(port)
+    running = f'a graph already runs in ROS domain {domain}, namespace {other} (process {_process_on(port)})'
     if other == name:
         return f'{running}; end it, or choose another domain with --domain or ROS_DOMAIN_ID'
     return f'{running}, whose CAN bus would have port {port} as that of {name}; choose another namespace'
 
 
-def _open_for_all(path: str, flags: int) -> int:
-    return os.open(path, flags, 0o666)
+def _namespace_on(port: int) -> str:
+    """Return the namespace of the graph that holds a port."""
+    begin = f'@{_PLACE[1:]}_{port} '  # so Linux lists such names
+    names = (line.partition(begin)[2] for line in _SOCKETS.read_text().splitlines() if begin in line)
+    return next(names, 'unknown')
+
+
+def _process_on(port: int) -> str:
+    with socket.socket(socket.AF_UNIX) as asking:
+        try:
+            asking.connect(f'{_PLACE}_{port}')
+            credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        except OSError:
+            return 'unknown'  # it has just ended
+    return str(_CREDENTIALS.unpack(credentials)[0])

@@ -1,29 +1,34 @@
-"""The graph for `ros2 launch`: its processes, their supervisor, and the end of all with the first that ends.
+"""The graph for `ros2 launch`: its processes, their supervisor, and the end of all with an end for good.
 
 Needs the `launch_ros` of a ROS 2 installation; where there is none, `mount_bringup.graph.supervisor` does it.
 """
 
 import contextlib
+import tempfile
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
+from launch.actions import DeclareLaunchArgument, EmitEvent, LogInfo, OpaqueFunction, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
 from launch_ros.actions import Node
 
+from mount_bringup.graph.composed import COMPOSED
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.launched import SUPERVISOR, arguments_of, exit_error
-from mount_bringup.graph.nodes import GraphNode
+from mount_bringup.graph.nodes import GraphNode, groups
 from mount_bringup.graph.order import LaunchArgument, LaunchOrder, launch_order
-from mount_bringup.graph.processes import node_environment
+from mount_bringup.graph.processes import node_environment, parameter_text
+from mount_bringup.graph.restarts import restartable
 from mount_ros.environment import prepare_environment
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
 _PATIENCE = '10'  # s, chosen: until a node that was asked to end is terminated
+_RESPAWN_DELAY = 0.2  # s, chosen: a node that dies at once must not keep the machine busy
 
 
 def launch_description(
@@ -50,9 +55,13 @@ def _graph(
 ) -> list[LaunchDescriptionEntity]:
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
     order = launch_order(nodes, arguments, given)
-    lock = contextlib.ExitStack()
-    lock.enter_context(domain_lock(order.settings.domain, order.settings.namespace))
-    processes = [_node(node, order) for node in order.nodes]
+    inherited = drop_real_time()
+    priority = order.settings.priority or inherited
+    held = contextlib.ExitStack()  # until the last process has ended
+    held.enter_context(domain_lock(order.settings.domain, order.settings.namespace))
+    grouped = groups(order.nodes, order.settings.grouping)
+    respawned = {_name(group): _is_respawned(group, order) for group in grouped}
+    processes = [_process(group, order, priority, held) for group in grouped]
     processes.append(
         Node(
             package='mount_bringup',
@@ -63,13 +72,15 @@ def _graph(
             output='both',
         )
     )
-    names = [*(node.name for node in order.nodes), SUPERVISOR]
+    names = [*respawned, SUPERVISOR]
     running = set(names)
 
-    def ended(name: str, event: ProcessExited, context: LaunchContext) -> EmitEvent:
+    def ended(name: str, event: ProcessExited, context: LaunchContext) -> EmitEvent | None:
+        if respawned.get(name) and not context.is_shutdown:
+            return None  # the supervisor brings it to life again, or ends by itself, and all with it
         running.discard(name)
         if not running:
-            lock.close()
+            held.close()
         error = exit_error(name, event.returncode, asked=context.is_shutdown)
         if error:
             raise RuntimeError(error)  # by which launch ends everything, with exit code 1
@@ -79,18 +90,45 @@ def _graph(
         RegisterEventHandler(OnProcessExit(target_action=process, on_exit=partial(ended, name)))
         for name, process in zip(names, processes, strict=True)
     ]
-    return [*handlers, *processes]  # handlers first, so that no end can happen unheard
+    told = [LogInfo(msg=started_in_real_time(inherited))] if inherited else []
+    return [*told, *handlers, *processes]  # handlers first, so that no end can happen unheard
 
 
-def _node(node: GraphNode, order: LaunchOrder) -> Node:
+def _process(
+    nodes: Sequence[GraphNode], order: LaunchOrder, priority: int, held: contextlib.ExitStack
+) -> Node:
+    [first, *others] = nodes
+    if others:
+        place = {'package': 'mount_bringup', 'executable': COMPOSED}
+        parameters: list[str | dict] = [_parameter_file(nodes, order, held)]
+    else:
+        place = {'package': first.package, 'executable': first.name, 'name': first.name}
+        parameters = [dict(order.settings.parameters[first.name])]
     return Node(
-        package=node.package,
-        executable=node.name,
-        name=node.name,
+        **place,
         namespace=order.settings.namespace,
-        parameters=[dict(order.settings.parameters[node.name])],
-        additional_env=node_environment((node,), order.settings.priority),
+        parameters=parameters,
+        additional_env=node_environment(nodes, priority),
         ros_arguments=['--log-level', order.log_level],
         sigterm_timeout=_PATIENCE,
+        respawn=_is_respawned(nodes, order),
+        respawn_delay=_RESPAWN_DELAY,
         output='both',
     )
+
+
+def _name(nodes: Sequence[GraphNode]) -> str:
+    return nodes[0].name if len(nodes) == 1 else COMPOSED
+
+
+def _is_respawned(nodes: Sequence[GraphNode], order: LaunchOrder) -> bool:
+    lockstep = any(values.get('lockstep') for values in order.settings.parameters.values())
+    return not lockstep and restartable(nodes, order.settings.restart_limit)
+
+
+def _parameter_file(nodes: Sequence[GraphNode], order: LaunchOrder, held: contextlib.ExitStack) -> str:
+    """Return a file with the parameters of several nodes, which launch cannot tell apart by itself."""
+    with tempfile.NamedTemporaryFile('w', prefix='mount_parameters_', suffix='.yaml', delete=False) as file:
+        file.write(parameter_text(nodes, order.settings))
+    held.callback(Path(file.name).unlink, missing_ok=True)
+    return file.name

@@ -3,6 +3,7 @@
 import argparse
 import signal
 import time
+from collections.abc import Sequence
 
 from rclpy.logging import get_logger
 
@@ -10,26 +11,62 @@ from mount_bags.run.session import new_session, session_text
 from mount_bringup.graph.bringup import Bringup
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.errors import GraphError, Interrupted
-from mount_bringup.graph.nodes import SIM, SIMULATED, GraphNode, GraphSettings
+from mount_bringup.graph.nodes import SIM, SIMULATED, GraphNode, GraphSettings, Grouping
 from mount_bringup.graph.order import LaunchOrder
+from mount_bringup.graph.restarts import Loss, NodesLostError
+from mount_bringup.graph.siblings import Sibling, sibling_of
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process
 from mount_ros.nodes.starter import Starter
 from mount_sim.diagnosis import FINISHED
 
 SUPERVISOR = 'mount_supervisor'
+_RESPAWN_LIMIT = 10.0  # s, chosen
+_LOOK_PERIOD = 0.1  # s, chosen
 
 
 class LaunchedGraph(Bringup):
-    """The nodes of a launch file, whose processes launch watches; without launch this one ends too."""
+    """The nodes of a launch file, whose processes launch starts again; without launch this one ends too."""
 
     def __init__(self, nodes: tuple[GraphNode, ...], settings: GraphSettings):
         super().__init__(nodes, settings)
         self._starter = Starter()
+        self._processes: list[Sibling] = []
+
+    def start_nodes(self) -> None:
+        super().start_nodes()
+        found = [sibling_of(group) for group in self._groups]
+        self._processes = [process for process in found if process is not None]
 
     def check_processes(self) -> None:
         if self._starter.ended:
             raise GraphError('launch has ended')
+        for process in self._processes:
+            if process.ended:
+                names = ' + '.join(node.name for node in process.nodes)
+                raise NodesLostError(Loss(process.nodes, f'{names} has ended (process {process.pid})'))
+
+    def start_again(self, nodes: Sequence[GraphNode]) -> None:
+        """Let launch respawn the processes of `nodes`, which it does when they end."""
+        lost = [process for process in self._processes if {*process.nodes} & {*nodes}]
+        if {*nodes} - {node for process in lost for node in process.nodes}:
+            super().start_again(nodes)
+        for process in lost:
+            for node in process.nodes:
+                self.verdicts.forget(node)
+            process.kill()
+            self._processes.remove(process)
+            self._processes.append(self._respawned(process))
+            process.close()
+
+    def _respawned(self, dead: Sibling) -> Sibling:
+        end = time.monotonic() + _RESPAWN_LIMIT
+        while time.monotonic() < end:
+            process = sibling_of(dead.nodes)
+            if process is not None and process.pid != dead.pid:
+                return process
+            self.serve_for(_LOOK_PERIOD)
+        raise GraphError(f'launch did not start {dead.nodes[0].name} again within {_RESPAWN_LIMIT:g} s')
 
 
 def arguments_of(order: LaunchOrder) -> list[str]:
@@ -40,6 +77,8 @@ def arguments_of(order: LaunchOrder) -> list[str]:
         f'--domain={order.settings.domain}',
         f'--scenario={order.scenario}',
         f'--duration={order.duration}',
+        f'--grouping={order.settings.grouping.name}',
+        f'--restart-limit={order.settings.restart_limit}',
     ]
 
 
@@ -65,9 +104,18 @@ def main() -> None:
     parser.add_argument('--domain', type=int, required=True)
     parser.add_argument('--scenario', required=True)
     parser.add_argument('--duration', type=float, required=True, help='s; inf: until a signal')
+    parser.add_argument('--grouping', choices=[entry.name for entry in Grouping], required=True)
+    parser.add_argument('--restart-limit', type=int, required=True)
     chosen, _ = parser.parse_known_args()  # the rest is of ROS
     nodes = tuple(node for node in SIMULATED if node.name in chosen.node)
-    graph = LaunchedGraph(nodes, GraphSettings(namespace=chosen.namespace, domain=chosen.domain))
+    settings = GraphSettings(
+        namespace=chosen.namespace,
+        domain=chosen.domain,
+        grouping=Grouping[chosen.grouping],
+        restart_limit=chosen.restart_limit,
+    )
+    graph = LaunchedGraph(nodes, settings)
+    graph.tell_loss = get_logger(SUPERVISOR).error
     end_process(_supervise(graph, chosen.scenario, chosen.duration))
 
 
@@ -98,9 +146,9 @@ def _supervise(graph: Bringup, scenario: str, duration: float) -> int:
             graph.stop()
             return 1
         finally:
-            for note in graph.notes:
+            for note in [*graph.notes, *(restart.sentence for restart in graph.restarts)]:
                 logger.warning(note)
-    return 0
+    return 1 if graph.restarts else 0
 
 
 if __name__ == '__main__':

@@ -7,7 +7,16 @@ from typing import Any, NamedTuple
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
-from mount_bringup.graph.nodes import DRIVER, INIT, RECORDER, SIM, GraphNode, GraphSettings
+from mount_bringup.graph.nodes import (
+    DRIVER,
+    INIT,
+    RECORDER,
+    RESTART_LIMIT,
+    SIM,
+    GraphNode,
+    GraphSettings,
+    Grouping,
+)
 from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
@@ -16,10 +25,15 @@ from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import with_flattened
+from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
+from mount_sim.electronics.faults.schedule import FORM, told_faults
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount
+
+_OF_SPECIMEN = ('mount_driver', 'mount_init', 'mount_control')
+"""The nodes that load the specimen file."""
 
 
 class LaunchArgument(NamedTuple):
@@ -64,17 +78,28 @@ _ANY = (
     LaunchArgument(
         'parameters_file',
         'specimen file of this actuator; empty: as in the config file, else the shipped one',
-        ('mount_init.parameters_file', 'mount_control.parameters_file'),
+        tuple(f'{node}.parameters_file' for node in _OF_SPECIMEN),
     ),
     LaunchArgument(
         'specimen',
         'name that the specimen file must bear; empty: as in the config file, else any',
-        ('mount_init.specimen', 'mount_control.specimen'),
+        tuple(f'{node}.specimen' for node in _OF_SPECIMEN),
     ),
     LaunchArgument(
         'priority',
-        'real-time priority (SCHED_FIFO, 1 .. 99) of the loop, half of it for the recorder; 0: none',
+        'real-time priority (SCHED_FIFO, 1 .. 98) of the loop, half of it for the recorder; 0: none',
         default='0',
+    ),
+    LaunchArgument(
+        'composed',
+        'true: driver, initialisation and control of the mount share a process',
+        default='false',
+        choices=('true', 'false'),
+    ),
+    LaunchArgument(
+        'restarts',
+        'times that a node may be lost within a minute before the graph ends; 0: the first loss ends it',
+        default=str(RESTART_LIMIT),
     ),
     LaunchArgument(
         'log_level',
@@ -93,6 +118,7 @@ SIM_ARGUMENTS = (
         'duration', 's of excitation, after which the graph ends', ('mount_sim.timeline.duration',)
     ),
     LaunchArgument('port', _PORT, ('mount_driver.port', 'mount_sim.port')),
+    LaunchArgument('fault', f'faults as {FORM}, with commas between them', ('mount_sim.faults',)),
 )
 """The arguments of the graph with the simulated car, besides `config`."""
 
@@ -130,7 +156,9 @@ def launch_order(
             namespace=namespace,
             domain=domain,
             parameters={node.name: settings.get(node.name, {}) for node in chosen},
-            priority=_number('priority', given['priority'], 99, int),
+            grouping=Grouping.COMPOSED if given['composed'] == 'true' else Grouping.APART,
+            priority=_number('priority', given['priority'], HIGHEST, int),
+            restart_limit=_number('restarts', given['restarts'], 1000, int),
         ),
         scenario=settings.get(SIM.name, {}).get('scenario', SimParameters().scenario)
         if SIM in nodes
@@ -154,13 +182,16 @@ def _of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str])
         text = given[argument.name]
         for target in argument.sets if text else ():
             node, _, name = target.partition('.')
-            is_text = isinstance(_known()[node][name], str)
-            value = text if is_text else _value(argument.name, text)
+            value = _value(argument.name, text, _known()[node][name])
             settings.setdefault(node, {})[name] = value
     return settings
 
 
-def _value(name: str, text: str) -> Any:
+def _value(name: str, text: str, default: Any) -> Any:
+    if isinstance(default, str):
+        return text
+    if isinstance(default, tuple):
+        return [part.strip() for part in text.split(',')]
     try:
         return plain_yaml(text)
     except YamlError as error:
@@ -183,6 +214,7 @@ def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
         with_flattened(defaults, settings.get(node.name, {}))
     sim = with_flattened(SimParameters(), settings.get(SIM.name, {}))
     seated_mount(sim.mount)
+    told_faults(sim.faults)
     build_excitation(sim)
     check_control_of_mount(settings)
     chosen_control(settings)

@@ -10,8 +10,11 @@ from pathlib import Path
 
 import yaml
 
-from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings
+from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups
 from mount_ros.nodes.starter import environment_of_children
+
+NODES_OF_PROCESS = 'ENGINE_MOUNT_NODES'
+"""The environment variable by which who did not start a process knows its nodes."""
 
 _INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that was asked to end is terminated
 _TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
@@ -23,24 +26,34 @@ class NodeProcess:
 
     def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
         self.nodes = tuple(nodes)
-        self.name = ' + '.join(node.name for node in nodes)
-        stem = '_'.join(node.name for node in nodes)
+        self.name = ' + '.join(node.full_name for node in nodes)
+        stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
+        self._settings = settings
         self.log_file = folder / f'{stem}.log'
         parameter_file = folder / f'{stem}.yaml'
-        parameter_file.write_text(_parameter_text(self.nodes, settings))
-        command = [sys.executable, '-c', _program(self.nodes), '--ros-args']
-        command += ['--params-file', str(parameter_file)]
-        if settings.namespace:
-            command += ['-r', f'__ns:=/{settings.namespace.strip("/")}']
-        with self.log_file.open('wb') as log:
-            self._process = subprocess.Popen(
-                command,
+        parameter_file.write_text(parameter_text(self.nodes, settings))
+        self._command = [sys.executable, '-c', _program(self.nodes, settings.namespace), '--ros-args']
+        self._command += ['--params-file', str(parameter_file)]
+        if settings.namespace and not any(node.mount for node in nodes):
+            self._command += ['-r', f'__ns:=/{settings.namespace.strip("/")}']
+        self._process = self._start()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        with self.log_file.open('ab') as log:
+            return subprocess.Popen(
+                self._command,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, **_environment(self.nodes, settings)},
+                env={**os.environ, **_environment(self.nodes, self._settings)},
                 start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
             )
+
+    def start_again(self) -> None:
+        """Kill what is left of the process and start it with the same parameters; its log goes on."""
+        self._process.kill()
+        self._process.wait()
+        self._process = self._start()
 
     @property
     def exit_code(self) -> int | None:
@@ -86,14 +99,14 @@ def end_all(processes: list[NodeProcess]) -> list[str]:
 
 def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> list[NodeProcess]:
     """Start the processes of `nodes` in order."""
-    groups = [nodes] if settings.together else [[node] for node in nodes]
-    return [NodeProcess(group, settings, folder) for group in groups]
+    return [NodeProcess(group, settings, folder) for group in groups(nodes, settings.grouping)]
 
 
 def node_environment(nodes: Sequence[GraphNode], priority: int) -> dict[str, str]:
-    """Return what a process in which `nodes` live is told of its starter, this process, and its priority."""
+    """Return what a process is told: its `nodes`, its starter, which is this process, and its priority."""
     share = _RECORDER_SHARE if RECORDER in nodes else 1.0
-    return environment_of_children(max(1, round(share * priority)) if priority else 0)
+    given = environment_of_children(max(1, round(share * priority)) if priority else 0)
+    return {**given, NODES_OF_PROCESS: ' '.join(node.full_name for node in nodes)}
 
 
 def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
@@ -101,15 +114,23 @@ def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[st
     return {**own, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'}
 
 
-def _program(nodes: Sequence[GraphNode]) -> str:
-    imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in nodes)
-    classes = ', '.join(node.class_name for node in nodes)
+def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
+    imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in dict.fromkeys(nodes))
+    if any(node.mount for node in nodes):  # a namespace for each, which no remapping of ROS could tell apart
+        creates = []
+        for node in nodes:
+            space = f'/{namespace.strip("/")}/{node.mount}'.replace('//', '/')
+            creates.append(f'partial({node.class_name}, namespace={space!r})')
+        classes, imports = ', '.join(creates), f'from functools import partial; {imports}'
+    else:
+        classes = ', '.join(node.class_name for node in nodes)
     return f'{imports}; from mount_ros.nodes.process import run_nodes; run_nodes([{classes}])'
 
 
-def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
+def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
+    """Return a parameter file of ROS for these nodes, whatever their namespace."""
     tables = {
-        f'/**/{node.name}': {'ros__parameters': dict(settings.parameters.get(node.name, {}))}
+        f'/**/{node.full_name}': {'ros__parameters': dict(settings.parameters.get(node.full_name, {}))}
         for node in nodes
     }
     return yaml.safe_dump(tables, sort_keys=True)

@@ -1,11 +1,13 @@
 """Starts the graph where there is no launch: processes up, transitions in order, all down again."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from mount_bringup.graph.bringup import Bringup
-from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import GraphNode, GraphSettings
 from mount_bringup.graph.processes import NodeProcess, end_all, start_processes
+from mount_bringup.graph.restarts import Loss, NodesLostError
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
 
 class Supervisor(Bringup):
@@ -17,16 +19,25 @@ class Supervisor(Bringup):
         self._processes: list[NodeProcess] = []
 
     def start_nodes(self) -> None:
+        inherited = drop_real_time()
+        if inherited:
+            self.notes.append(started_in_real_time(inherited))
         self.refuse_others(own=0)
-        self._processes = start_processes(self._nodes, self._settings, self._folder)
+        self._processes = start_processes(self.nodes, self._settings, self._folder)
 
     def check_processes(self) -> None:
         for process in self._processes:
             if process.exit_code is not None:
-                raise GraphError(
-                    f'{process.name} ended with code {process.exit_code}: '
-                    f'{process.last_words().split("]: ", 1)[-1]} (log: {process.log_file})'
-                )
+                said = f'{process.last_words().split("]: ", 1)[-1]} (log: {process.log_file})'
+                reason = f'{process.name} ended with code {process.exit_code}: {said}'
+                raise NodesLostError(Loss(process.nodes, reason))
+
+    def start_again(self, nodes: Sequence[GraphNode]) -> None:
+        for process in self._processes:
+            if {*process.nodes} & {*nodes}:
+                for node in process.nodes:
+                    self.verdicts.forget(node)
+                process.start_again()
 
     def leave(self) -> list[str]:
         complaints = end_all(self._processes)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_bringup.graph.nodes import RESTART_LIMIT
 from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
 from mount_cli.terminal import note, terminal
 
@@ -26,6 +27,10 @@ Examples:
 
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
+`engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
+
+`engine-mount drive --mounts left,right --fault right/coil_open@12` - one engine on two mounts
+
 `engine-mount drive --set mount_sim.friction.scale=1.15 --set mount_control.policy=switched_viscous`
 """
 
@@ -34,6 +39,10 @@ def drive(
     scenario: Annotated[str, typer.Option(help='motorway, bench, sweep or recorded')] = 'motorway',
     mount: Annotated[
         str, typer.Option(help='friction, friction_off, friction_always_on, hydro or elastomer')
+    ] = '',
+    mounts: Annotated[
+        str,
+        typer.Option(help='mounts with electronics under one engine: of left, right, front, rear'),
     ] = '',
     file: Annotated[
         Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
@@ -47,12 +56,24 @@ def drive(
     scale: Annotated[
         float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
     ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar='NAME@t[:duration]',
+            help='a fault from t s after the start of the simulator on, for so many s or for good; '
+            'may be repeated; list: what there is',
+        ),
+    ] = None,
     lockstep: Annotated[
         bool, typer.Option('--lockstep', help='the electronics wait for each answer: deterministic, faster')
     ] = False,
     apart: Annotated[
         bool,
         typer.Option('--apart', help='lock-step: each node in its own process, as in the car; slower'),
+    ] = False,
+    composed: Annotated[
+        bool,
+        typer.Option('--composed', help='driver, initialisation and control of the mount share a process'),
     ] = False,
     core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
     duration: Annotated[
@@ -77,6 +98,12 @@ def drive(
         int,
         typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
     ] = 10,
+    restarts: Annotated[
+        int,
+        typer.Option(
+            min=0, help='times that a node may be lost within a minute before the drive ends; 0: none'
+        ),
+    ] = RESTART_LIMIT,
     domain: Domain = None,
     namespace: Namespace = '',
 ) -> None:
@@ -90,10 +117,15 @@ def drive(
     from mount_report.drive.telling import tell_drive, tell_snapshots
     from mount_report.json_file import write_json
 
+    if 'list' in (fault or []):
+        _list_faults()
+        raise typer.Exit
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
+    if composed and (lockstep or core):
+        raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
     try:
         parameters = settings_of_options(settings or [])
     except SettingError as error:
@@ -101,6 +133,7 @@ def drive(
     given = {
         'scenario': scenario,
         'mount': mount or None,
+        'mounts': mounts or None,
         'seed': seed,
         'timeline.duration': duration,
         'recorded.file': str(file.absolute()) if file else None,
@@ -111,6 +144,8 @@ def drive(
     }
     sim = parameters.setdefault('mount_sim', {})
     sim.update({name: value for name, value in given.items() if value is not None})
+    if fault:
+        sim['faults'] = [*sim.get('faults', []), *fault]
     recorder = recorder_options(split or [], snapshot)
     if on_full != 'stop':
         recorder['on_full'] = on_full
@@ -121,7 +156,9 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = DriveOrder(scenario, mode, parameters, chosen, namespace, out, priority, apart)
+    order = DriveOrder(
+        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts
+    )
     console = terminal()
     screen = TerminalScreen(console)
     folder, run, complaints = record_drive(order, screen)
@@ -133,8 +170,8 @@ def drive(
     complaints += told.complaints
     if json_file is not None:
         write_json(told.figures, json_file)
-    if folder.figure.exists():
-        console.print(f'figure     {folder.figure}', soft_wrap=True)
+    for figure in told.pictures:
+        console.print(f'figure     {figure}', soft_wrap=True)
     if folder.report.exists():
         console.print(f'report     {folder.report}', soft_wrap=True)
     for place in told.recordings:
@@ -143,3 +180,12 @@ def drive(
         note(console, complaint)
     if complaints:
         raise typer.Exit(1)
+
+
+def _list_faults() -> None:
+    from mount_sim.electronics.faults.kinds import FAULTS
+
+    console = terminal()
+    width = max(map(len, FAULTS))
+    for name, kind in FAULTS.items():
+        console.print(f'{name:{width}}  {kind.meaning}', soft_wrap=True, markup=False, highlight=False)

@@ -61,6 +61,7 @@ def replay(
     ] = 'mean',
     out: NewFolder = None,
     json_file: JsonFile = None,
+    mount: Annotated[str, typer.Option(help='which of several mounts, such as left')] = '',
     rate: Annotated[float, typer.Option(help='live: factor on the speed of time')] = 1.0,
     start: Annotated[float, typer.Option('--from', help='live: where to begin, s')] = 0.0,
     topic_names: Annotated[
@@ -90,39 +91,42 @@ def replay(
         if maps or table or out or json_file:
             raise typer.BadParameter('--live only shows; --map, --table, --out and --json do not go with it')
         order = LiveOrder(
-            recording, rate, start, topic_names, with_control, changes, chosen_domain(domain), namespace
+            recording,
+            rate,
+            start,
+            topic_names,
+            with_control,
+            changes,
+            chosen_domain(domain),
+            namespace,
+            mount,
         )
         play_live(order, TerminalScreen(console))
         return
     if rate != 1.0 or start or topic_names or with_control or namespace:
         raise typer.BadParameter('--rate, --from, --topics, --with-control and --namespace go with --live')
+    from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder
+
     if not maps and (scale != 1.0 or offset != 'mean'):
         raise typer.BadParameter('--scale and --offset go with --map')
     foreign = _foreign(maps, scale, offset) if maps else None
-    _replay(recording, lockstep, changes, table, foreign, out, json_file, chosen_domain(domain), console)
+    mode = LOCKSTEP if lockstep else CORE
+    order = ReplayOrder(recording, mode, changes, table, foreign, out, chosen_domain(domain), mount)
+    _replay(order, json_file, console)
 
 
 def _replay(
-    recording: Path,
-    lockstep: bool,
-    changes: dict[str, dict[str, Any]],
-    table: str,
-    foreign: Any,
-    out: Path | None,
+    order: Any,
     json_file: Path | None,
-    domain: int,
     console: Console,
 ) -> None:
     from mount_cli.screen import TerminalScreen, progress_bar
-    from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder
     from mount_replay.replay import replay as run_replay
     from mount_replay.summary import print_replay, replay_figures
     from mount_report.json_file import write_json
 
-    mode = LOCKSTEP if lockstep else CORE
-    order = ReplayOrder(recording, mode, changes, table, foreign, out, domain)
     with progress_bar(console, transient=True) as progress:
-        task = progress.add_task(f'replaying ({mode})', total=1.0)
+        task = progress.add_task(f'replaying ({order.mode})', total=1.0)
         outcome = run_replay(order, lambda share: progress.update(task, completed=share))
     figures = replay_figures(outcome)
     print_replay(outcome, figures, TerminalScreen(console))

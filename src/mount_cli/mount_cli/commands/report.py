@@ -48,7 +48,7 @@ def report(
     from mount_report.pages import default_page, default_pictures, write_report
 
     console = terminal()
-    opened = [open_run(path) for path in recordings]
+    opened = [part for path in recordings for part in open_run(path).by_mount()]
     compared = None if other is None else open_run(other)
     file = out or default_page(recordings[0])
     files = write_report(opened, compared, file, pictures or default_pictures(file), TerminalScreen(console))

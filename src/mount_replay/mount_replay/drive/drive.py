@@ -11,16 +11,26 @@ from mount_bags.run.folder import RunFolder, make_run_folder
 from mount_bags.run.screen import Screen
 from mount_bags.run.session import new_session, session_text
 from mount_bringup.chosen import Parameters
-from mount_bringup.graph.domain import can_port, domain_lock
+from mount_bringup.graph.domain import can_port, domain_locks
 from mount_bringup.graph.ending_signals import ending_signals
-from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings
+from mount_bringup.graph.nodes import (
+    CONTROL,
+    RECORDER,
+    RESTART_LIMIT,
+    SIM,
+    SIMULATED,
+    GraphSettings,
+    Grouping,
+    of_mounts,
+)
 from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
+from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_control.diagnosis import fault_sentence
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
 from mount_replay.drive.preflight import preflight
-from mount_replay.loop.recording import record_core
+from mount_replay.loop.recording import record_car, record_core
 from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
 
@@ -39,6 +49,13 @@ class DriveOrder:
     out: Path | None = None
     priority: int = 0
     apart: bool = False  # in lock-step too every node has a process of its own
+    composed: bool = False  # in real time driver, initialisation and control share one
+    restart_limit: int = RESTART_LIMIT
+
+    @property
+    def mounts(self) -> tuple[str, ...]:
+        """The names of the mounts, none where there is one mount alone."""
+        return mounts_of(self.parameters)
 
 
 def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str, Any], list[str]]:
@@ -46,7 +63,7 @@ def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str
 
     Raises `Interrupted`, `GraphError` or a `ValueError` with the reason.
     """
-    excitation = preflight(order.parameters)
+    excitation = preflight(order.parameters, core=order.mode == 'core')
     for remark in excitation.notes:
         screen.note(remark)
     folder = make_run_folder(order.out, order.scenario)
@@ -69,11 +86,13 @@ def _drive_graph(
         namespace=order.namespace,
         domain=order.domain,
         parameters=_node_parameters(order, folder),
-        together=_together(order),
+        grouping=_grouping(order),
         priority=0 if lockstep else order.priority,
+        restart_limit=order.restart_limit,
     )
-    supervisor = Supervisor(SIMULATED, settings, folder.logs)
-    with domain_lock(order.domain, order.namespace), ending_signals(supervisor.interrupt):
+    supervisor = Supervisor(of_mounts(SIMULATED, order.mounts), settings, folder.logs)
+    supervisor.tell_loss = screen.note
+    with domain_locks(order.domain, order.namespace, order.mounts), ending_signals(supervisor.interrupt):
         try:
             with screen.line('starting') as show:
                 supervisor.start(
@@ -85,12 +104,14 @@ def _drive_graph(
             _watch_drive(order, supervisor, limit, screen)
             figures = supervisor.figures(SIM)
             complaints += _beyond_range(int(figures['beyond_range']), float(figures['first_beyond_range_s']))
-            complaints += _control_faults(int(supervisor.figures(CONTROL).get('faults', 0)))
+            controls = (supervisor.figures(node) for node in supervisor.nodes if node.is_a(CONTROL))
+            complaints += _control_faults(sum(int(told.get('faults', 0)) for told in controls))
         finally:
             recorder = supervisor.figures(RECORDER)
             if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
                 supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
+            complaints += [restart.sentence for restart in supervisor.restarts]
             for sentence in supervisor.notes:
                 screen.note(sentence)
     return {
@@ -101,6 +122,7 @@ def _drive_graph(
         'real_time_factor': float(figures['real_time_factor']),
         'latency_median_s': float(figures['latency_median_s']),
         'latency_p99_s': float(figures['latency_p99_s']),
+        'restarts': supervisor.restarts,
     }
 
 
@@ -128,15 +150,18 @@ def _drive_in_core(
     order: DriveOrder, excitation: Excitation, folder: RunFolder, screen: Screen, complaints: list[str]
 ) -> dict[str, Any]:
     with screen.bar(f'driving ({order.scenario})') as show:
-        outcome = record_core(
-            folder.recording,
-            order.parameters,
-            _session(order, order.parameters),
-            show,
-            excitation=excitation,
-            namespace=order.namespace,
-            split=split_of(recorder_parameters(order)),
-        )
+        given = {
+            'excitation': excitation,
+            'namespace': order.namespace,
+            'split': split_of(recorder_parameters(order)),
+        }
+        sessions = {
+            name: _session(order, settings) for name, settings in settings_of_mounts(order.parameters).items()
+        }
+        if order.mounts:
+            outcome = record_car(folder.recording, order.parameters, sessions, show, **given)
+        else:
+            outcome = record_core(folder.recording, order.parameters, sessions[''], show, **given)
     complaints += _beyond_range(outcome.beyond_range.samples, outcome.beyond_range.first)
     complaints += _control_faults(outcome.control_faults)
     return {
@@ -147,6 +172,7 @@ def _drive_in_core(
         'real_time_factor': outcome.simulated / outcome.wall_time,
         'latency_median_s': float('nan'),
         'latency_p99_s': float('nan'),
+        'restarts': [],
     }
 
 
@@ -159,27 +185,38 @@ def _control_faults(faults: int) -> list[str]:
 
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
-    lockstep = order.mode == 'lock-step'
-    can = {
-        'interface': 'virtual' if _together(order) else 'udp_multicast',
-        'port': can_port(order.domain, order.namespace),
+    lockstep, mounts = order.mode == 'lock-step', order.mounts
+    buses = {mount: _bus(order, mount) for mount in mounts or ('',)}
+    interface = {'interface': 'virtual' if _grouping(order) is Grouping.TOGETHER else 'udp_multicast'}
+    shared: dict[str, dict[str, Any]] = {
+        'mount_recorder': {'uri': str(folder.recording), **({'mounts': ','.join(mounts)} if mounts else {})},
+        'mount_sim': interface
+        | {
+            f'mount_{mount}.{name}' if mount else name: value
+            for mount, bus in buses.items()
+            for name, value in bus.items()
+        },
     }
-    added: dict[str, dict[str, Any]] = {
-        'mount_recorder': {'uri': str(folder.recording)},
-        'mount_driver': can,
-        'mount_sim': can,
-        # Nothing but a stalled process may end a ramp in lock-step.
-        'mount_init': {'silence_timeout': 10.0} if lockstep else {},
-        'mount_control': {},
-    }
-    return {
-        name: {'lockstep': lockstep, **values, **order.parameters.get(name, {})}
-        for name, values in added.items()
-    }
+    # Nothing but a stalled process may end a ramp in lock-step.
+    patience = {'silence_timeout': 10.0} if lockstep else {}
+    added = {name: {**values, **order.parameters.get(name, {})} for name, values in shared.items()}
+    for mount, settings in settings_of_mounts(order.parameters).items():
+        own = {'mount_driver': interface | buses[mount], 'mount_init': patience, 'mount_control': {}}
+        for name, values in own.items():
+            added[f'{mount}/{name}'.lstrip('/')] = {**values, **settings.get(name, {})}
+    return {name: {'lockstep': lockstep, **values} for name, values in added.items()}
 
 
-def _together(order: DriveOrder) -> bool:
-    return order.mode == 'lock-step' and not order.apart
+def _bus(order: DriveOrder, mount: str) -> dict[str, Any]:
+    """Return port, and channel where that must tell buses apart, of the CAN bus of a mount."""
+    port: dict[str, Any] = {'port': can_port(order.domain, f'{order.namespace}/{mount}')}
+    return {**port, 'channel': f'can_{mount}'} if mount and _grouping(order) is Grouping.TOGETHER else port
+
+
+def _grouping(order: DriveOrder) -> Grouping:
+    if order.composed:
+        return Grouping.COMPOSED
+    return Grouping.TOGETHER if order.mode == 'lock-step' and not order.apart else Grouping.APART
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:

@@ -13,7 +13,7 @@ from rclpy.node import Node
 
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Payloads, registered_topic
-from mount_bags.run.place import open_run
+from mount_bags.run.place import open_mount
 from mount_bags.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
@@ -52,6 +52,7 @@ class LiveOrder:
     changes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     domain: int = 0
     namespace: str = ''
+    mount: str = ''
 
 
 @dataclass
@@ -68,7 +69,7 @@ class _Film:
 
 def play_live(order: LiveOrder, screen: Screen) -> None:
     """Play to the end, to `q` or to Ctrl-C; raises `ReplayError` with the reason where it cannot."""
-    recording = open_run(order.recording)
+    recording = open_mount(order.recording, order.mount)
     if not 0.01 <= order.rate <= 100.0:
         raise ReplayError(f'--rate ({order.rate:g}) must lie within 0.01 .. 100')
     film = _film(recording, _chosen(recording, order))

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mount_control.controller import compiled_with
+from mount_control.plausibility import doubt_of
 from mount_control.policy.contract import Policy
 from mount_driver.quantisation import (
     quantised_coil_current,
@@ -46,23 +47,29 @@ def run_with(policy: Policy) -> Callable[..., tuple[int, float, float]]:
 step: Any = None  # of the controller; bound by `run_with`
 
 
-def _run(ahead, memory, believable, pending, readings, setpoints, truths, traces):
-    """Take samples until one displacement is not believable; return (number taken, setpoints in A).
+def _run(ahead, memory, plausibility, believable, pending, readings, setpoints, truths, traces):
+    """Take samples until one displacement is not believed; return (number taken, setpoints in A).
 
     The two setpoints are the one that has arrived for the next sample and the one taken over last.
 
-    `ahead` is what the plant gives for n samples, `memory` that of the controller, `believable` the
-    largest displacement (m), `pending` the setpoint (A) that arrived before the first sample. Filled for
-    each sample taken: `readings` (n, 4) as they arrive, `setpoints` (n,) in A as they leave,
-    `truths` and `traces` (n, bytes of their records).
+    `ahead` is what the plant gives for n samples, `memory` that of the controller, `plausibility` limits and
+    memory of the check of the displacement, `believable` its largest value (m), `pending` the setpoint (A)
+    that arrived before the first sample. Filled for each sample taken: `readings` (n, 4) as they arrive,
+    `setpoints` (n,) in A as they leave, `truths` and `traces` (n, bytes of their records).
     """
     last, mount = pending, ahead.memory
+    limits, known = plausibility
+    before = known.copy()
     for index in range(len(setpoints)):
         displacement, coil_current, current_rate, flux_rate = plant.read(
             mount.plant, mount.state, truths[index], ahead.noise[index]
         )
         reading = over_the_bus(displacement, coil_current, current_rate, flux_rate)
         if not abs(reading[0]) <= believable:  # also NaN
+            return index, pending, last
+        before[:] = known
+        if doubt_of(limits, known, reading[0], 0):
+            known[:] = before
             return index, pending, last
         setpoint = step(memory.law, memory.tables, memory.state, memory.window, traces[index], reading[0], 0)
         for place in range(4):

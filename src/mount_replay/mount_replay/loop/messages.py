@@ -17,7 +17,7 @@ from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import Topic
 from mount_sim.electronics.electronics import STATUS_EVERY
-from mount_sim.node import level_imu
+from mount_sim.instruments import level_imu
 from mount_sim.plant.plant import TRUTH
 
 _STATUS_PERIOD = round(STATUS_EVERY * SAMPLE_TIME * 1e9)  # ns

@@ -16,12 +16,15 @@ from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
 from mount_sim.electronics.electronics import STATUS_EVERY, Reading
+from mount_sim.electronics.faults.schedule import Faults, check_without_bus
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.simulated_car import CarMount
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
-_BLOCK = 1000  # samples, chosen: packed and written together
+BLOCK = 1000
+"""Samples, chosen: packed and written together."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ def run_core(
     With `write_columns` those of the samples go there, many at a time. `excitation` is that of the scenario
     where it is built already.
     """
-    messages = CoreMessages(write, _coil_temperature(_sim_parameters(parameters)), write_columns)
+    messages = CoreMessages(write, coil_temperature(_sim_parameters(parameters)), write_columns)
     return run_core_into(messages, parameters, progress, excitation)
 
 
@@ -71,30 +74,32 @@ def run_core_into(
 ) -> CoreOutcome:
     """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
     sim = _sim_parameters(parameters)
-    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed)
+    check_without_bus(sim.faults)
+    faults = Faults(sim.faults, sim.seed)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, faults)
     chain = CoreChain(parameters)
-    celsius = _coil_temperature(sim)
-    samples = Samples(_BLOCK, chain.policy)
+    celsius = coil_temperature(sim)
+    samples = Samples(BLOCK, chain.policy)
     pending: float | None = None
     begin = time.monotonic()
     while not mount.finished:
         if not samples.room:
             messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-        if pending is not None and chain.answering.expects(_stamp(mount)):
+        if pending is not None and faults.none_told and chain.answering.expects(stamp_of(mount)):
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
         if mount.sample % STATUS_EVERY == 0:
-            chain.take_temperature(_stamp(mount), celsius)
-        pending = _take_one(mount, chain, samples, pending)
+            chain.take_temperature(stamp_of(mount), celsius)
+        pending = take_one(mount, chain, samples, pending)
         if chain.result is not None and not chain.controlled:
             messages.write_samples(samples)
-            messages.write_result(_stamp(mount) - SAMPLE_TIME_NS, chain.result)
+            messages.write_result(stamp_of(mount) - SAMPLE_TIME_NS, chain.result)
     setpoint = samples.setpoints[samples.count - 1]
     messages.write_samples(samples)
     if chain.controlled and setpoint != OFF:
-        messages.write_off(_stamp(mount) - SAMPLE_TIME_NS)  # as mount_control when it is deactivated
+        messages.write_off(stamp_of(mount) - SAMPLE_TIME_NS)  # as mount_control when it is deactivated
     return CoreOutcome(
         samples=mount.sample,
         excitation_start=mount.run.excitation_start * SAMPLE_TIME,
@@ -110,18 +115,21 @@ def _sim_parameters(parameters: Parameters) -> SimParameters:
     return with_flattened(SimParameters(), parameters.get('mount_sim', {}))
 
 
-def _coil_temperature(sim: SimParameters) -> float:
+def coil_temperature(sim: SimParameters) -> float:
     """Return the coil temperature (degC) as the electronics' status tells it."""
     return quantised_coil_temperature(sim.electronics.coil_temperature)
 
 
-def _stamp(mount: SimulatedMount) -> int:
+def stamp_of(mount: SimulatedMount | CarMount) -> int:
+    """Return the stamp (ns) of the next sample."""
     return mount.sample * SAMPLE_TIME_NS
 
 
-def _take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float | None) -> float:
+def take_one(
+    mount: SimulatedMount | CarMount, chain: CoreChain, samples: Samples, pending: float | None
+) -> float:
     """Take one sample and return the setpoint (A) as it arrives for the next."""
-    place, stamp = samples.count, _stamp(mount)
+    place, stamp = samples.count, stamp_of(mount)
     reading = Reading(*loop.over_the_bus(*mount.measure()))
     answer = chain.answer(stamp, reading)
     setpoint = OFF if answer.current is None else answer.current
@@ -143,11 +151,12 @@ def _take_many(
     """Take samples while all of them are plausible; return how many, and the setpoint (A) for the next."""
     controller = chain.answering.controller
     assert controller is not None
-    ahead = mount.ahead(samples.room)
+    plausibility, ahead = chain.answering.watch.plausibility, mount.ahead(samples.room)
     part = slice(samples.count, samples.count + len(ahead.values))
     taken, arrived, last = loop.run_with(chain.policy)(
         ahead,
         controller.memory,
+        (plausibility.limits, plausibility.memory),
         chain.displacement_range,
         pending,
         samples.readings[part],
@@ -156,7 +165,7 @@ def _take_many(
         samples.traces[part],
     )
     if taken:
-        stamps = _stamp(mount) + SAMPLE_TIME_NS * np.arange(taken)
+        stamps = stamp_of(mount) + SAMPLE_TIME_NS * np.arange(taken)
         part = slice(samples.count, samples.count + taken)
         samples.stamps[part] = stamps
         samples.traced[part] = True

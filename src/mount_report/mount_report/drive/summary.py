@@ -16,6 +16,7 @@ from mount_bags.events.switching_changes import switching_times
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.run.screen import Screen, Table
 from mount_bringup.chosen import Parameters, policy_of
+from mount_bringup.graph.restarts import Restart
 from mount_bringup.mount_choice import seat_of
 from mount_report.drive.evaluation import tracking_error
 from mount_report.drive.signals import DriveSignals, excitation_stamp
@@ -34,9 +35,9 @@ def summarise(
 ) -> dict[str, Any]:
     """Return the figures of a drive from its recording, its audit and its losses; `run` brings the others.
 
-    `run`: `scenario`, `mode`, `excitation_start`, `real_time_factor`, `latency_median_s`, `latency_p99_s`.
-    Times are s on the recording's time axis, from which `drive` counts too. Unknown or not applicable is
-    null.
+    `run`: `scenario`, `mode`, `excitation_start`, `real_time_factor`, `latency_median_s`, `latency_p99_s`,
+    `restarts`, `recordings`. Times are s on the recording's time axis, from which `drive` counts too. Unknown
+    or not applicable is null.
     """
     gap = recording['air_gap']
     truth = recording['sim/truth']
@@ -44,6 +45,7 @@ def summarise(
     friction = _friction_figures(recording, audits, drive, parameters)
     return {
         'recording': str(recording.path),
+        'recordings': run['recordings'],
         'scenario': run['scenario'],
         'mode': run['mode'],
         'mount': seat_of(parameters),
@@ -57,6 +59,7 @@ def summarise(
         'late_samples': found.late,
         'misdated_messages': found.misdated,
         'faults': found.as_json()['faults'],
+        'restarts': [_restart(entry, drive.zero) for entry in run['restarts']],
         'real_time_factor': run['real_time_factor'],
         'rest_gap_m': float(gap['rest_gap'][-1]),
         'contact_gap_m': float(gap['contact_gap'][-1]),
@@ -98,6 +101,17 @@ def _friction_figures(
     return _FrictionFigures(on.tolist(), off.tolist(), _known(peak_current(recording, audits)), _known(error))
 
 
+def _restart(restart: Restart, zero: int) -> dict[str, Any]:
+    loss = restart.loss
+    return {
+        'time_s': (restart.time - zero) / 1e9,
+        'nodes': [node.name for node in loss.nodes],
+        'reason': loss.reason,
+        'remedy': restart.remedy.value,
+        'took_s': restart.took,
+    }
+
+
 def summarise_snapshots(snapshots: list[Path], run: dict[str, Any]) -> dict[str, Any]:
     """Return the figures of a drive that recorded only events: those of `run`, as in `summarise`."""
     return {
@@ -122,18 +136,19 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
     )
 
 
-def print_summary(figures: dict[str, Any], found: Losses, screen: Screen) -> None:
-    """Print the figures as a table; times are s from the first displacement sample."""
+def print_summary(figures: dict[str, Any], found: Losses, screen: Screen, mount: str = '') -> None:
+    """Print the figures, `mount` before their title; times are s from the first displacement sample."""
     rows = [
         *(_gap_row(figures, name) for name in ('rest', 'contact')),
         ('excitation', f'from {figures["excitation_start_s"]:.2f} s on'),
         ('peak displacement', f'{_MM * figures["peak_displacement_m"]:.2f} mm'),
         *_friction_rows(figures),
         *found.rows(),
+        *_restart_rows(figures),
         ('latency', _latency_text(figures)),
         ('speed', f'{figures["real_time_factor"]:.2f} x real time'),
     ]
-    screen.table(Table(f'{figures["scenario"]}, {figures["mode"]}', 'll', rows))
+    screen.table(Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows))
 
 
 def _gap_row(figures: dict[str, Any], name: str) -> tuple[str, str]:
@@ -168,6 +183,16 @@ def _latency_text(figures: dict[str, Any]) -> str:
     if median is None or p99 is None:
         return 'none (no middleware)'
     return f'{_US * median:.0f} us median, {_US * p99:.0f} us in 99 of 100 (sample sent to setpoint back)'
+
+
+def _restart_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    return [
+        (
+            f'lost at {entry["time_s"]:.1f} s',
+            f'{entry["reason"]}; {entry["remedy"]} ({entry["took_s"]:.1f} s)',
+        )
+        for entry in figures['restarts']
+    ]
 
 
 def _percent(value: float | None, of_what: str) -> str:

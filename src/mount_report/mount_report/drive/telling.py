@@ -11,9 +11,10 @@ from mount_bags.audit.report import as_table, sentences
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.recorder.snapshot import saved_snapshots
-from mount_bags.run.folder import RunFolder
+from mount_bags.run.folder import RunFolder, recordings_of
 from mount_bags.run.screen import Screen
 from mount_bringup.chosen import Parameters, policy_of
+from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_report.drive.evaluation import levels_of, samples_at_the_ends
 from mount_report.drive.signals import DriveSignals, load_drive
 from mount_report.drive.summary import (
@@ -32,6 +33,7 @@ class Told:
     figures: dict[str, Any]
     recordings: list[Path]
     complaints: list[str] = field(default_factory=list)
+    pictures: list[Path] = field(default_factory=list)
 
 
 def tell_drive(
@@ -39,23 +41,60 @@ def tell_drive(
 ) -> Told:
     """Print and write the figures of a drive, with `report` also its picture and its page.
 
-    `run` is what the run itself knows, `parameters` those of its nodes. A picture or page that cannot be made
-    is a complaint.
+    `run` is what the run itself knows, `parameters` those of its nodes. Of several mounts each has figures
+    under `mounts`, a table and a picture; they share a page. Where the recorder was started again the figures
+    are those of the longest recording, and the others are audited. A picture or page that cannot be made is a
+    complaint.
     """
-    recording = open_recording(folder.recording)
+    recording, *others = _longest_first(recordings_of(folder.recording))
+    places = sorted(entry.path for entry in (recording, *others))
+    run = {**run, 'recordings': [str(place) for place in places]}
+    told = Told({}, places, list(recording.warnings))
+    parts = [recording.of_mount(name) for name in mounts_of(parameters)] or [recording]
+    figures = {
+        part.mount: _tell_mount(folder, part, settings, run, screen, told, report=report)
+        for part, settings in zip(parts, settings_of_mounts(parameters).values(), strict=True)
+    }
+    told.figures = figures[''] if '' in figures else {**_common(run), 'mounts': figures}
+    told.complaints += [words for other in others for words in _audited(other, screen)]
+    write_json(told.figures, folder.summary)
+    if report:
+        told.complaints += _complaint(folder.report, lambda: _write_report(folder, parts, screen))
+    return told
+
+
+def _common(run: dict[str, Any]) -> dict[str, Any]:
+    """Return what is the same for all mounts of a run."""
+    return {name: run[name] for name in ('scenario', 'mode', 'samples', 'recordings', 'real_time_factor')}
+
+
+def _tell_mount(
+    folder: RunFolder,
+    recording: Recording,
+    parameters: Parameters,
+    run: dict[str, Any],
+    screen: Screen,
+    told: Told,
+    *,
+    report: bool,
+) -> dict[str, Any]:
+    """Print the figures of one mount and draw its picture; return them, add to `told` what is wrong."""
     drive = load_drive(recording)
     audits = audit(recording)
     found = losses(recording, audits)
-    complaints = [*recording.warnings, *found.complaints()]
-    complaints += samples_at_the_ends(recording, audits, run['samples'])
+    mount = f'{recording.mount}: ' if recording.mount else ''
+    complaints = [*found.complaints(), *samples_at_the_ends(recording, audits, run['samples'])]
+    told.complaints += [f'{mount}{words}' for words in complaints]
     figures = summarise(recording, audits, found, drive, parameters, run)
-    write_json(figures, folder.summary)
-    print_summary(figures, found, screen)
+    print_summary(figures, found, screen, mount)
     screen.table(as_table(audits))
     if report:
-        complaints += _complaint(folder.figure, lambda: _draw(folder, parameters, drive, figures))
-        complaints += _complaint(folder.report, lambda: _write_report(folder, recording, screen))
-    return Told(figures, [folder.recording], complaints)
+        figure = folder.figure
+        if recording.mount:
+            figure = figure.with_name(f'{figure.stem}_{recording.mount}{figure.suffix}')
+        told.complaints += _complaint(figure, lambda: _draw(figure, parameters, drive, figures))
+        told.pictures += [figure] if figure.exists() else []
+    return figures
 
 
 def tell_snapshots(
@@ -65,31 +104,48 @@ def tell_snapshots(
     saved = saved_snapshots(folder.recording)
     complaints: list[str] = []
     for place in saved:
-        recording = open_recording(place)
-        audits = audit(recording)
-        found = losses(recording, audits)
-        screen.say(f'{place.name}: {sentences(audits, found)[-1]}')
-        complaints += [*recording.warnings, *(f'{place.name}: {words}' for words in found.complaints())]
+        complaints += _audited(open_recording(place), screen)
     screen.say(snapshots_sentence(len(saved), recorder))
     figures = summarise_snapshots(saved, run)
     write_json(figures, folder.summary)
     return Told(figures, saved, complaints)
 
 
-def _draw(folder: RunFolder, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:
+def _longest_first(places: list[Path]) -> list[Recording]:
+    """Return the recordings of a run, that of which its figures are made first."""
+
+    def samples(recording: Recording) -> int:
+        return sum(
+            recording.topics[f'/{name}/displacement'.replace('//', '/')].message_count
+            for name in recording.mounts
+        )
+
+    return sorted(map(open_recording, places), key=samples, reverse=True)
+
+
+def _audited(recording: Recording, screen: Screen) -> list[str]:
+    """Say in one sentence what a recording holds; return what is not as it should be."""
+    audits = audit(recording)
+    found = losses(recording, audits)
+    name = recording.path.name
+    screen.say(f'{name}: {sentences(audits, found)[-1]}')
+    return [*recording.warnings, *(f'{name}: {words}' for words in found.complaints())]
+
+
+def _draw(figure: Path, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:
     from mount_report.drive.picture import draw_drive  # after the drive: what draws takes a second to load
 
     policy, own = policy_of(parameters)
     levels = levels_of(policy, own)
     title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
     begin = figures['excitation_start_s']
-    draw_drive(drive.seen, levels, begin, title, folder.figure)
+    draw_drive(drive.seen, levels, begin, title, figure)
 
 
-def _write_report(folder: RunFolder, recording: Recording, screen: Screen) -> None:
+def _write_report(folder: RunFolder, parts: list[Recording], screen: Screen) -> None:
     from mount_report.pages import write_report  # after the drive, as above
 
-    write_report([recording], None, folder.report, None, screen)
+    write_report(parts, None, folder.report, None, screen)
 
 
 def _complaint(file: Path, make: Callable[[], None]) -> list[str]:

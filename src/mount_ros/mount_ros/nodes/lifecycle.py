@@ -12,7 +12,7 @@ from mount_ros.data_thread import DataThread
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
 from mount_ros.nodes.parameters import refuse_unknown
-from mount_ros.nodes.scheduling import calm_resending
+from mount_ros.nodes.real_time import Beats, RealTime, Urgent
 from mount_ros.private_rclpy import OpenLifecycleNode, integer_as_float
 
 
@@ -46,12 +46,16 @@ class SafeLifecycleNode(OpenLifecycleNode):
     run_time_parameters: frozenset[str] = frozenset()
     """Names of the parameters that can be set on the configured node: `check_parameters`, `take_changes`."""
 
+    urgent = Urgent(frozenset({'data'}))
+    """Its threads that work in real time while it is active."""
+
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
         self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
         self._lockstep = bool(self.declare_parameter('lockstep', False).value)
         self.data_path: ServedPath | None = None
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
+        self.real_time = RealTime(0)  # that of the process, if it has one
         self.after_configure: Callable[[], None] = _nothing  # what a process wants done then
         self.after_failure: Callable[[], None] = _nothing  # and when a thread of the node has ended by itself
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
@@ -89,6 +93,10 @@ class SafeLifecycleNode(OpenLifecycleNode):
     def judge(self) -> Verdict:
         """Return the verdict on the active node; must be quick and must not block."""
         return Verdict(Level.OK, 'active')
+
+    def beats(self) -> Beats:
+        """Return how a loop with a clock of its own has kept its time since the activation."""
+        return Beats()
 
     # State.
 
@@ -141,9 +149,12 @@ class SafeLifecycleNode(OpenLifecycleNode):
         return outcome
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        calm_resending()
         outcome = self._attempt('activate', self.activate, undo=self.deactivate)
         self._active = outcome == TransitionCallbackReturn.SUCCESS
+        if self._active:
+            self.real_time.begin(self)
+        else:
+            self.real_time.end(self)  # where the activation itself took it
         return outcome
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -193,6 +204,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
     def _leave_active(self) -> None:
         self._active = False
         self._make_safe(self.deactivate)
+        self.real_time.end(self)
 
     def _release(self) -> None:
         self._gate.open()
@@ -216,6 +228,11 @@ class SafeLifecycleNode(OpenLifecycleNode):
             sentence = f'errors in the data path ({path.refused}), the last: {path.refusal}'
             verdict = Verdict(Level.WARN, sentence, verdict.figures)
         unmatched = ', '.join(path.unmatched()) if path is not None else 'not configured'
+        if self.real_time.given_back:
+            sentence = self.real_time.given_back
+            worse = verdict.level is not Level.OK
+            sentence = f'{verdict.sentence}; {sentence}' if worse else sentence
+            verdict = Verdict(max(verdict.level, Level.WARN), sentence, verdict.figures)
         state = 'active' if self._active else 'inactive'
         figures = {**verdict.figures, 'state': state, 'unmatched': unmatched}
         return Verdict(verdict.level, verdict.sentence, figures)

@@ -29,8 +29,17 @@ def declare(node: Node, defaults: NamedTuple, prefix: str = '') -> None:
         full = f'{prefix}.{name}' if prefix else name
         if hasattr(value, '_asdict'):
             declare(node, value, full)
+        elif isinstance(value, tuple):
+            _declare_texts(node, full, value)
         else:
             node.declare_parameter(full, value, _descriptor(notes.get(name), kinds[name]))
+
+
+def _declare_texts(node: Node, name: str, texts: tuple[str, ...]) -> None:
+    """Declare a list of texts, which may be empty: rclpy takes an empty list for one of bytes."""
+    given = node.declare_parameter(name, Parameter.Type.STRING_ARRAY)
+    if given.type_ is Parameter.Type.NOT_SET:
+        node.set_parameters([Parameter(name, Parameter.Type.STRING_ARRAY, list(texts))])
 
 
 def read(node: Node, defaults: P, prefix: str = '') -> P:

@@ -17,7 +17,9 @@ from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
-from mount_ros.nodes.starter import Starter, take_priority
+from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
+from mount_ros.nodes.starter import Starter, given_priority
 
 _SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
 
@@ -35,8 +37,9 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     At the end they are closed in reverse order, so that the sender of setpoints ends before the driver.
     An exception in one of them or in a thread of its data ends all in the same way, with exit code 1.
     """
+    inherited = drop_real_time()
+    real_time = RealTime(given_priority() or inherited)
     prepare_environment()
-    take_priority()
     # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     nodes = [create() for create in creates]
@@ -46,14 +49,19 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         node.data_thread = data_thread
         node.after_configure = _freeze
         node.after_failure = over.tell_failure
-    over.listen(signal.SIGINT, signal.SIGTERM)
+        node.real_time = real_time
+    logger = nodes[0].get_logger()
+    if inherited:
+        logger.warning(started_in_real_time(inherited))
+    over.listen(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     _freeze()
     services = [_Service(node, over) for node in nodes]
-    over.wait()
+    over.wait(real_time, logger.warning)
+    real_time.close()
     for node in nodes:
         node.ending.set()
     if over.starter.ended:
-        nodes[0].get_logger().error('the process that started this one has ended, so this one ends too')
+        logger.error(f'{over.starter.name} has ended, so this one ends too, at 0 A: start the graph again')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()
@@ -116,8 +124,22 @@ class _Ending:
         self.failed = True
         self.tell()
 
-    def wait(self) -> None:
-        self.starter.wait_beside(self._read)
+    def wait(self, real_time: RealTime, say: Callable[[str], None]) -> None:
+        """Look after the priority of the process until it shall end; `say` takes why it was given back."""
+        period = WATCH_PERIOD if real_time.priority else None
+        while not self.starter.ended:
+            told = self._read_for(period)
+            if any(number != signal.SIGXCPU for number in told):
+                return
+            sentence = real_time.ran_without_sleep() if told else real_time.look()
+            if sentence:
+                say(sentence)
+
+    def _read_for(self, period: float | None) -> bytes:
+        """Return the numbers of the signals that came, 46 of what is no signal; nothing after `period` s."""
+        if self.starter.wait_beside(self._read, period):
+            return os.read(self._read, 4096)
+        return b''
 
 
 class _Service:

@@ -4,7 +4,6 @@ Told by the environment, so that it holds for nodes of the supervisor and of `ro
 node stands for itself.
 """
 
-import contextlib
 import os
 import select
 
@@ -12,20 +11,13 @@ _STARTER, _PRIORITY = 'ENGINE_MOUNT_STARTER', 'ENGINE_MOUNT_PRIORITY'
 
 
 def environment_of_children(priority: int) -> dict[str, str]:
-    """Return what processes that this one starts need to end with it, and to run at `priority` (0: none)."""
+    """Return what processes need that shall end with this one and run their loops at `priority` (0: none)."""
     return {_STARTER: str(os.getpid()), _PRIORITY: str(priority)}
 
 
-def take_priority() -> None:
-    """Run this thread, and those it will make, at the priority given, as SCHED_FIFO.
-
-    To be called before the middleware makes its threads, so that those that receive inherit it; those that
-    send again are taken out by `mount_ros.nodes.scheduling`. Where not permitted nothing changes.
-    """
-    priority = int(os.environ.get(_PRIORITY, '0'))
-    if priority:
-        with contextlib.suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+def given_priority() -> int:
+    """Return the real-time priority at which the loop of this process is to run; 0: none."""
+    return int(os.environ.get(_PRIORITY, '0'))
 
 
 class Starter:
@@ -41,10 +33,18 @@ class Starter:
             except ProcessLookupError:
                 self._had_ended = True
 
-    def wait_beside(self, descriptor: int) -> None:
-        """Return when there is something to read from `descriptor`, or the starter has ended."""
-        if not self._had_ended:
-            select.select([descriptor, *self._end], [], [])
+    def wait_beside(self, descriptor: int, period: float | None = None) -> bool:
+        """Return whether there is something to read from `descriptor`.
+
+        It waits for that, for the end of the starter, and for no longer than `period` s.
+        """
+        ready, _, _ = select.select([descriptor, *self._end], [], [], 0.0 if self._had_ended else period)
+        return descriptor in ready
+
+    @property
+    def name(self) -> str:
+        """The process, for people."""
+        return f'the process that started this one ({os.environ.get(_STARTER, "none")})'
 
     @property
     def ended(self) -> bool:

@@ -10,11 +10,17 @@ from mount_driver.bus import Reception, may_have_frames
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
 from mount_driver.frame import Frame
+from mount_driver.watches.sender_watch import SenderLimits, SenderWatch
+from mount_models.sampling import SAMPLE_TIME_NS
 from mount_sim.electronics.electronics import Reading
 
 _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFFFFFF
+_QUIET = 1_000_000_000  # ns, chosen: so long no second host may be heard before a current flows again
 _CREDIBLE_AGE = 10.0  # s, chosen: a frame's time stamp that is farther from now is of another clock
+
+
+_OFF = Setpoint(0.0, _COUNTER_MASK, enable=False)
 
 
 @dataclass(frozen=True)
@@ -43,23 +49,37 @@ class CanEnd:
         self._bus = bus
         self._reception = Reception()
         self._codec = MountCodec()
+        self.restart()
+
+    def restart(self) -> None:
+        """Count frames from 0, those that come too, as electronics do that were without power."""
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
         self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.decode_setpoint, self._codec.setpoint)
+        self._hosts = SenderWatch(SenderLimits(), self._codec.setpoint.name, 'one host only may send it')
+        self._now = 0  # ns, by the samples
+        self._off_until = 0
 
     @property
     def failed_setpoints(self) -> int:
         """Setpoint frames that failed their check and were not used: damaged, repeated, of wrong sequence."""
         return self._receiver.failed
 
+    @property
+    def contested(self) -> bool:
+        """Whether more than one host sends setpoints, or did within the last second: the coil is at 0 A."""
+        return self._now < self._off_until
+
     def measurement_frame(
-        self, number: int, microseconds: int, reading: Reading, enabled: bool
+        self, number: int, microseconds: int, reading: Reading, *, enabled: bool, unheard: bool = False
     ) -> can.Message:
         """Return the frame of sample `number`, taken at `microseconds` of the electronics' clock.
 
+        `enabled`: the power stage is on; `unheard`: it is off because setpoints stopped.
         What lies beyond the limits of its signal, and so of its sensor, is sent as not valid.
         """
         codec = self._codec
+        self._now = number * SAMPLE_TIME_NS
         measurement = Measurement(
             number & _COUNTER_MASK,
             microseconds & _MICROSECOND_MASK,
@@ -68,14 +88,15 @@ class CanEnd:
             codec.current_rate.within(reading.current_rate),
             codec.flux_rate.within(reading.flux_rate),
             enabled=enabled,
+            setpoint_timeout=unheard,
         )
         data = self._codec.encode_measurement(measurement, self._measurement_alive.next())
         return Frame(self._codec.measurement.frame_id, data)
 
-    def send_status(self, status: Status) -> None:
-        """Send the slow health message."""
+    def status_frame(self, status: Status) -> can.Message:
+        """Return the frame of the slow health message."""
         data = self._codec.encode_status(status, self._status_alive.next())
-        self.send_frame(Frame(self._codec.status.frame_id, data))
+        return Frame(self._codec.status.frame_id, data)
 
     def send_frame(self, frame: can.Message) -> None:
         """Send a frame as it is."""
@@ -114,6 +135,10 @@ class CanEnd:
         if frame.arbitration_id != self._codec.setpoint.frame_id:
             return None
         setpoint = self._receiver.receive(frame.data)
+        if self._hosts.judge(self._receiver.strangers, self._now):
+            self._off_until = self._now + _QUIET
+        if self.contested:
+            return ReceivedSetpoint(_OFF, math.nan)
         if setpoint is None:
             return None
         credible = abs(time.time() - frame.timestamp) < _CREDIBLE_AGE

@@ -63,9 +63,10 @@ class Noise:
     """Displacement, current, the two slopes, time of sampling: the last has a sequence of its own."""
     _BLOCK = 4096
 
-    def __init__(self, seed: int):
-        self._random = RandomNumbers(seed)
-        self._random_times = RandomNumbers((seed, 1))
+    def __init__(self, seed: int, place: int | None = None):
+        """`place`: the number of the mount where there are several; each has sequences of its own."""
+        self._random = RandomNumbers(seed if place is None else (seed, 2, 1 + place))
+        self._random_times = RandomNumbers((seed, 1) if place is None else (seed, 1, 1 + place))
         self._numbers: NDArray[np.float64] = np.empty((0, self.NUMBERS))
         self._place = 0
 

@@ -3,7 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from mount_models.coil.ripple import RippleCoil
-from mount_models.quantity import Quantity, with_values
+from mount_models.quantity import Quantity
 
 REFERENCE_CELSIUS = 20.0
 """Temperature at which the parameters of the truth hold."""
@@ -27,8 +27,7 @@ class TemperatureCoefficients(NamedTuple):
 def coil_at(coil: RippleCoil, coefficients: TemperatureCoefficients, celsius: float) -> RippleCoil:
     """Return coil and core plates, given at 20 degC, as they are at `celsius` (degC)."""
     warmer = celsius - REFERENCE_CELSIUS
-    return with_values(
-        coil,
+    return coil._replace(
         conductivity=coil.conductivity / (1.0 + coefficients.core * warmer),
         resistance=coil.resistance * (1.0 + coefficients.copper * warmer),
     )

@@ -19,7 +19,9 @@ from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.mounts import Contents
 from mount_sim.plant.plant import STATE, Plant, advance
 
-_GROWTH_ALLOWED = 1e-6  # of a motion in one step, chosen: far above rounding, 2 % in a second
+GROWTH_ALLOWED = 1e-6
+"""Of a motion in one step, chosen: far above rounding, 2 % in a second."""
+
 _BISECTIONS = 30
 _SHIFTS = {'volume': 1e-12, 'flow': 1e-9}  # m^3, m^3/s (chosen): within one piece of the hydromount's laws
 _SHIFT = 1e-6  # of all others, SI, chosen
@@ -50,7 +52,7 @@ def growth(plant: Plant, seat: Seat, step_time: float) -> float:
 
 
 def _is_stable(plant: Plant, seat: Seat, step_time: float) -> bool:
-    return growth(plant, seat, step_time) <= 1.0 + _GROWTH_ALLOWED
+    return growth(plant, seat, step_time) <= 1.0 + GROWTH_ALLOWED
 
 
 def _after_a_step(

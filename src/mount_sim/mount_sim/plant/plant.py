@@ -45,7 +45,8 @@ class Plant(NamedTuple):
     mount: SeatedMount = SeatedMount()
 
 
-_PLANT = record_dtype(Plant)
+PLANT = record_dtype(Plant)
+"""The plant's parameters in compiled code."""
 
 STATE = record_type(
     [
@@ -94,10 +95,8 @@ class PlantSimulation:
 
     def __init__(self, plant: Plant, seat: Seat, step_time: float):
         plant = Plant(*(checked(part) for part in plant))
-        celsius = plant.electronics.coil_temperature
-        plant = plant._replace(coil=coil_at(plant.coil, plant.temperature, celsius))
         checked_closing(plant.mechanics, plant.actuator)
-        self._plant = record_bytes(plant)
+        self._plant = record_bytes(_warm(plant))
         self._seat = int(seat)
         self._step_time = step_time
         self._state = np.zeros(1, STATE).view(np.uint8)
@@ -110,6 +109,11 @@ class PlantSimulation:
     def memory(self) -> Memory:
         """What the compiled `read` and `advance` need, for a compiled loop that calls them."""
         return Memory(self._plant, self._state, self._seat, self._step_time)
+
+    def stand_in(self, plant: NDArray[np.uint8], state: NDArray[np.uint8]) -> None:
+        """Have parameters and state in these bytes from now on, where those of several mounts stand."""
+        plant[:], state[:] = self._plant, self._state
+        self._plant, self._state = plant, state
 
     @property
     def truth(self) -> np.void:
@@ -134,6 +138,10 @@ class PlantSimulation:
         """
         advance(self._plant, self._state, self._seat, values, engine_forces, wanted_current, self._step_time)
 
+    def change(self, plant: Plant) -> None:
+        """Go on from the present state with other parameters; a fault's need not lie within their ranges."""
+        self._plant[:] = record_bytes(_warm(plant))
+
     @property
     def account(self) -> np.void:
         """The energy since the first `advance_with_books`, a record of `mount_models.energy.ACCOUNT`."""
@@ -153,13 +161,19 @@ class PlantSimulation:
         )
 
 
+def _warm(plant: Plant) -> Plant:
+    """Return the plant with coil and core at their temperature."""
+    celsius = plant.electronics.coil_temperature
+    return plant._replace(coil=coil_at(plant.coil, plant.temperature, celsius))
+
+
 @compiled
 def read(plant, state, truth, noise):
     """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` as in `Noise`.
 
     The displacement is NaN where anything of the state is no finite number.
     """
-    law, now, seen = plant.view(_PLANT)[0], state.view(STATE)[0], truth.view(TRUTH)[0]
+    law, now, seen = plant.view(PLANT)[0], state.view(STATE)[0], truth.view(TRUTH)[0]
     seen.displacement = now.displacement
     seen.velocity = now.velocity
     seen.coil_current = now.current
@@ -192,27 +206,27 @@ def _finite(now):
 @compiled
 def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
     """Advance the state by one step of `dt` s for each excitation value; see `PlantSimulation.advance`."""
-    law, now = plant.view(_PLANT)[0], state.view(STATE)[0]
+    law, now = plant.view(PLANT)[0], state.view(STATE)[0]
     now.wanted_current = wanted_current
     for index in range(len(values)):
-        _advance_magnet(law, now, dt)
+        advance_magnet(law, now, dt)
         if seat == _BENCH:
             _advance_bench(law, now, values[index], dt)
         elif seat == _ACCELERATED_CHASSIS:
-            beside = _force_beside_elastomer(law, now, now.displacement, dt)
+            beside = force_beside_elastomer(law, now, now.displacement, dt)
             motion = engine_step(law.engine, now.engine, values[index], engine_forces[index], beside, dt)
-            _take_motion(law, now, motion, dt)
+            take_motion(law, now, motion, dt)
         else:
             now.road_height = values[index]
-            beside = _force_beside_elastomer(law, now, now.displacement, dt)
+            beside = force_beside_elastomer(law, now, now.displacement, dt)
             motion = vehicle_step(law.vehicle, now.vehicle, values[index], engine_forces[index], beside, dt)
-            _take_motion(law, now, motion, dt)
+            take_motion(law, now, motion, dt)
 
 
 @compiled
 def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
     """Advance as `advance` does in a vehicle and book each step in `account`, the bytes of its record."""
-    law, books = plant.view(_PLANT)[0], account.view(ACCOUNT)[0]
+    law, books = plant.view(PLANT)[0], account.view(ACCOUNT)[0]
     before = state.copy()
     for k in range(len(values)):
         before[:] = state
@@ -231,7 +245,8 @@ def advance_with_books(plant, state, account, values, engine_forces, wanted_curr
 
 
 @compiled
-def _advance_magnet(law, now, dt):
+def advance_magnet(law, now, dt):
+    """Advance current, gap and normal force by `dt` s."""
     now.current = advance_current(
         law.electronics, law.coil, law.actuator, now.current, now.gap, now.wanted_current, dt
     )
@@ -241,7 +256,7 @@ def _advance_magnet(law, now, dt):
 
 
 @compiled
-def _force_beside_elastomer(law, now, displacement, dt):
+def force_beside_elastomer(law, now, displacement, dt):
     """Return the force (N) of what acts in the mount at `displacement` (m) beside its elastomer."""
     if law.mount.contents == _PADS:
         _rub(law, now, displacement, dt)
@@ -271,12 +286,13 @@ def _advance_bench(law, now, displacement, dt):
     now.velocity = change / dt
     now.displacement = displacement
     _pump(law, now, change, dt)
-    beside = _force_beside_elastomer(law, now, displacement, dt)
+    beside = force_beside_elastomer(law, now, displacement, dt)
     now.mount_force = elastomer_force(elastomer, displacement, branches) + beside
 
 
 @compiled
-def _take_motion(law, now, motion, dt):
+def take_motion(law, now, motion, dt):
+    """Note a `MountMotion` and advance what it pumps."""
     _pump(law, now, motion.displacement - now.displacement, dt)
     now.displacement = motion.displacement
     now.velocity = motion.velocity

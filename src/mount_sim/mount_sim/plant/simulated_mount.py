@@ -1,7 +1,6 @@
 """Electronics and plant together, sample by sample, without bus or clock."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics.electronics import Noise, Reading
+from mount_sim.electronics.faults.schedule import Faults
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.shaking import Shaking
 from mount_sim.plant.check import checked_plant
@@ -60,23 +60,25 @@ class Ahead(NamedTuple):
     noise: NDArray[np.float64]
 
 
-class SimulatedMount:
-    """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again.
+class MountElectronics:
+    """Sensors, noise and current of one mount, sample by sample; who moves the plant calls `wanted`.
 
     A setpoint takes effect at the sample instant after the one that it answers, as the electronics' own
     sampled current loop takes it over. Without a setpoint for `setpoint_timeout`, counted from when the last
-    one was due, the current goes to 0 A.
+    one was due, the current goes to 0 A. `faults` change readings, coil current and plant.
     """
 
-    def __init__(self, plant: Plant, excitation: Excitation, seed: int):
-        self._plant = PlantSimulation(plant, excitation.seat, excitation.step_time)
-        checked_plant(plant, excitation.seat, excitation.step_time)
-        self._noise = Noise(seed)
+    def __init__(
+        self, plant: Plant, simulation: PlantSimulation, noise: Noise, run: Run, faults: Faults | None = None
+    ):
+        self.faults = Faults() if faults is None else faults
+        self._sound_plant = plant
+        self._plant = simulation
+        self._noise = noise
         self.patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
         """Samples without a setpoint after which the current goes to 0 A."""
-        self._shaking = Shaking(excitation)
         self._driver_opens = plant.mount.driver_opens
-        self.run = Run(self._shaking.samples, self._shaking.start)
+        self.run = run
         self.sample = 0
         self.beyond_range = BeyondRange()
         self._silent = 0
@@ -114,26 +116,58 @@ class SimulatedMount:
 
     def measure(self) -> Reading:
         """Return what the sensors read now; raises `DivergedError` where the plant has blown up."""
+        faults = self.faults
+        if faults.due(self.time):
+            faults.look(self.time)
+            self._plant.change(faults.plant(self._sound_plant))
         reading = Reading(*self._plant.read(self._noise.next()))
         if not abs(reading.displacement) <= FARTHEST_DISPLACEMENT:
             self._doubt(reading.displacement)
-        return reading
+        return faults.reading(reading) if faults.present else reading
 
-    def advance(
-        self, setpoint: float | None, late: int = 0, driven: Callable[[float], float] | None = None
-    ) -> None:
-        """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
+    def forget(self) -> None:
+        """Take no setpoint of the past for one of the present, as electronics that were without power."""
+        self._silent = self.patience
 
-        `late` is the number of samples since it was due; `driven` returns what a faulty driver gives where a
-        current (A) is wanted. Behind the end of the run nothing shakes the mount any more.
-        """
+    def wanted(self, setpoint: float | None, late: int) -> float:
+        """Return the current (A) that the coil is given up to the next sample; arguments as of `advance`."""
         if setpoint is None:
             self._silent += 1
         else:
             self._silent, self._current = late, setpoint
         current = self._current if self.driver_on else 0.0
-        if driven is not None:
-            current = driven(current)
+        return self.faults.driven(current) if self.faults.present else current
+
+    def _doubt(self, displacement: float) -> None:
+        if not math.isfinite(displacement):
+            raise DivergedError(
+                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
+                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
+            )
+        self.beyond_range.note(self.time)
+
+    @property
+    def _driver_open(self) -> bool:
+        return self._driver_opens and self.sample >= self.run.excitation_start
+
+
+class SimulatedMount(MountElectronics):
+    """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again."""
+
+    def __init__(self, plant: Plant, excitation: Excitation, seed: int, faults: Faults | None = None):
+        simulation = PlantSimulation(plant, excitation.seat, excitation.step_time)
+        checked_plant(plant, excitation.seat, excitation.step_time)
+        self._shaking = Shaking(excitation)
+        run = Run(self._shaking.samples, self._shaking.start)
+        super().__init__(plant, simulation, Noise(seed), run, faults)
+
+    def advance(self, setpoint: float | None, late: int = 0) -> None:
+        """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
+
+        `late` is the number of samples since it was due. Behind the end of the run nothing shakes the mount
+        any more.
+        """
+        current = self.wanted(setpoint, late)
         values, forces = self._shaking.at(self.sample)
         self._plant.advance(values, forces, current)
         self.sample += 1
@@ -155,15 +189,3 @@ class SimulatedMount:
         self._noise.skip(count)
         self._silent, self._current = 0, setpoint
         self.sample += count
-
-    def _doubt(self, displacement: float) -> None:
-        if not math.isfinite(displacement):
-            raise DivergedError(
-                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
-                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
-            )
-        self.beyond_range.note(self.time)
-
-    @property
-    def _driver_open(self) -> bool:
-        return self._driver_opens and self.sample >= self.run.excitation_start

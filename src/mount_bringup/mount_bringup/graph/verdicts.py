@@ -1,0 +1,87 @@
+"""What the nodes of a graph say of themselves on `/diagnostics`."""
+
+import time
+from collections.abc import Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray
+
+from mount_bringup.graph.errors import GraphError
+from mount_bringup.graph.liveliness import Liveliness
+from mount_bringup.graph.nodes import CONTROL, DRIVER, GraphNode
+from mount_ros.nodes.diagnostics import Level
+
+
+class Verdicts:
+    """The last diagnostics of each node in `namespace`, and who has been silent since."""
+
+    def __init__(self, nodes: Sequence[GraphNode], namespace: str):
+        self.liveliness = Liveliness()
+        self._nodes = nodes
+        self._names = {node.full_name for node in nodes}
+        self._space = f'{namespace.strip("/")}/'.lstrip('/')
+        self._figures: dict[str, dict[str, str]] = {}
+
+    def take(self, message: DiagnosticArray) -> None:
+        """Take what a node tells."""
+        for status in message.status:
+            # /diagnostics belongs to all mounts of the car
+            if not status.name.startswith(self._space):
+                continue
+            name = status.name.removeprefix(self._space)
+            if '/' in name and name not in self._names:
+                continue
+            if name in self._names:
+                self.liveliness.hear(name, time.monotonic())
+            self._figures[name] = {
+                **{value.key: value.value for value in status.values},
+                'level': str(status.level[0]),
+                'sentence': status.message,
+            }
+
+    def figures(self, node: GraphNode) -> dict[str, str]:
+        """Return what a node told last: its figures, `level` and `sentence`; empty if nothing came."""
+        return self._figures.get(node.full_name, {})
+
+    def note_active(self, node: GraphNode) -> None:
+        """Note that a node was activated, which it tells only with its next diagnostics."""
+        self._figures.setdefault(node.full_name, {'level': '0', 'sentence': ''})['state'] = 'active'
+
+    def forget(self, node: GraphNode) -> None:
+        """Forget what a node has told: it holds no more."""
+        self._figures.pop(node.full_name, None)
+        self.liveliness.forget(node.full_name)
+
+    def check_fatal(self) -> None:
+        """Raise `GraphError` if a node tells that the graph must end."""
+        for node in self._nodes:
+            figures = self.figures(node)
+            if figures.get('fatal') == 'True':
+                raise GraphError(f'{node.full_name}: {figures["sentence"]}{self._who_is_silent(figures)}')
+
+    def needing_initialisation(self) -> str:
+        """Return why the mount must be initialised anew, by the node that says so; else empty."""
+        for node in self._nodes:
+            figures = self.figures(node)
+            if figures.get('needs_initialisation') == 'True':
+                return f'{node.full_name}: {figures["sentence"]}'
+        return ''
+
+    def complaints(self) -> str:
+        """Return what the nodes complain of, in one sentence."""
+        said = [
+            f'{name}: {figures["sentence"]}'
+            for name, figures in self._figures.items()
+            if int(figures['level']) >= Level.WARN
+        ]
+        return '; '.join(said) or 'no node complains'
+
+    def _who_is_silent(self, figures: dict[str, str]) -> str:
+        """Return the first node of the chain that has not handled the sample which waits for its answer."""
+        waiting = figures.get('waiting_stamp', '')
+        if not waiting.isdigit():
+            return ''
+        for node in self._nodes:
+            handled = self.figures(node).get('last_stamp', '')
+            if node.is_a(DRIVER, CONTROL) and (not handled.isdigit() or int(handled) < int(waiting)):
+                return f'; {node.full_name} does not answer'
+        return ''

@@ -1,0 +1,90 @@
+"""A real recorder that is killed or stands still, under a real supervisor: the graph goes on without it."""
+
+import contextlib
+import os
+import signal
+
+import pytest
+
+import mount_bags
+from mount_bags.run.folder import recordings_of
+from mount_bringup.graph.errors import GraphError
+from mount_bringup.graph.nodes import RECORDER, GraphSettings
+from mount_bringup.graph.supervisor import Supervisor
+
+LIMIT = 60.0  # s: only a hang takes so long
+
+
+@contextlib.contextmanager
+def recording_graph(folder, domain, limit=3, **parameters):
+    """A graph of nothing but a recorder: what is tested needs no machine that keeps 1 kHz."""
+    values = {RECORDER.name: {'uri': str(folder / 'recording'), **parameters}}
+    settings = GraphSettings(domain=domain, parameters=values, restart_limit=limit)
+    graph = Supervisor((RECORDER,), settings, folder)
+    try:
+        graph.start(lambda parameters: 'scenario: none', lambda text: None)
+        yield graph
+    finally:
+        assert graph.stop() == []
+
+
+def pid_of(graph):
+    [process] = graph._processes
+    return process._process.pid
+
+
+def lose(graph, number):
+    """Send a signal to the recorder and wait until the graph works again."""
+    before = len(graph.restarts)
+    os.kill(pid_of(graph), number)
+    graph.wait_until(lambda: len(graph.restarts) > before, LIMIT, 'recovery')
+    graph.wait_until(lambda: graph.figures(RECORDER).get('state') == 'active', LIMIT, 'an active recorder')
+
+
+def test_a_killed_recorder_begins_a_new_recording_and_the_old_one_stays_readable(tmp_path, domain):
+    told = []
+    with recording_graph(tmp_path, domain) as graph:
+        graph.tell_loss = told.append
+        graph.wait_until(lambda: int(graph.figures(RECORDER).get('received', 0)) > 2, LIMIT, 'messages')
+        lose(graph, signal.SIGKILL)
+        [restart] = graph.restarts
+    assert restart.loss.names == 'mount_recorder'
+    assert 'ended with code -9' in told[0]
+    assert 'started again with a new recording' in restart.sentence
+    first, second = recordings_of(tmp_path / 'recording')
+    assert second.name == 'recording_restarted_2'
+    assert len(mount_bags.open(first)['session']) == 1
+    whole = mount_bags.open(second)
+    assert whole.warnings == []
+    assert len(whole['session']) == 1  # latched by the supervisor, so the new recording tells what it is
+
+
+def test_a_recorder_that_stands_still_counts_as_dead_after_the_limit(tmp_path, domain):
+    with recording_graph(tmp_path, domain) as graph:
+        lose(graph, signal.SIGSTOP)
+        assert 'mount_recorder told nothing for 4 s' in graph.restarts[0].sentence
+
+
+def test_one_that_stands_still_for_less_goes_on(tmp_path, domain):
+    with recording_graph(tmp_path, domain) as graph:
+        process = pid_of(graph)
+        os.kill(process, signal.SIGSTOP)
+        graph.serve_for(2.0)
+        os.kill(process, signal.SIGCONT)
+        graph.serve_for(3.0)
+        assert pid_of(graph) == process
+        assert graph.restarts == []
+
+
+def test_a_recorder_that_dies_too_often_ends_the_graph(tmp_path, domain):
+    with recording_graph(tmp_path, domain, limit=1) as graph:
+        lose(graph, signal.SIGKILL)
+        with pytest.raises(GraphError, match=r'mount_recorder was lost 2 times within 60 s \(limit 1\)'):
+            lose(graph, signal.SIGKILL)
+
+
+def test_in_lock_step_the_first_loss_ends_the_graph(tmp_path, domain):
+    with recording_graph(tmp_path, domain, lockstep=True) as graph:
+        os.kill(pid_of(graph), signal.SIGKILL)
+        with pytest.raises(GraphError, match='mount_recorder ended with code -9'):
+            graph.wait_until(lambda: False, LIMIT, 'nothing')

@@ -1,0 +1,21 @@
+"""The first step of the `engine-mount` command: Ctrl-C ends it in order while its modules are loaded."""
+
+import os
+import signal
+from typing import Any
+
+from mount_bringup.graph.errors import INTERRUPTED
+
+
+def main() -> None:
+    """Load the command and run it."""
+    signal.signal(signal.SIGINT, _leave)
+    from mount_cli.command import main as run
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    run()
+
+
+def _leave(*_: Any) -> None:
+    os.write(2, b'interrupted; nothing was started\n')
+    os._exit(INTERRUPTED)

@@ -1,0 +1,165 @@
+"""Whether a displacement can be one: does it move as a mount can, with the noise of a sound sensor?
+
+What no sample tells is not looked for: a reading of wrong sign, or one whose zero drifts within the range.
+Friction opposes the motion whatever sign it is told, and the band-pass takes drift away.
+"""
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from mount_control.parameters import ControlParameters
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
+from mount_models.sampling import SAMPLE_TIME
+
+HOLD = 1.0
+"""After the last implausible sample none is believed for so long, s; chosen."""
+
+_LEAST_NOISE = 0.5e-6  # m, chosen: five steps of the signal; a sensor with less may well repeat itself
+_ORDER = 4  # of the difference that leaves noise and takes motion away: at 50 Hz 1 % of it remains
+_NOISE_OF_DIFFERENCE = math.sqrt(70.0 * 2.0 / math.pi)  # mean of |4th difference| of white noise of 1
+_SHARE = 0.01  # chosen: of each sample in the mean, over about 100 samples
+_CUT = 4.0  # chosen: of the limit; no single reading counts for more
+
+
+class Doubt(IntEnum):
+    """Why a displacement is not believed."""
+
+    NONE = 0
+    STEP = 1
+    STUCK = 2
+    NOISE = 3
+
+
+class Limits(NamedTuple):
+    """What a displacement keeps to: m/s, m, and numbers of samples."""
+
+    velocity: float
+    noise: float
+    stuck: int
+    hold: int
+
+
+LIMITS = record_dtype(Limits)
+MEMORY = record_type(
+    [
+        *((name, 'f8') for name in ('newest', 'second', 'third', 'fourth', 'noise', 'value')),
+        *((name, 'i8') for name in ('known', 'repeats', 'held', 'doubt')),
+    ]
+)
+"""The newest displacements (m), how many are `known`, their noise (m); the last doubt and its value."""
+
+
+class Plausibility:
+    """Keeps what is known of the displacement; `memory` for compiled code, see `doubt_of`."""
+
+    def __init__(self, parameters: ControlParameters):
+        self.limits = record_bytes(
+            Limits(
+                parameters.displacement_velocity,
+                parameters.displacement_noise,
+                round(parameters.displacement_stuck / SAMPLE_TIME),
+                round(HOLD / SAMPLE_TIME),
+            )
+        )
+        self.memory = np.zeros(1, MEMORY).view(np.uint8)
+        self._record = self.memory.view(MEMORY)[0]
+        self._parameters = parameters
+
+    def doubt(self, displacement: float, missing: int) -> bool:
+        """Take a sample (m) with so many missing before it; return whether it is not to be believed."""
+        return bool(doubt_of(self.limits, self.memory, displacement, missing))
+
+    def believed(self, displacements: np.ndarray) -> int:
+        """Take samples that follow each other up to the first that is not to be believed; return how many."""
+        return int(_believed(self.limits, self.memory, displacements))
+
+    @property
+    def held(self) -> bool:
+        """Whether samples are not believed at present."""
+        return bool(self._record['held'])
+
+    @property
+    def sentence(self) -> str:
+        """What was last not believed, with value, limit and remedy; empty where everything was."""
+        value, limits = float(self._record['value']), self._parameters
+        told = {
+            Doubt.NONE: '',
+            Doubt.STEP: (
+                f'displacement moved at {value:.2f} m/s (limit {limits.displacement_velocity:g} m/s): '
+                'check the displacement sensor, its seat and its cable'
+            ),
+            Doubt.STUCK: (
+                f'displacement repeated {1e3 * value:.4f} mm for {1e3 * limits.displacement_stuck:.0f} ms, '
+                f'without the noise of its sensor (limit {1e3 * limits.displacement_stuck:g} ms): '
+                'check the displacement sensor'
+            ),
+            Doubt.NOISE: (
+                f'noise of the displacement ({1e6 * value:.0f} um) is above '
+                f'{1e6 * limits.displacement_noise:g} um: check the displacement sensor and its shield'
+            ),
+        }
+        return told[Doubt(int(self._record['doubt']))]
+
+
+_STEP, _STUCK, _NOISE = int(Doubt.STEP), int(Doubt.STUCK), int(Doubt.NOISE)
+
+
+@compiled
+def doubt_of(limits, memory, displacement, missing):
+    """Take one displacement (m) with so many `missing` before it; return whether it is in doubt.
+
+    `limits` and `memory` are the bytes of their records. A doubt lasts for `Limits.hold` samples from the
+    last reason on. More missing samples than displacements are kept leave nothing to compare with.
+    """
+    law, now = limits.view(LIMITS)[0], memory.view(MEMORY)[0]
+    now.held = max(0, now.held - 1 - missing)
+    if missing > 0:
+        now.known = min(now.known, 1)
+    _compare(law, now, displacement, missing)
+    now.fourth, now.third, now.second, now.newest = now.third, now.second, now.newest, displacement
+    now.known = min(now.known + 1, _ORDER)
+    return now.held > 0
+
+
+@compiled
+def _compare(law, now, displacement, missing):
+    if now.known == 0:
+        return
+    velocity = abs(displacement - now.newest) / ((missing + 1) * SAMPLE_TIME)
+    if velocity > law.velocity:
+        _raise(law, now, _STEP, velocity)
+    if displacement == now.newest:
+        now.repeats += 1
+        if now.repeats >= law.stuck and now.noise >= _LEAST_NOISE:
+            _raise(law, now, _STUCK, displacement)
+        return
+    now.repeats = 0
+    if now.known == _ORDER:
+        difference = displacement - 4.0 * (now.newest + now.third) + 6.0 * now.second + now.fourth
+        noise = min(abs(difference) / _NOISE_OF_DIFFERENCE, _CUT * law.noise)
+        now.noise += _SHARE * (noise - now.noise)
+        if now.noise > law.noise:
+            _raise(law, now, _NOISE, now.noise)
+
+
+@compiled
+def _raise(law, now, doubt, value):
+    """Note a doubt; while one lasts, the first is told."""
+    if now.held == 0:
+        now.doubt, now.value = doubt, value
+    now.held = law.hold
+
+
+@compiled
+def _believed(limits, memory, displacements):
+    before = memory.copy()
+    for index in range(len(displacements)):
+        before[:] = memory
+        if doubt_of(limits, memory, displacements[index], 0):
+            memory[:] = before
+            return index
+    return len(displacements)

@@ -1,0 +1,100 @@
+"""Behind a restart of the electronics the coil stays at 0 A until a new activation."""
+
+import re
+
+import pytest
+from car import GOOD, MS, Car
+from far_end import CODEC, sample
+
+from mount_driver.codec import Setpoint, Status
+from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.frame import Frame
+from mount_driver.link import Refusal
+
+BEGIN = GOOD * MS
+
+
+@pytest.fixture
+def car():
+    made = Car()
+    made.drive(GOOD, made.answer)
+    assert made.on_bus() == Setpoint(3.0, GOOD, True)
+    yield made
+    made.exchange.stop()
+    made.far.close()
+
+
+def restarted(car, pause):
+    """Return electronics that are silent for `pause` ms, then count from 0 again."""
+    alive = AliveCounter()
+
+    def electronics(index):
+        k = index - GOOD - 1 - pause
+        if k >= 0:
+            measured = sample(k, coil_current=car.on_bus().current)
+            car.far.bus.send(
+                Frame(CODEC.measurement.frame_id, CODEC.encode_measurement(measured, alive.next()))
+            )
+
+    return electronics
+
+
+@pytest.mark.parametrize('pause', [0, 5, 30, 500])
+def test_a_restart_gives_0_ampere_for_good_and_needs_nothing_but_an_initialisation(car, pause):
+    car.drive(900, car.answer, electronics=restarted(car, pause))
+    link = car.exchange.link
+    assert car.off_since() <= BEGIN + min(pause + 4, 21) * MS
+    assert link.last_refusal is Refusal.SWITCHED_OFF
+    assert link.needs_initialisation
+    assert re.match(
+        r"the electronics' counters began anew: they have restarted \(1 times, limit 0\)", link.fault
+    )
+    assert (link.clock.restarts, link.jumps, link.lost) == (1, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ('number', 'microseconds'),
+    [
+        (1, 500_000),  # the clock jumps ahead
+        (1, 0),  # and stands still
+        (0, 1000),  # the counter of samples stands still
+        (300, 1000),  # and jumps
+    ],
+)
+def test_counters_that_contradict_each_other_do_so_too(car, number, microseconds):
+    alive = AliveCounter()
+    for _ in range(GOOD):
+        alive.next()
+
+    def electronics(index):
+        k = index - GOOD - 1
+        told = sample(GOOD, coil_current=3.0)._replace(
+            sample_counter=GOOD + number + k, microseconds=GOOD * 1000 + microseconds + 1000 * k
+        )
+        car.far.bus.send(Frame(CODEC.measurement.frame_id, CODEC.encode_measurement(told, alive.next())))
+
+    car.drive(1, car.answer, electronics=electronics)
+    assert car.off_since() == BEGIN + MS
+    assert "the electronics' counters have jumped" in car.exchange.link.fault
+    assert car.exchange.link.needs_initialisation
+
+
+@pytest.mark.parametrize('missing', [1, 40, 400])
+def test_lost_samples_are_no_jump(car, missing):
+    car.drive(missing, lambda: None, electronics=lambda index: None)
+    car.drive(10, car.answer)
+    assert car.exchange.link.jumps == 0
+    assert car.exchange.link.fault == ''
+
+
+def test_a_graver_fault_takes_the_place_of_a_restart_and_not_the_other_way_round(car):
+    car.drive(50, car.answer, electronics=restarted(car, 0))
+    assert car.exchange.link.needs_initialisation
+    car.far._status_alive = AliveCounter()
+    for _ in range(5):  # from the fourth on it is believed
+        car.far.send_status(Status(5.0, 20.0))
+    car.drive(1, car.answer, electronics=lambda index: None)
+    assert 'supply voltage (5.00 V)' in car.exchange.link.fault
+    assert not car.exchange.link.needs_initialisation
+    car.drive(900, car.answer, electronics=restarted(car, 0))
+    assert 'supply voltage (5.00 V)' in car.exchange.link.fault

@@ -1,0 +1,223 @@
+"""The requirements: every fault with what the graph must do about it."""
+
+import math
+from signal import SIGINT
+
+from lifecycle_msgs.msg import Transition
+
+from mount_replay.faults.fault import FaultCase, Reaction
+from mount_replay.faults.injections import (
+    ClockStep,
+    Intruder,
+    Killed,
+    ParametersSet,
+    Simulated,
+    Stopped,
+    Transitioned,
+    Unchanged,
+)
+from mount_sim.electronics.faults.kinds import FAULTS
+
+_TOLERATED, _TOLD = Reaction.TOLERATED, Reaction.TOLD
+_WHILE, _INITIALISE = Reaction.SAFE_WHILE, Reaction.SAFE_UNTIL_INITIALISED
+_CONFIGURE, _CLEANUP = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_CLEANUP
+ACTIVATE, DEACTIVATE = Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE
+_ANOTHER = (
+    'another|a second |second sender|publisher|writer'  # words that name who sends what only one may send
+)
+_HOUR = 3600.0  # s
+
+
+def _simulated(name: str, reaction: Reaction, words: str = '', **options) -> FaultCase:
+    return FaultCase(name, FAULTS[name].meaning, Simulated(name), reaction, words, **options)
+
+
+def _at_start(name: str, words: str, **options) -> FaultCase:
+    """A fault that is there from the first sample on, so that the initialisation must find it."""
+    told = ('--set', f'mount_sim.faults=["{name}@0"]')
+    meaning = f'{FAULTS[name].meaning}, from the start'
+    return FaultCase(
+        f'{name}_at_start',
+        meaning,
+        Unchanged(),
+        Reaction.NOT_STARTED,
+        words,
+        options=told,
+        ends_drive=True,
+        **options,
+    )
+
+
+def _from_start(name: str, lasts: float) -> FaultCase:
+    """A fault that cannot come or go during a run, and that must be tolerated."""
+    told = ('--set', 'mount_sim.faults=["clock_drift@0", "counter_wrap@8"]')
+    return FaultCase(name, FAULTS[name].meaning, Unchanged(), _TOLERATED, lasts=lasts, options=told)
+
+
+def _off(name: str, words: str, **options) -> FaultCase:
+    """A fault of the coil or its supply: the drive ends."""
+    return _simulated(name, _INITIALISE, words, ends_drive=True, **options)
+
+
+def _sender(name: str, meaning: str, kind: str, **options) -> FaultCase:
+    """Somebody sends what only one may send: nobody knows whom to believe, and the drive ends."""
+    injection = Intruder(kind)
+    return FaultCase(name, meaning, injection, _INITIALISE, _ANOTHER, 1.0, ends_drive=True, **options)
+
+
+def _flood(name: str, meaning: str, kind: str) -> FaultCase:
+    return FaultCase(name, meaning, Intruder(kind), _TOLERATED, lasts=1.0)
+
+
+def _stopped(node: str, name: str, lasts: float, reaction: Reaction, words: str = '', **options) -> FaultCase:
+    """A process stands still for a while (SIGSTOP)."""
+    meaning, injection = f'mount_{node} stands still for {lasts:g} s', Stopped(f'mount_{node}')
+    return FaultCase(f'stop_{node}_{name}', meaning, injection, reaction, words, lasts, **options)
+
+
+def _lost(node: str, reaction: Reaction, **options) -> FaultCase:
+    """A process ends by SIGKILL."""
+    name = f'mount_{node}'
+    return FaultCase(f'kill_{node}', f'SIGKILL of {name}', Killed(name), reaction, name, **options)
+
+
+BUS = (
+    _simulated('can_silent', _WHILE, 'no frames|no displacement|no setpoint', silent=True, third=True),
+    _simulated('bus_off', _WHILE, 'bus off', silent=True, in_electronics=True),
+    _simulated('lost_1', _TOLERATED, 'samples lost'),
+    _simulated('lost_5', _TOLD, 'samples lost', lasts=1.5, third=True),
+    _simulated('lost_50', _TOLD, 'samples lost', lasts=1.5),
+    _simulated('delayed', _TOLERATED, third=True),
+    _simulated('delayed_50', _WHILE, 'do not take|late|old', in_electronics=True, lasts=1.5),
+    _simulated('duplicated', _TOLERATED, 'repeated', lasts=1.0, third=True),
+    _simulated('reordered', _TOLD, 'wrong sequence|samples lost', lasts=1.0),
+    _off('frozen_counter', 'second sender', silent=True, third=True),
+    _simulated('wrong_crc', _TOLD, 'corrupt', lasts=1.0, third=True),
+    _simulated('wrong_length', _TOLD, 'corrupt', lasts=1.0),
+    _off('replayed', 'another|second sender'),
+    _simulated('babbling', _TOLERATED, third=True),
+    _simulated('deaf', _WHILE, 'do not take the setpoints', in_electronics=True, lasts=1.5),
+)
+CLOCKS = (
+    _simulated('clock_jump', _INITIALISE, 'restart|clock|initialis'),
+    _from_start('clock_drift', lasts=2.0),
+    _from_start('counter_wrap', lasts=6.0),
+    _simulated('electronics_reset', _INITIALISE, 'restart|initialis', silent=True, third=True),
+    FaultCase(
+        'clock_forward', 'the system clock goes an hour ahead', ClockStep(_HOUR), _TOLERATED, clock=True
+    ),
+    FaultCase(
+        'clock_back', 'the system clock goes back by an hour', ClockStep(-_HOUR), _TOLERATED, clock=True
+    ),
+)
+SENSORS = (
+    _simulated('displacement_invalid', _WHILE, 'displacement', third=True),
+    _simulated('displacement_stuck', _WHILE, 'displacement', lasts=1.5),
+    _simulated('displacement_step', _TOLERATED),
+    _simulated('displacement_out_of_range', _WHILE, 'displacement|invalid', third=True),
+    _simulated('displacement_noisy', _TOLERATED),
+    _simulated('displacement_inverted', _TOLERATED, third=True),
+    _simulated('displacement_drifting', _TOLERATED, lasts=1.5, third=True),
+    _simulated('displacement_sensor', _WHILE, 'displacement sensor', third=True),
+    _simulated('ripple_missing', _TOLERATED),
+    _simulated('ripple_noisy', _TOLERATED),
+    _simulated('ripple_scale', _TOLERATED),
+    _at_start('ripple_missing', 'ripple'),
+    _at_start('ripple_noisy', 'ripple|gap'),
+    _at_start('ripple_scale', 'ripple|gap|contact'),
+)
+COIL = (
+    _off('coil_open', 'coil current', third=True),
+    _off('coil_half', 'coil current'),
+    _off('coil_stuck', 'coil current'),
+    _off('coil_stuck_on', 'coil current'),
+    _off('coil_shorted', 'coil'),
+    _simulated('coil_hot', _TOLD, 'coil temperature'),
+    _off('supply_0', 'supply'),
+    _off('supply_5', 'supply', third=True),
+    _simulated('supply_9', _TOLERATED),
+    _simulated('supply_16', _TOLERATED, third=True),
+    _off('supply_24', 'supply'),
+    _off('over_current', 'over_current'),
+    _off('over_temperature', 'over_temperature'),
+    _off('under_voltage', 'under_voltage'),
+    _off('temperature_250', 'coil temperature'),
+    _at_start('coil_shorted', 'resistance|ohm|coil'),
+    _at_start('pads_worn', 'gap|pads'),
+    _at_start('pads_missing', 'gap|pads|contact'),
+    _at_start('gap_blocked', 'gap|contact|closed', third=True),
+)
+SENDERS = (
+    _sender('second_host', 'a second CAN host asks for 3 A', 'can_host', third=True, in_electronics=True),
+    _sender('second_electronics', 'second electronics send samples at rest', 'can_electronics'),
+    _sender(
+        'second_setpoint', 'a second node publishes 3 A on current_setpoint', 'current_setpoint', third=True
+    ),
+    _sender('second_displacement', 'a second node publishes on displacement', 'displacement'),
+    _sender('second_air_gap', 'a second node publishes on air_gap', 'air_gap'),
+    _sender('second_table', 'a second node publishes on current_force_table', 'table'),
+    _sender('table_old', 'the same, a table of an older activation', 'table_old'),
+    _sender('table_not_monotone', 'the same, a table that falls', 'table_not_monotone'),
+    _flood('flood_bus', '1000 datagrams a second on the bus that are no frames', 'can_garbage'),
+    _flood('flood_topic', '5000 events a second', 'flood_topic'),
+    _flood('flood_service', 'mount_control is asked for parameters 500 times a second', 'flood_service'),
+)
+PROCESSES = (
+    _stopped('control', '200_ms', 0.2, _WHILE, 'no setpoint', silent=True, third=True),
+    _stopped('control', '2_s', 2.0, _INITIALISE, 'no setpoint', silent=True),
+    _stopped('driver', '200_ms', 0.2, _WHILE, 'no displacement|no setpoint|not take', in_electronics=True),
+    _stopped('driver', '2_s', 2.0, _WHILE, 'no displacement|no samples', in_electronics=True),
+    _stopped('recorder', '200_ms', 0.2, _TOLERATED),
+    _stopped('recorder', '2_s', 2.0, _TOLERATED, third=True),
+    _stopped('sim', '200_ms', 0.2, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
+    _stopped('sim', '2_s', 2.0, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
+    _lost('control', _WHILE, silent=True, third=True),
+    _lost('driver', _INITIALISE, silent=True, in_electronics=True, third=True),
+    _lost('init', _TOLD),
+    _lost('recorder', _TOLD, loses_samples=True),
+    _lost('sim', _INITIALISE, silent=True, ends_drive=True),
+    FaultCase(
+        'kill_supervisor', 'SIGKILL of the supervisor', Killed('supervisor'), _INITIALISE,
+        'started this one .* has ended', ends_drive=True,
+    ),
+    FaultCase(
+        'interrupt', 'Ctrl-C amid damping', Killed('supervisor', SIGINT), _INITIALISE, 'interrupted',
+        ends_drive=True,
+    ),
+)  # fmt: skip
+OPERATION = (
+    FaultCase(
+        'deactivate', 'mount_control is deactivated amid damping',
+        Transitioned((('mount_control', DEACTIVATE),), (('mount_control', ACTIVATE),)),
+        _WHILE, 'no setpoint|inactive', silent=True, third=True,
+    ),
+    FaultCase(
+        'shutdown', 'mount_control is shut down amid damping',
+        Transitioned((('mount_control', Transition.TRANSITION_ACTIVE_SHUTDOWN),)),
+        _INITIALISE, 'no setpoint|shut', silent=True, ends_drive=True,
+    ),
+    FaultCase(
+        'table_missing', 'mount_control is activated without a table',
+        Transitioned((
+            ('mount_control', DEACTIVATE), ('mount_control', _CLEANUP),
+            ('mount_init', DEACTIVATE), ('mount_init', _CLEANUP),
+            ('mount_control', _CONFIGURE), ('mount_control', ACTIVATE),
+        )),
+        _INITIALISE, 'no setpoint|table', ends_drive=True,
+    ),
+    FaultCase(
+        'nonsense_parameters', 'parameters of all nodes are set to what makes no sense',
+        ParametersSet((
+            ('mount_control', 'continuous_viscous.damping_coefficient', -3.0),
+            ('mount_control', 'continuous_viscous.damping_coefficient', math.nan),
+            ('mount_control', 'damper', 'nonsense'),
+            ('mount_driver', 'setpoint_timeout', 5.0),
+            ('mount_init', 'silence_timeout', -1.0),
+            ('mount_sim', 'inject', 'nonsense'),
+            ('mount_recorder', 'uri', '/'),
+        )),
+        Reaction.REFUSED, third=True,
+    ),
+)  # fmt: skip
+MATRIX = {case.name: case for case in (*BUS, *CLOCKS, *SENSORS, *COIL, *SENDERS, *PROCESSES, *OPERATION)}
+"""{name: fault}."""

@@ -1,0 +1,141 @@
+"""What can be seen of a running graph from outside: the CAN bus, the simulated truth, `/diagnostics`.
+
+None of it asks the graph: it is another participant of the bus, and another subscriber. Times are on the
+steady clock, s; those of frames are the kernel's.
+"""
+
+import bisect
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from operator import attrgetter
+from typing import NamedTuple, TypeVar
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+
+from mount_driver.bus import MULTICAST_GROUP, Reception, open_bus
+from mount_driver.codec import MountCodec, WrongCrcError, WrongLengthError
+from mount_ros.data_path import DataPath
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.topics import AIR_GAP, DIAGNOSTICS, SIM_TRUTH
+
+_LOOK_PERIOD = 0.1  # s: how often a listener looks whether it shall end
+
+
+class Heard(NamedTuple):
+    """A setpoint frame on the bus; its current (A) is 0 where it switches off."""
+
+    time: float
+    current: float
+
+
+class Seen(NamedTuple):
+    """The simulated truth: the coil's current, and what the electronics made it follow, A."""
+
+    time: float
+    coil_current: float
+    followed: float
+
+
+class Told(NamedTuple):
+    """A verdict on `/diagnostics`; `level` as in `mount_ros.nodes.diagnostics.Level`."""
+
+    time: float
+    node: str
+    level: int
+    sentence: str
+
+
+Timed = TypeVar('Timed', Heard, Seen, Told)
+
+
+def since(entries: Sequence[Timed], begin: float, end: float = float('inf')) -> list[Timed]:
+    """Return the entries with begin <= time <= end; both clocks run on, so they are in order."""
+    first = bisect.bisect_left(entries, begin, key=attrgetter('time'))
+    last = bisect.bisect_right(entries, end, key=attrgetter('time'))
+    return list(entries[first:last])
+
+
+class Observers:
+    """What was heard, seen and told of one graph since the observers began."""
+
+    def __init__(self, namespace: str):
+        self.heard: list[Heard] = []
+        self.seen: list[Seen] = []
+        self.told: list[Told] = []
+        self.initialised: list[float] = []
+        """When gaps came: the ends of initialisations."""
+        self.active: set[str] = set()
+        """The nodes that said last that they are active."""
+        self._namespace = namespace
+        self._codec = MountCodec()
+        self._truth = ScalarsLayout(SIM_TRUTH)
+        names = self._truth.names
+        self._places = names.index('coil_current'), names.index('current_setpoint')
+        # The kernel stamps frames by the system clock, which is not stepped while this runs.
+        self._epoch = time.time() - time.monotonic()
+
+    def take_frame(self, timestamp: float, data: bytes | bytearray) -> None:
+        """Note a setpoint frame; one that no electronics would take is none."""
+        try:
+            _, setpoint = self._codec.decode_setpoint(data)
+        except (WrongCrcError, WrongLengthError):
+            return
+        if setpoint is not None:
+            current = setpoint.current if setpoint.enable else 0.0
+            self.heard.append(Heard(timestamp - self._epoch, current))
+
+    def take_truth(self, raw: bytes) -> None:
+        """Note a message of `sim/truth`."""
+        _, numbers, _ = self._truth.unpack(raw)
+        coil, followed = self._places
+        self.seen.append(Seen(time.monotonic(), numbers[coil], numbers[followed]))
+
+    def take_diagnostics(self, raw: bytes) -> None:
+        """Note the verdicts of this graph; `/diagnostics` belongs to all."""
+        now = time.monotonic()
+        for status in deserialize_message(raw, DiagnosticArray).status:
+            space, _, node = status.name.rpartition('/')
+            if space == self._namespace:
+                self.told.append(Told(now, node, status.level[0], status.message))
+                active = any(value.key == 'state' and value.value == 'active' for value in status.values)
+                (self.active.add if active else self.active.discard)(node)
+
+
+@contextmanager
+def observers(context: Context, namespace: str, port: int) -> Iterator[Observers]:
+    """Observe the graph of a namespace whose CAN bus has a UDP port, while the context lasts."""
+    observed = Observers(namespace)
+    node = Node('observer', namespace=namespace, context=context, start_parameter_services=False)
+    path = DataPath(node)
+    path.subscribe(SIM_TRUTH, observed.take_truth)
+    path.subscribe(DIAGNOSTICS, observed.take_diagnostics)
+    path.subscribe(AIR_GAP, lambda raw: observed.initialised.append(time.monotonic()))
+    path.start()
+    ending = threading.Event()
+    listener = threading.Thread(target=_listen, args=(observed, port, ending), name='bus', daemon=True)
+    listener.start()
+    try:
+        yield observed
+    finally:
+        ending.set()
+        listener.join()
+        path.stop()
+        node.destroy_node()
+
+
+def _listen(observed: Observers, port: int, ending: threading.Event) -> None:
+    identifier = MountCodec().setpoint.frame_id
+    bus = open_bus('udp_multicast', MULTICAST_GROUP, port=port, receive=[identifier])
+    reception = Reception()  # frames that cannot be read are one of the faults
+    try:
+        while not ending.is_set():
+            frame = reception.frame(bus, _LOOK_PERIOD)
+            if frame is not None:
+                observed.take_frame(frame.timestamp, frame.data)
+    finally:
+        bus.shutdown()

@@ -1,0 +1,160 @@
+"""Runs faults through real graphs: one for as many as it outlives, a fresh one for those that end it."""
+
+import itertools
+import os
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+
+from rclpy.context import Context
+from rclpy.node import Node
+
+from mount_bringup.graph.domain import can_port
+from mount_replay.faults.fault import FaultCase, Reaction
+from mount_replay.faults.graph import Ending, GraphUnderTest, GraphUnderTestError, Place
+from mount_replay.faults.injections import NonsenseTakenError, clock_environment
+from mount_replay.faults.kept import lost_while
+from mount_replay.faults.observers import observers
+from mount_replay.faults.outcome import Outcome
+from mount_replay.faults.trial import tried
+from mount_ros.nodes.hosting import ros_context
+
+_TRIALS = 2  # chosen: a machine with other work is late now and then
+_PATIENCE = 6.0  # s, chosen: for damping in a graph that has seen faults
+_CODES = (0, 1, 130)  # of `drive`: nothing wrong, something wrong, interrupted
+
+Progress = Callable[[float, str], None]
+Tell = Callable[[FaultCase, Outcome], None]
+Kind = tuple[bool, tuple[str, ...]]
+"""What a graph is started with: clocks that can be stepped, options."""
+
+
+def run_faults(
+    cases: Sequence[FaultCase], place: Place, progress: Progress, tell: Tell
+) -> dict[str, Outcome]:
+    """Return {fault: outcome}; what the end of a graph shows is added to those that it has seen.
+
+    `progress` takes the share that is done and the fault that is next, `tell` each outcome as it comes.
+    """
+    outcomes: dict[str, Outcome] = {}
+    with ros_context(place.domain) as context:
+        session = _Session(place, context)
+        try:
+            for number, case in enumerate(_in_order(cases)):
+                progress(number / len(cases), case.name)
+                outcomes[case.name] = session.outcome(case)
+                tell(case, outcomes[case.name])
+        finally:
+            session.end_graph()
+    return {case.name: outcomes[case.name] for case in cases}
+
+
+def _in_order(cases: Sequence[FaultCase]) -> list[FaultCase]:
+    """Return the faults so that those of one graph follow each other, and first those that it outlives."""
+    return sorted(cases, key=lambda case: (_kind(case), case.ends_drive))
+
+
+def _kind(case: FaultCase) -> Kind:
+    return case.clock, case.options
+
+
+@dataclass
+class _Running:
+    """A graph, its observers, and the faults that it has seen with their times on the system clock, s."""
+
+    kind: Kind
+    graph: GraphUnderTest
+    observing: ExitStack
+    tried: list[tuple[FaultCase, Outcome, float, float]] = field(default_factory=list)
+
+
+class _Session:
+    """The graph that runs at present, if one does."""
+
+    def __init__(self, place: Place, context: Context):
+        self._place = place
+        self._context = context
+        self._numbers = itertools.count(1)
+        self._running: _Running | None = None
+
+    def outcome(self, case: FaultCase) -> Outcome:
+        """Try a fault; once more, if it was not as required."""
+        outcome = self._trial(case)
+        for _ in range(1, _TRIALS):
+            if outcome.ok:
+                break
+            later = self._trial(case)
+            if outcome.seen and not later.seen:
+                outcome.earlier.append(later.wrong)
+            else:
+                later.earlier = [*outcome.earlier, outcome.wrong]
+                outcome = later
+        return outcome
+
+    def _trial(self, case: FaultCase) -> Outcome:
+        begin = time.time()
+        try:
+            running = self._prepared(case)
+            begin = time.time()
+            outcome = tried(case, running.graph)
+        except (GraphUnderTestError, NonsenseTakenError) as error:
+            outcome = Outcome(complaints=[str(error)])
+            if self._running is None:
+                return outcome
+            running = self._running
+        running.tried.append((case, outcome, begin, time.time()))
+        if running.graph.ended:
+            self.end_graph()
+        return outcome
+
+    def _prepared(self, case: FaultCase) -> _Running:
+        """Return a graph that damps without complaint, or that starts where the fault is one of the start."""
+        running = self._running
+        if running is not None:
+            try:
+                if running.kind == _kind(case):
+                    running.graph.wait_for_damping(_PATIENCE)
+                    return running
+            except GraphUnderTestError:
+                pass  # what came before has spoiled it
+            self.end_graph()
+        running = self._running = self._started(case)
+        if case.reaction is not Reaction.NOT_STARTED:
+            running.graph.wait_for_damping()
+        return running
+
+    def _started(self, case: FaultCase) -> _Running:
+        namespace = f'faults_{os.getpid()}_{next(self._numbers)}'
+        stack = ExitStack()
+        port = can_port(self._place.domain, namespace)
+        observed = stack.enter_context(observers(self._context, namespace, port))
+        operator = Node(
+            'operator', namespace=namespace, context=self._context, start_parameter_services=False
+        )
+        stack.callback(operator.destroy_node)
+        environment = clock_environment(self._place.folder) if case.clock else {}
+        graph = GraphUnderTest(self._place, namespace, case.options, environment, observed, operator)
+        return _Running(_kind(case), graph, stack)
+
+    def end_graph(self) -> None:
+        """End the graph that runs, and tell the faults that it has seen what its end has shown."""
+        running, self._running = self._running, None
+        if running is None:
+            return
+        with running.observing:
+            ending = running.graph.end()
+        if running.tried:
+            _, last, _, _ = running.tried[-1]
+            last.complaints += _complaints(ending)
+        for case, outcome, begin, end in running.tried:
+            if not case.loses_samples:
+                outcome.complaints += lost_while(running.graph.folder, begin, end)
+
+
+def _complaints(ending: Ending) -> list[str]:
+    said = [f'left behind: {thing}' for thing in ending.left_behind]
+    said += [f'traceback in {file}' for file in ending.tracebacks]
+    if ending.code not in (*_CODES, -9):
+        said.append(f'the command ended with code {ending.code}')
+    return said

@@ -1,0 +1,54 @@
+"""The electronics of several mounts at work, each on a bus of its own, in one thread."""
+
+import threading
+import time
+from collections.abc import Mapping
+
+from mount_models.sampling import SAMPLE_TIME
+from mount_sim.loop import LOCKSTEP_WAIT, ElectronicsLoop, NoAnswerError
+
+
+class CarLoop:
+    """Takes each sample of all mounts, one after the other, before it takes the next of the first."""
+
+    def __init__(self, loops: Mapping[str, ElectronicsLoop], clock_drift: float):
+        self._loops = list(loops.items())
+        self._clock_drift = clock_drift
+        self._turn = 0  # lock-step: whose sample comes next
+
+    def run_in_real_time(self, ending: threading.Event) -> None:
+        """Sample all mounts at 1 kHz of the electronics' clock, as `ElectronicsLoop` does for one."""
+        period = SAMPLE_TIME / (1.0 + self._clock_drift)
+        begin, taken = time.monotonic(), 0
+        while not ending.is_set():
+            for _, loop in self._loops:
+                loop.step_in_real_time()
+            taken += 1
+            now = time.monotonic()
+            remaining = begin + taken * period - now
+            for _, loop in self._loops:
+                loop.figures.wall_time = now - begin
+                loop.figures.overruns += remaining <= 0.0  # the next samples follow at once: none is skipped
+            if remaining > 0.0:
+                time.sleep(remaining)
+
+    def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
+        """Sample as fast as all answers come; raise `NoAnswerError` after `patience` s without one."""
+        while not self.finished and not ending.is_set():
+            self.step_in_lockstep(patience, LOCKSTEP_WAIT)
+
+    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
+        """Take the next sample of the mount whose turn it is; as `ElectronicsLoop.step_in_lockstep`."""
+        name, loop = self._loops[self._turn]
+        try:
+            taken = loop.step_in_lockstep(patience, wait)
+        except NoAnswerError as error:
+            raise NoAnswerError(f'{name}: {error}') from None
+        if taken or loop.finished:
+            self._turn = (self._turn + 1) % len(self._loops)
+        return taken or (loop.finished and not self.finished)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run is over, in lock-step with all last samples answered."""
+        return all(loop.finished for _, loop in self._loops)

@@ -1,0 +1,61 @@
+"""A representative third of the fault matrix, in real time through the real graph.
+
+Times are those of the machine and are told, not asserted: what is asserted is what the graph does.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mount_replay.faults.fault import SAFE, Reaction
+from mount_replay.faults.matrix import MATRIX
+from mount_ros.testing import free_domain
+
+THIRD = [case for case in MATRIX.values() if case.third]
+LIMIT = 600.0  # s: only a hang takes so long
+
+pytestmark = pytest.mark.real_time
+
+
+@pytest.fixture(scope='session')
+def outcomes(tmp_path_factory):
+    """The outcomes of the command, {fault: figures}."""
+    folder = tmp_path_factory.mktemp('faults')
+    with free_domain() as domain:
+        ended = subprocess.run(
+            [
+                str(Path(sys.executable).parent / 'engine-mount'), 'faults', '--third', '--priority', '0',
+                '--domain', str(domain), '--out', str(folder / 'runs'), '--json', str(folder / 'faults.json'),
+            ],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+            check=False,
+        )  # fmt: skip
+    print(ended.stdout)
+    file = folder / 'faults.json'
+    assert file.exists(), ended.stdout + ended.stderr
+    found = json.loads(file.read_text())
+    assert ended.returncode == (0 if all(each['ok'] for each in found.values()) else 1)
+    return found
+
+
+@pytest.mark.parametrize('case', THIRD, ids=lambda case: case.name)
+def test_a_fault_ends_as_required(case, outcomes, skip_if_late):
+    outcome = outcomes[case.name]
+    if outcome['complaints']:
+        skip_if_late(str(outcome))
+    assert outcome['complaints'] == []
+    assert outcome['highest_current_a'] <= 3.0
+    if case.reaction in SAFE:
+        assert outcome['zero_s'] is not None
+        assert outcome['coil_current_a'] < 0.05
+    if case.reaction not in (Reaction.TOLERATED, Reaction.REFUSED):
+        assert outcome['detected_by']
+        assert outcome['sentence']
+    if not case.ends_drive:
+        assert outcome['recovered']
