@@ -114,7 +114,7 @@ class GraphUnderTest:
         return self._log.read_text(errors='replace')
 
     def outputs(self) -> dict[str, str]:
-        """Return {who: what it has printed so far}; not of the simulator, which tells what it was asked for."""
+        """Return {who: what it has printed}; not of the simulator, which tells what it was asked for."""
         logs = {file.stem: file for file in self.folder.glob('log/*.log') if file.stem != SIM.name}
         said = {name: file.read_text(errors='replace') for name, file in logs.items()}
         return {'supervisor': self.output, **said}
