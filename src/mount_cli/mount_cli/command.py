@@ -21,6 +21,7 @@ from mount_cli.commands import (
     recover,
     replay,
     report,
+    view,
 )
 from mount_cli.commands.identify_arguments import with_repeated_options
 from mount_cli.terminal import refuse, terminal
@@ -63,6 +64,8 @@ app.command(name='recover', epilog=recover.EPILOG)(recover.recover)
 app.command(name='replay', epilog=replay.EPILOG)(replay.replay)
 app.command(name='compare', epilog=compare.EPILOG)(compare.compare)
 app.command(name='report', epilog=report.EPILOG)(report.report)
+app.command(name='view', epilog=view.EPILOG)(view.view)
+app.command(name='status', epilog=view.STATUS_EPILOG)(view.status)
 app.command(name='cut', epilog=cut.EPILOG)(cut.cut)
 app.command(name='merge', epilog=merge.EPILOG)(merge.merge)
 app.command(name='experiment', epilog=experiment.EPILOG)(experiment.experiment)

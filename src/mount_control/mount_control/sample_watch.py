@@ -1,6 +1,7 @@
 """Judges each displacement sample by its stamp before the controller sees it; knows no clock."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
@@ -15,6 +16,9 @@ from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
 _NANOSECONDS = 1e9
 _COUNTED = 50  # chosen: samples from which their rate is known
 _RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses before an activation
+_CLOSEST = 0.75  # of a period, chosen: mount_driver's stamps lie 0.9 of a period apart or more
+_INTRUSIONS = 3  # chosen: samples between those of the stream
+_INTRUSION_PERIOD = 1_000_000_000  # ns, chosen: in it they are those of another sender
 _STREAM_BREAK = 1_000_000_000  # ns, chosen: a longer silence may have been a loss of power
 
 INTERRUPTED = (
@@ -32,6 +36,7 @@ class Judgement(Enum):
     IMPLAUSIBLE = 'implausible'  # it moves as no mount does, see `plausibility`: answered with 0 A
     INTERRUPTED = 'interrupted'  # the table may be of another state of the mount: answered with 0 A
     IGNORE = 'ignore'  # repeated or out of order: already answered
+    FOREIGN = 'foreign'  # another sender is or may be there: answered with 0 A
     EARLY = 'early'  # not after the activation: mount_init answers
     INACTIVE = 'inactive'  # nobody asked for an answer
 
@@ -60,12 +65,16 @@ class SampleWatch:
         self.measured_before = False
         """Whether the measurements are known to have come without a break before the first sample, too."""
         self.interrupted = False  # since the activation
+        self.foreign = ''  # which other sender there is, since the activation
+        self.writer_doubt = ''  # which other sender there may be at present
         self.counts = SampleCounts()
+        self._intruded: deque[int] = deque(maxlen=_INTRUSIONS)  # stamps of samples that came too soon, ns
         self._used: int | None = None  # stamp of the last sample that the controller took, ns
         self._activation = 0  # ns
         self._longest_bridge = 0  # ns
         self._range = 0.0  # m
         self._period = SAMPLE_TIME_NS  # ns between two samples
+        self._closest = round(_CLOSEST * SAMPLE_TIME_NS)
         self._counted_from, self._noted = 0, 0  # stamp (ns) of a sample, and samples from it on
         self._seen: int | None = None  # stamp of the last sample that was compared with those before, ns
         self.plausibility = Plausibility(ControlParameters())
@@ -127,8 +136,11 @@ class SampleWatch:
         self._longest_bridge = round(parameters.longest_bridge * _NANOSECONDS)
         self._range = parameters.displacement_range
         self._period = sample_time_ns(parameters.sample_rate)
+        self._closest = round(_CLOSEST * self._period)
         self.plausibility = Plausibility(parameters)
         self._used, self._seen, self.interrupted, self.counts = None, None, False, SampleCounts()
+        self.foreign = ''
+        self._intruded.clear()
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
         """Return the judgement on a noted sample (ns, m), and how many are missing before it."""
@@ -138,6 +150,10 @@ class SampleWatch:
             return Judgement.INTERRUPTED, 0
         if stamp <= self._activation:
             return Judgement.EARLY, 0
+        if self._used is not None and stamp - self._used < self._closest:
+            self._note_intrusion(stamp)
+        if self.foreign or self.writer_doubt:
+            return Judgement.FOREIGN, 0
         if self._used is not None and stamp <= self._used:
             self.counts.ignored += 1
             return Judgement.IGNORE, 0
@@ -170,7 +186,7 @@ class SampleWatch:
         valid = np.abs(displacement) <= self._range  # not so for NaN
         follows = np.zeros(len(stamps), bool)
         steps = np.diff(stamps)
-        follows[1:] = valid[1:] & (steps > 0) & (steps < self._period + self._period // 2)
+        follows[1:] = valid[1:] & (steps >= self._closest) & (steps < self._period + self._period // 2)
         return follows
 
     def believed(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> int:
@@ -191,6 +207,16 @@ class SampleWatch:
     def _missing(self, elapsed: int) -> int:
         """Return how many samples are missing between two that are `elapsed` ns apart."""
         return max(0, (elapsed + self._period // 2) // self._period - 1)
+
+    def _note_intrusion(self, stamp: int) -> None:
+        found = self._intruded
+        found.append(stamp)
+        if len(found) == _INTRUSIONS and stamp - found[0] <= _INTRUSION_PERIOD and not self.foreign:
+            self.foreign = (
+                f'{len(found)} displacement samples within {_INTRUSION_PERIOD * 1e-9:g} s were repeated, '
+                f'older than the one before or less than {self._closest * 1e-6:g} ms behind it: end one of '
+                'the two nodes that publish displacement'
+            )
 
 
 def _seconds(stamp: int) -> str:

@@ -279,6 +279,7 @@ def _figures(now: Snapshot, parameters: DriverParameters) -> dict[str, object]:
         'error_frames': now.error_frames,
         'unreadable': now.unreadable,
         'switched_off': bool(now.fault),
+        'held': bool(now.held),
         # A supervisor ends the graph on the one, and initialises it anew on the other.
         'fatal': bool(now.fault) and not now.needs_initialisation,
         'needs_initialisation': bool(now.fault) and now.needs_initialisation,

@@ -33,6 +33,7 @@ from mount_init.plausibility import (
     check_contact,
     check_peak_force,
     check_precision,
+    check_resistance,
     check_rest_current,
     check_same_crossing,
     check_same_rest_gap,
@@ -44,6 +45,7 @@ from mount_init.readings import Readings, check_rate, check_readings
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, find_crossing
+from mount_models.coil.resistance import CoilResistance, measured_resistance
 from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
 from mount_models.specimen import Specimen
 
@@ -69,6 +71,7 @@ class Evidence:
     contact: ContactGap
     curve: InductanceCurve
     temperature: CoilTemperature
+    resistance: CoilResistance
     samples: int
     skipped: int
 
@@ -218,6 +221,10 @@ def _estimate(
 ) -> Evidence:
     current, inductance = readings.current, readings.inductance(specimen.turns_area)
     level = specimen.crossing_inductance
+    celsius = temperature.celsius
+
+    driven = slice(ramp.up.start, ramp.down.stop)
+    resistance = measured_resistance(specimen.turns_area, current[driven], readings.flux_rate[driven])
 
     dwells = [
         dwell_inductance(current[part], inductance[part], parameters)
@@ -225,11 +232,11 @@ def _estimate(
     ]
     for dwell in dwells:
         check_rest_current(specimen, dwell, parameters)
-    celsius = temperature.celsius
     before, after = (rest_gap(specimen, dwell.inductance, dwell.inductance_std, celsius) for dwell in dwells)
     check_same_rest_gap(before, after, parameters)
     mean = _mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells])
     rest = rest_gap(specimen, *mean, celsius)
+    check_resistance(specimen, resistance, celsius, parameters)
 
     curve = inductance_curve(current, inductance, ramp.up, ramp.down, parameters.peak_current)
     check_single_crossing(curve, level, specimen.rest_current)
@@ -256,6 +263,7 @@ def _estimate(
         contact=contact,
         curve=curve,
         temperature=temperature,
+        resistance=resistance,
         samples=readings.valid,
         skipped=readings.skipped,
     )

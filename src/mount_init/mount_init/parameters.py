@@ -80,6 +80,12 @@ class InitParameters(NamedTuple):
     crossing_gap_tolerance: Annotated[
         float, Quantity('m', 'largest difference of the crossing gap up and down', 1e-6, 1e-4, _WIDE)
     ] = 6e-6
+    resistance_tolerance: Annotated[
+        float,
+        Quantity(
+            '1', 'largest relative deviation of the resistance of the coil at its temperature', 0.02, 0.5
+        ),
+    ] = 0.15
     smallest_travel: Annotated[
         float,
         Quantity('m', 'least way of the halves from the rest current to contact', 2e-6, 2e-4),

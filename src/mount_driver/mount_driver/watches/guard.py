@@ -36,6 +36,8 @@ class Guard:
     ):
         self.foreign_setpoints = 0
         """Sound setpoint frames of another sender."""
+        self.writer_doubt = ''
+        """Why another node may publish setpoints, so that answers are 0 A; empty where none may."""
         self.heat = heat
         self._link, self._clock = link, clock
         self._coil = CoilWatch(parameters.coil, sample_time_ns(parameters.sample_rate))
@@ -70,7 +72,7 @@ class Guard:
         """Take a new sample and lower the link's limits as the watches say."""
         (stamp, sample), link, heat = stamped, self._link, self.heat
         now = self._clock.now(received)
-        link.held = self._health.hold(now)
+        link.held = self._health.hold(now) or self.writer_doubt
         heat.take(stamp, sample.coil_current, self._sent)
         link.current_limit = heat.current_limit
         if link.jumps + self._clock.restarts != self._breaks:
