@@ -21,7 +21,6 @@ ELSEWHERE = {
     'ros2 service call /mount_right/mount_recorder/mark': _RECORD,
     'ros2 topic pub --once /mount_right/event': _RECORD,
     'ros2 param set /mount_right/mount_control': _SET,
-    'ros2 param set /mount_sim inject': 'by src/mount_sim/test/test_node.py',
     'engine-mount record --': _RECORD,
     'engine-mount view': _VIEW,
     'engine-mount status': _VIEW,
