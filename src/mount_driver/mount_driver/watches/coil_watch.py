@@ -16,11 +16,9 @@ from typing import Annotated, NamedTuple
 
 from mount_driver.codec import Measurement, Setpoint
 from mount_models.quantity import Quantity
-from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SETPOINT_TIMEOUT
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
-_FOLLOWED = round(SETPOINT_TIMEOUT / SAMPLE_TIME) + 2
-"""Samples that a setpoint in force can answer: those of the hold, one to take it over, one to see it."""
-_UNSURE = round(0.5 / SAMPLE_TIME)  # samples, chosen: so long 0 A may be followed late, or once more
+_UNSURE = 0.5  # s, chosen: so long 0 A may be followed late, or once more
 _COUNTER_MASK = 0xFFFF
 
 
@@ -47,14 +45,20 @@ class CoilWatchParameters(NamedTuple):
 class CoilWatch:
     """Takes what was sent and what was measured, sample by sample."""
 
-    def __init__(self, parameters: CoilWatchParameters):
+    def __init__(self, parameters: CoilWatchParameters, sample_time: int = SAMPLE_TIME_NS):
+        """`sample_time` in ns."""
+        period = 1e-9 * sample_time
+        # A setpoint in force answers a sample of the hold; one more to take it over, and one to see it.
+        self._followed = round(SETPOINT_TIMEOUT / period) + 2
+        self._unsure = round(_UNSURE / period)  # samples
         self._limit = parameters.limit
-        self._duration = round(parameters.duration / SAMPLE_TIME)  # samples
-        closed = 2.0 * math.pi * parameters.bandwidth * SAMPLE_TIME
+        self._duration = round(parameters.duration / period)  # samples
+        self._period = period
+        closed = 2.0 * math.pi * parameters.bandwidth * period
         self._share = closed / (1.0 + closed)  # less than the exact 1 - exp(-closed): the bounds are wider
-        self._rise, self._fall = parameters.rise_rate * SAMPLE_TIME, parameters.fall_rate * SAMPLE_TIME  # A
+        self._rise, self._fall = parameters.rise_rate * period, parameters.fall_rate * period  # A
         # What the setpoints lie between that answer each of the last samples; what ran before is not known.
-        self._lows, self._highs = [0.0] * _FOLLOWED, [HIGHEST_CURRENT] * _FOLLOWED
+        self._lows, self._highs = [0.0] * self._followed, [HIGHEST_CURRENT] * self._followed
         self._low, self._high = 0.0, HIGHEST_CURRENT
         self._number = -1  # of the last sample: its counter, unwrapped
         self._off_sent = False
@@ -68,9 +72,9 @@ class CoilWatch:
             return
         newest = self._number  # once: the other thread counts on
         age = (newest - setpoint.answered_counter) & _COUNTER_MASK
-        if age >= _FOLLOWED:
+        if age >= self._followed:
             return  # nor do the electronics use it
-        place = (newest - age) % _FOLLOWED
+        place = (newest - age) % self._followed
         current = setpoint.current
         if current < self._lows[place]:
             self._lows[place] = current
@@ -87,7 +91,7 @@ class CoilWatch:
         off = sample.setpoint_timeout or not sample.enabled
         if off or self._off_sent:
             self._off_sent = False
-            self._sure_from = self._number + _UNSURE
+            self._sure_from = self._number + self._unsure
         wanted = max(self._highs)
         self._follow(0.0 if off else wanted, lost)
         current = sample.coil_current
@@ -103,8 +107,8 @@ class CoilWatch:
         last = self._number
         self._number = number = last + ((counter - last) & _COUNTER_MASK) if last >= 0 else counter
         lost = number - last - 1 if last >= 0 else 0
-        for each in range(number - min(lost, _FOLLOWED), number + 1):
-            place = each % _FOLLOWED
+        for each in range(number - min(lost, self._followed), number + 1):
+            place = each % self._followed
             self._lows[place], self._highs[place] = math.inf, 0.0
         return lost
 
@@ -127,7 +131,7 @@ class CoilWatch:
     def _sentence(self, current: float) -> str:
         measured = f'{current:.3f} A' if current == current else 'not valid'
         low, high = max(0.0, self._low - self._limit), self._high + self._limit
-        lasted = 1e3 * SAMPLE_TIME * (self._deviating - 1)
+        lasted = 1e3 * self._period * (self._deviating - 1)
         return (
             f'coil current ({measured}) must lie within {low:.3f} .. {high:.3f} A, {self._limit:g} A about '
             f'its setpoint; it has not for {lasted:.0f} ms: check coil, cable and power stage'
