@@ -99,7 +99,7 @@ class SampleWatch:
         remedy = 'activate mount_init (again)'
         if table_stamp is None or air_gap_stamp is None:
             missing = 'current_force_table' if table_stamp is None else 'air_gap'
-            raise ForceTableError(f'no {missing} was received; {remedy}')
+            raise ForceTableError(f'no {missing} was received (0 messages, needed is 1); {remedy}')
         if table_stamp != air_gap_stamp:
             raise ForceTableError(
                 f'current_force_table (activation {_seconds(table_stamp)}) and air_gap '

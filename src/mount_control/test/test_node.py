@@ -363,7 +363,10 @@ def test_measurements_whose_time_goes_back_make_the_table_invalid(active, around
 @pytest.mark.parametrize(
     ('sent', 'reason'),
     [
-        (lambda around: None, 'no current_force_table was received; activate mount_init (again)'),
+        (
+            lambda around: None,
+            'no current_force_table was received (0 messages, needed is 1); activate mount_init (again)',
+        ),
         (lambda around: around.send_air_gap(), 'no current_force_table was received'),
         (lambda around: around.send_table(), 'no air_gap was received'),
         (

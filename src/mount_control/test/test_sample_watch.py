@@ -102,8 +102,14 @@ def test_a_table_of_the_present_stream_is_accepted():
 
 def test_without_table_or_air_gap_it_is_refused():
     stream = _stream(S)
-    assert _refusal(None, S, stream) == 'no current_force_table was received; activate mount_init (again)'
-    assert _refusal(S, None, stream) == 'no air_gap was received; activate mount_init (again)'
+    assert (
+        _refusal(None, S, stream)
+        == 'no current_force_table was received (0 messages, needed is 1); activate mount_init (again)'
+    )
+    assert (
+        _refusal(S, None, stream)
+        == 'no air_gap was received (0 messages, needed is 1); activate mount_init (again)'
+    )
     assert 'no current_force_table' in _refusal(None, None, stream)
 
 
