@@ -188,6 +188,11 @@ def checked_specimen(specimen: Specimen) -> Specimen:
         check_heating(specimen.heating)
     except ParameterError as error:
         raise SpecimenError(f'heating: {error}') from error
+    if specimen.coil_resistance not in (None, specimen.heating.resistance):
+        raise SpecimenError(
+            f'coil_resistance ({specimen.coil_resistance:g} ohm) and heating.resistance '
+            f'({specimen.heating.resistance:g} ohm) are those of one coil at 20 degC: correct one of them'
+        )
     _check_friction(specimen.friction)
     try:
         check_provenance(specimen.provenance)

@@ -114,6 +114,7 @@ def test_a_specimen_cannot_be_changed_by_accident():
             3.5,
             r'current_limit \(3\.50 A\) must not exceed force_law\.current_high \(3\.00 A\)',
         ),
+        ('coil_resistance', 3.0, r'coil_resistance \(3 ohm\) and heating\.resistance \(2\.5 ohm\) are'),
         ('force_law.gap_high', 1.0, r'force_law\.gap_high \(1 m\) must lie within'),
         ('force_law.gap_high', 900e-6, 'the force must'),
         ('gap_curves.gap_of_inductance.coefficients', [4e-4, 1e-4], 'must agree within'),

@@ -12,6 +12,7 @@ the four basic operations alone, so it gives the same bits on every processor.
 
 from typing import Annotated, NamedTuple
 
+from mount_models.coil.resistance import COPPER_COEFFICIENT
 from mount_models.quantity import ParameterError, Quantity
 
 COPPER_CELSIUS = 20.0
@@ -25,7 +26,7 @@ class CoilHeating(NamedTuple):
     copper: Annotated[
         float,
         Quantity('1/K', 'rise of the resistance per kelvin', 0.0, 0.01, 'copper, IEC 60028'),
-    ] = 0.00393
+    ] = COPPER_COEFFICIENT
     thermal_resistance: Annotated[
         float,
         Quantity('K/W', 'from coil to ambient', 0.1, 100.0, 'chosen: 1 A for ever is 20 K, 3 A is too much'),

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.averages import mean
 
-COPPER_COEFFICIENT = 0.0039
-"""Relative rise of the resistance of copper per kelvin, 1/K (a constant of the material)."""
+COPPER_COEFFICIENT = 0.00393
+"""Relative rise of the resistance of copper per kelvin at 20 degC, 1/K (IEC 60028)."""
 
 REFERENCE_CELSIUS = 20.0
 """Temperature at which the resistance of a coil is given, degC."""
