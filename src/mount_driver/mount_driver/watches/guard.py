@@ -12,6 +12,8 @@ from mount_driver.link import Link, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.watches.coil_watch import CoilWatch
 from mount_driver.watches.heat_watch import HeatWatch
+from mount_driver.watches.ripple_law import RippleLaw
+from mount_driver.watches.ripple_watch import RippleWatch
 from mount_driver.watches.sender_watch import SenderWatch
 from mount_driver.watches.status_watch import StatusWatch
 
@@ -30,11 +32,18 @@ class Guard:
     """Judges what comes and remembers what was sent; lives as long as an activation."""
 
     def __init__(
-        self, parameters: DriverParameters, codec: MountCodec, clock: Clock, link: Link, heat: HeatWatch
+        self,
+        parameters: DriverParameters,
+        codec: MountCodec,
+        clock: Clock,
+        link: Link,
+        heat: HeatWatch,
+        law: RippleLaw,
     ):
         self.foreign_setpoints = 0
         """Sound setpoint frames of another sender."""
         self.heat = heat
+        self.ripple = RippleWatch(parameters.ripple, law, parameters.heating)
         self._link, self._clock = link, clock
         self._coil = CoilWatch(parameters.coil)
         self._health = StatusWatch(parameters.status)
@@ -73,7 +82,10 @@ class Guard:
         if link.jumps + self._clock.restarts != self._breaks:
             self._breaks = link.jumps + self._clock.restarts
             return Fault(self._restarted(), needs_initialisation=True)
-        sentence = self._coil.judge(sample.coil_current, sample.enabled, self._clock.taken(received), now)
+        current, enabled = sample.coil_current, sample.enabled
+        sentence = self._coil.judge(current, enabled, self._clock.taken(received), now) or self.ripple.judge(
+            current, sample.current_rate, sample.flux_rate, enabled, now
+        )
         return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:
@@ -86,6 +98,7 @@ class Guard:
         sentence = self._statuses.judge(self._link.statuses.strangers, now)
         if status is not None:
             self.heat.take_reported(status.coil_temperature_celsius)
+            self.ripple.take_status(status.supply_voltage, status.coil_temperature_celsius)
             sentence = self._health.judge(status, now) or sentence
         return Fault(sentence) if sentence else None
 
