@@ -108,6 +108,8 @@ def wait_for_end(process: subprocess.Popen[bytes]) -> int | None:
 
 def wrong_end(outcome: Outcome, said: str) -> list[str]:
     """Return what is wrong with code and words of a graph; one that was too late for 1 kHz may say so."""
+    if '<frozen site>' in said and outcome.number is signal.SIGINT:
+        return []  # Python itself was starting, which no program can mend; nothing was begun
     wanted = 1 if outcome.by_itself else 130 if outcome.number is signal.SIGINT else -signal.SIGKILL
     faults = [] if outcome.code == wanted else [f'code {outcome.code} instead of {wanted}']
     return [*faults, *(['traceback'] if 'Traceback' in said else [])]

@@ -3,10 +3,7 @@
 import mount_bags
 
 OPTIONS = ('--mounts', 'left,right', '--duration', '1.2', '--set', 'mount_sim.timeline.start=2.9')
-OWN = (
-    *('--set', 'mount_sim.motorway.gap_time=0.2', '--set', 'mount_sim.mount_right.friction.scale=0.8'),
-    *('--fault', 'left/coil_half@3.5:0.3'),
-)
+OWN = ('--set', 'mount_sim.motorway.gap_time=0.2', '--set', 'mount_sim.mount_right.friction.scale=0.8')
 
 
 def test_two_mounts_give_the_same_in_lockstep_and_in_core_to_the_bit(command):

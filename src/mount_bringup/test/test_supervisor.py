@@ -2,7 +2,7 @@
 
 import pytest
 
-from mount_bringup.graph import bringup
+from mount_bringup.graph import activation
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import DRIVER, INIT, SIM, SIMULATED, VEHICLE, GraphSettings, ending_order
 from mount_bringup.graph.supervisor import Supervisor
@@ -58,7 +58,7 @@ def test_refusals_of_a_machine_that_was_late_do_not_count(tmp_path, pace):
 
 
 def test_a_machine_that_stays_late_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(bringup, '_LATE_PATIENCE', 0.0)
+    monkeypatch.setattr(activation, '_LATE_PATIENCE', 0.0)
     graph = Refused(tmp_path, 9, timeouts=1)
     with pytest.raises(GraphError):
         graph.activate_init()

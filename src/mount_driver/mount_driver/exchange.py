@@ -22,6 +22,7 @@ from mount_driver.parameters import DriverParameters
 from mount_driver.watches.guard import Fault, Guard
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw
+from mount_models.sampling import sample_time_ns
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
 _REOPEN_PERIOD = 0.2  # s, chosen
@@ -50,7 +51,8 @@ class Exchange:
         heat: HeatWatch | None = None,
         law: RippleLaw | None = None,
     ):
-        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9))
+        sample_time = sample_time_ns(parameters.sample_rate)
+        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9), sample_time)
         self.reception = Reception()
         self.failure = ''
         """Why the exchange has ended on its own; empty while it runs."""
@@ -112,7 +114,19 @@ class Exchange:
                 self.link.refuse(Refusal.BUS_LOST)
                 return False
             setpoint = self.link.answer(stamp, current, self._now())
-            return setpoint is not None and self._send(setpoint)
+            sent = setpoint is not None and self._send(setpoint)
+            if self.link.double_answer and not self.link.fault:
+                self._send(self.link.switch_off(self.link.double_answer, needs_initialisation=False))
+                return False
+            return sent
+
+    def switch_off(self, fault: Fault | None) -> None:
+        """Send 0 A and let no setpoint pass any more; the first fault stays, or a graver one."""
+        link = self.link
+        if fault is None or (link.fault and not (link.needs_initialisation > fault.needs_initialisation)):
+            return
+        with self._sending:
+            self._send(link.switch_off(*fault))
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
@@ -179,16 +193,16 @@ class Exchange:
         if stamped is not None:
             self.bus_off = False
             self.last_received = received
-            self._switch_off(self.guard.judge_sample(stamped, received))
+            self.switch_off(self.guard.judge_sample(stamped, received))
             self._on_sample(stamped)
             return
-        self._switch_off(self.guard.judge_frame(received))
+        self.switch_off(self.guard.judge_frame(received))
         if self.link.arrival is Arrival.RESENT:
             self._answer_again()
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
-        self._switch_off(self.guard.judge_status(status, self._now()))
+        self.switch_off(self.guard.judge_status(status, self._now()))
         if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
             return
         # The frame has no time of its own. A second one without a sample between has none at all.
@@ -201,19 +215,11 @@ class Exchange:
             _, setpoint = self._codec.decode_setpoint(message.data)
         except (WrongCrcError, WrongLengthError):
             return  # nor do the electronics use it; their status tells of it
-        self._switch_off(self.guard.judge_foreign(setpoint, self._now()))
+        self.switch_off(self.guard.judge_foreign(setpoint, self._now()))
         with self._sending:
             # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
             if self._accepting:
                 self._send(self.link.off())
-
-    def _switch_off(self, fault: Fault | None) -> None:
-        """Send 0 A and let no setpoint pass any more; the first fault stays, but for a graver one."""
-        link = self.link
-        if fault is None or (link.fault and not (link.needs_initialisation > fault.needs_initialisation)):
-            return
-        with self._sending:
-            self._send(link.switch_off(*fault))
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1

@@ -204,7 +204,7 @@ def _take_motion(support, state, body, dt):
 def engine_stiffness(engine: RigidEngine, supports: Sequence[Support]) -> FloatArray:
     """Return the static stiffness (3, 3) against heave (m), roll and pitch (rad); forces N, moments N m."""
     stiffness = np.zeros((3, 3))
-    stiffness[2, 2] = engine.rod.static_stiffness * engine.rod_lever**2
+    stiffness[2, 2] = engine.rod.static_stiffness * engine.rod_lever * engine.rod_lever
     for support in supports:
         lever = np.array([1.0, support.y, -support.x])
         stiffness += support.elastomer.static_stiffness * np.outer(lever, lever)

@@ -6,12 +6,17 @@ from functools import partial
 from typing import Any
 
 import can
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
 from mount_models.quantity import ParameterError, flattened
-from mount_models.sampling import SAMPLE_TIME_NS
+from mount_ros import topics
+from mount_ros.data_path import DataPath
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
@@ -23,7 +28,6 @@ from mount_sim.diagnosis import car_verdict, verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults.schedule import Faults, injected_faults, texts_of_mount
 from mount_sim.excitation.scenario import build_excitation
-from mount_sim.instruments import Instruments
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import general_name, mount_names, values_of_mount
@@ -33,6 +37,7 @@ from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
 
+_UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
 _ALONE = ''  # name of the mount where there is one
 
 
@@ -66,7 +71,7 @@ class MountSim(SafeLifecycleNode):
         self._names = mount_names(self._settings.mounts) or (_ALONE,)
         self._excitation = build_excitation(self._settings)
         path = self.open_data_path()
-        self._instruments = {name: Instruments(path, name) for name in self._names}
+        self._instruments = {name: _Instruments(path, name) for name in self._names}
         path.start()
         self._path = path
         self._prepare_mounts()
@@ -77,7 +82,7 @@ class MountSim(SafeLifecycleNode):
             self._prepare_mounts()
         self._loops = {}
         for name, mount in self._mounts.items():
-            can_end = CanEnd(self._open_bus(interface, name))
+            can_end = CanEnd(self._open_bus(interface, name), self._settings.sample_rate)
             self._can_ends.append(can_end)
             self._loops[name] = ElectronicsLoop(
                 mount,
@@ -86,7 +91,7 @@ class MountSim(SafeLifecycleNode):
                 partial(self._publish, name),
             )
         drift = self._settings.electronics.clock_drift
-        self._loop = self._loops.get(_ALONE) or CarLoop(self._loops, drift)
+        self._loop = self._loops.get(_ALONE) or CarLoop(self._loops, drift, self._settings.sample_rate)
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
@@ -166,8 +171,11 @@ class MountSim(SafeLifecycleNode):
     def _simulated(self, faults: Sequence[str]) -> dict[str, SimulatedMount | CarMount]:
         if _ALONE in self._names:
             settings = self._settings
-            present = Faults(faults, settings.seed)
-            return {_ALONE: SimulatedMount(settings.plant, self._excitation, settings.seed, present)}
+            present = Faults(faults, settings.seed, settings.sample_rate)
+            mount = SimulatedMount(
+                settings.plant, self._excitation, settings.seed, present, settings.sample_rate
+            )
+            return {_ALONE: mount}
         return {**SimulatedCar({**self._values, 'faults': faults}, self._excitation).mounts}
 
     def _run(self) -> None:
@@ -202,7 +210,8 @@ class MountSim(SafeLifecycleNode):
         truth = mount.truth
         if not self.lockstep:
             truth['setpoint_latency'] = self._loops[name].last_latency
-        self._instruments[name].publish(self._time_zero + number * SAMPLE_TIME_NS, truth, mount.truth_bytes)
+        stamp = self._time_zero + number * mount.sample_time
+        self._instruments[name].publish(stamp, truth, mount.truth_bytes)
 
 
 def _declare_own(node: SafeLifecycleNode) -> list[str]:
@@ -217,6 +226,33 @@ def _declare_own(node: SafeLifecycleNode) -> list[str]:
             node.declare_parameter(name, node.get_parameter(general).value)
             own.append(name)
     return own
+
+
+class _Instruments:
+    """Publishes truth, acceleration and force of one mount, the one `name` of several or the only one."""
+
+    def __init__(self, path: DataPath, name: str = ''):
+        self._truth = ScalarsLayout(topics.SIM_TRUTH)
+        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
+        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        self._send_truth = path.sender(topics.SIM_TRUTH, name)
+        self._send_acceleration = path.sender(topics.SIM_CHASSIS_ACCELERATION, name)
+        self._send_force = path.sender(topics.SIM_MOUNT_FORCE, name)
+
+    def publish(self, stamp: int, truth: np.void, truth_bytes: bytes) -> None:
+        """Publish what was true at the time `stamp` (ns)."""
+        self._send_truth(self._truth.pack_record(stamp, truth_bytes))
+        self._send_acceleration(self._acceleration.pack(stamp, truth['chassis_acceleration']))
+        self._send_force(self._force.pack(stamp, truth['mount_force']))
+
+
+def level_imu() -> Imu:
+    """Return the message of an accelerometer that knows neither orientation nor rotation."""
+    message = Imu()
+    message.header.frame_id = 'mount_chassis'
+    message.orientation_covariance[0] = _UNKNOWN_ORIENTATION
+    message.angular_velocity_covariance[0] = _UNKNOWN_ORIENTATION
+    return message
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from mount_bringup.graph.activation import FRESH_DIAGNOSTICS, TRANSITION_LIMIT, Activation
 from mount_bringup.graph.errors import GraphError, Interrupted
 from mount_bringup.graph.liveliness import SILENCE_LIMIT
 from mount_bringup.graph.matches import unmatched
@@ -30,10 +31,10 @@ from mount_bringup.graph.nodes import (
     ending_order,
     groups,
 )
-from mount_bringup.graph.pace import Pace, pace
 from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
+from mount_bringup.graph.shared_memory import remove_abandoned
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
 from mount_ros.nodes.diagnostics import Level
@@ -44,10 +45,7 @@ from mount_sim.diagnosis import FINISHED
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
-_FRESH_DIAGNOSTICS = 1.5  # s, chosen: every node tells its figures once a second
 _CONFIGURE = Transition.TRANSITION_CONFIGURE
-_LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
-_TRANSITION_LIMIT = 60.0  # s, chosen: activation of mount_init includes its current ramp
 
 
 class Bringup:
@@ -71,6 +69,7 @@ class Bringup:
         self._mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
         self._interrupted = False  # no lock: a second signal may come amid the first
         self._context = Context()
+        self._activation = Activation(self)
         self._recovery = Recovery(self, settings.restart_limit)
         self._makes_good = False
 
@@ -82,6 +81,7 @@ class Bringup:
         self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
     ) -> None:
         """Bring all nodes to life; `session` makes the session text of a mount from its nodes' parameters."""
+        remove_abandoned()
         rclpy.init(
             context=self._context,
             domain_id=self._settings.domain,
@@ -107,14 +107,14 @@ class Bringup:
             publisher.publish(String(data=session(settings_of_mount(self.parameters, mount))))
         self.wait_for_matches()
         for _, side_by_side in groupby(self.nodes, lambda node: node.name):
-            self._activate_all(list(side_by_side), say)
+            self._activation.activate_all(list(side_by_side), say)
         self._makes_good = not any(values.get('lockstep') for values in self.parameters.values())
         self.verdicts.liveliness.pause()
 
     def start_nodes(self) -> None:
         """See to it that the nodes of this graph, and no others of their names, are there."""
         for node in self.nodes:
-            self._wait_for_service(node)
+            self.wait_for_service(node)
         self.refuse_others(own=1)
 
     def check_processes(self) -> None:
@@ -140,67 +140,8 @@ class Bringup:
         return self._recovery.restarts
 
     def activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
-        """Activate a node; one that refuses is asked as often as the graph declares.
-
-        If the machine was late, the refusal tells nothing of the mount: it is asked again for a minute.
-        """
-        begin, asked = time.monotonic(), 0
-        while True:
-            before = self._pace(node.mount)
-            try:
-                self.transition(node, Transition.TRANSITION_ACTIVATE)
-                self.verdicts.note_active(node)
-                return
-            except GraphError as error:
-                asked += not self._was_late(node, before)
-                if asked >= node.activations or time.monotonic() - begin > _LATE_PATIENCE:
-                    raise
-                self._tell_again(node, error, before, say)
-
-    def _was_late(self, node: GraphNode, before: Pace) -> bool:
-        """Return whether this machine has been too late since `before`, by fresh figures."""
-        self.serve_for(_FRESH_DIAGNOSTICS)
-        return self._pace(node.mount).was_late_since(before)
-
-    def _tell_again(
-        self, node: GraphNode, error: GraphError, before: Pace, say: Callable[[str], None]
-    ) -> None:
-        was_late = self._pace(node.mount).was_late_since(before)
-        reason = ' (this machine was too late for 1 kHz)' if was_late else ''
-        self.notes.append(f'{error}{reason}; it was activated again')
-        say(f'activating {node.full_name} again{reason}')
-
-    def _activate_all(self, nodes: Sequence[GraphNode], say: Callable[[str], None]) -> None:
-        """Activate one node, or those of all mounts at the same time; one that refuses is asked by itself."""
-        say(f'activating {", ".join(node.full_name for node in nodes)}')
-        if len(nodes) == 1:
-            self.activate(nodes[0], say)
-            return
-        before = {node: self._pace(node.mount) for node in nodes}
-        clients = {node: self._wait_for_service(node) for node in nodes}
-        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
-        answers = {node: client.call_async(request) for node, client in clients.items()}
-        names = ', '.join(node.full_name for node in nodes)
-
-        def all_done() -> bool:
-            return all(answer.done() for answer in answers.values())
-
-        self.wait_until(all_done, _TRANSITION_LIMIT, f'activate of {names}')
-        for node, client in clients.items():
-            self._node.destroy_client(client)
-            if answers[node].result().success:
-                self.verdicts.note_active(node)
-        for node in nodes:
-            if not answers[node].result().success:
-                error = self._refusal(node, 'activate')
-                if not self._was_late(node, before[node]) and node.activations == 1:
-                    raise error
-                self._tell_again(node, error, before[node], say)
-                self.activate(node, say)
-
-    def _pace(self, mount: str) -> Pace:
-        driver = next((node for node in self.nodes if node.is_a(DRIVER) and node.mount == mount), DRIVER)
-        return pace(self.figures(driver), self.figures(SIM))
+        """Activate a node; one that refuses is asked as often as the graph declares."""
+        self._activation.activate(node, say)
 
     def serve_for(self, duration: float) -> None:
         """Serve the graph for so many s."""
@@ -273,16 +214,16 @@ class Bringup:
         self._take_answer(node, transition, self._ask(node, transition))
 
     def _ask(self, node: GraphNode, transition: int) -> tuple[Client, Future]:
-        client = self._wait_for_service(node)
+        client = self.wait_for_service(node)
         return client, client.call_async(ChangeState.Request(transition=Transition(id=transition)))
 
     def _take_answer(self, node: GraphNode, transition: int, asked: tuple[Client, Future]) -> None:
         client, answer = asked
         label = {1: 'configure', 3: 'activate', 4: 'deactivate'}.get(transition, str(transition))
-        self.wait_until(answer.done, _TRANSITION_LIMIT, f'{label} of {node.full_name}')
+        self.wait_until(answer.done, TRANSITION_LIMIT, f'{label} of {node.full_name}')
         self._node.destroy_client(client)
         if not answer.result().success:
-            raise self._refusal(node, label)
+            raise self.refusal(node, label)
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
@@ -294,6 +235,7 @@ class Bringup:
         """End without a word to the nodes; return a sentence per unclean end."""
         if self._context.ok() and not leave_middleware(self._take_down):
             self.notes.append('the middleware of the supervisor did not come to an end and was left behind')
+        remove_abandoned()
         return []
 
     def _take_down(self) -> None:
@@ -301,17 +243,19 @@ class Bringup:
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
-    def _wait_for_service(self, node: GraphNode) -> Client:
+    def wait_for_service(self, node: GraphNode) -> Client:
+        """Return a client of the transitions of a node when it is there; to be destroyed by who asked."""
         client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
         self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.full_name}')
         return client
 
-    def _refusal(self, node: GraphNode, label: str) -> GraphError:
+    def refusal(self, node: GraphNode, label: str) -> GraphError:
+        """Return the error of a refused transition with the node's own reason."""
         return GraphError(f'{node.full_name} refused to {label}: {self._reason(node)}')
 
     def _reason(self, node: GraphNode) -> str:
         """Return what the node says of its refusal; it may come after the answer."""
-        end = time.monotonic() + _FRESH_DIAGNOSTICS
+        end = time.monotonic() + FRESH_DIAGNOSTICS
         while int(self.figures(node).get('level', Level.OK)) < Level.ERROR and time.monotonic() < end:
             self._executor.spin_once(0.05)
         return self.figures(node).get('sentence', '(it said nothing)')
@@ -373,6 +317,6 @@ class Bringup:
         client = self.client(kind, service)
         self.wait_until(client.service_is_ready, _START_LIMIT, f'service {service}')
         answer = client.call_async(request)
-        self.wait_until(answer.done, _TRANSITION_LIMIT, f'answer of {service}')
+        self.wait_until(answer.done, TRANSITION_LIMIT, f'answer of {service}')
         self._node.destroy_client(client)
         return answer.result()

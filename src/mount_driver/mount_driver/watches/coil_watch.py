@@ -15,9 +15,9 @@ from typing import Annotated, NamedTuple
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
-_WAY = SAMPLE_TIME_NS + 3_000_000  # ns, chosen: to the electronics' next sample, and 3 ms on the bus
+_ON_THE_BUS = 3_000_000  # ns, chosen
 _LATEST = 50_000_000  # ns, chosen: no sample is believed to have waited longer than this
-_REMEMBERED = 64  # chosen: setpoints; more than are sent in `_LATEST` and `_WAY`
+_REMEMBERED = 128  # chosen: setpoints; more than are sent in `_LATEST` and the way of a frame, at 2 kHz too
 _HOLD = round(1e9 * SETPOINT_TIMEOUT)  # ns: after a longer pause the electronics may have gone to 0 A
 
 
@@ -44,7 +44,9 @@ class CoilWatchParameters(NamedTuple):
 class CoilWatch:
     """Takes what was sent and what was measured, sample by sample."""
 
-    def __init__(self, parameters: CoilWatchParameters):
+    def __init__(self, parameters: CoilWatchParameters, sample_time: int = SAMPLE_TIME_NS):
+        """`sample_time` in ns."""
+        self._way = sample_time + _ON_THE_BUS  # ns: to the electronics' next sample
         self._limit = parameters.limit
         self._duration = round(1e9 * parameters.duration)
         self._bandwidth = 2e-9 * math.pi * parameters.bandwidth  # 1/ns
@@ -68,7 +70,7 @@ class CoilWatch:
         power stage is on. One that they say to be off must carry no current. A current that is not valid
         (NaN) is a deviation as soon as one is wanted.
         """
-        begin = max(taken, now - _LATEST) - _WAY
+        begin = max(taken, now - _LATEST) - self._way
         low, high = self._window(begin) if enabled else (0.0, 0.0)
         self._follow(low, high, now)
         within = self._low - self._limit <= current <= self._high + self._limit  # not so for NaN

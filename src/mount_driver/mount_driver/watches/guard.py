@@ -12,10 +12,12 @@ from mount_driver.link import Link, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.watches.coil_watch import CoilWatch
 from mount_driver.watches.heat_watch import HeatWatch
+from mount_driver.watches.rate_watch import RateWatch
 from mount_driver.watches.ripple_law import RippleLaw
 from mount_driver.watches.ripple_watch import RippleWatch
 from mount_driver.watches.sender_watch import SenderWatch
 from mount_driver.watches.status_watch import StatusWatch
+from mount_models.sampling import sample_time_ns
 
 _ALONE = 'take every node but the electronics that sends it off the bus'
 
@@ -42,10 +44,13 @@ class Guard:
     ):
         self.foreign_setpoints = 0
         """Sound setpoint frames of another sender."""
+        self.writer_doubt = ''
+        """Why another node may publish setpoints, so that answers are 0 A; empty where none may."""
         self.heat = heat
         self.ripple = RippleWatch(parameters.ripple, law, parameters.heating)
         self._link, self._clock = link, clock
-        self._coil = CoilWatch(parameters.coil)
+        self._coil = CoilWatch(parameters.coil, sample_time_ns(parameters.sample_rate))
+        self._rate = RateWatch(parameters.sample_rate)
         self._health = StatusWatch(parameters.status)
         self._samples = SenderWatch(parameters.senders, codec.measurement.name, _ALONE)
         self._statuses = SenderWatch(parameters.senders, codec.status.name, _ALONE)
@@ -76,16 +81,16 @@ class Guard:
         """Take a new sample and lower the link's limits as the watches say."""
         (stamp, sample), link, heat = stamped, self._link, self.heat
         now = self._clock.now(received)
-        link.held = self._health.hold(now)
+        link.held = self._health.hold(now) or self.writer_doubt
         heat.take(stamp, sample.coil_current, self._sent)
         link.current_limit = heat.current_limit
         if link.jumps + self._clock.restarts != self._breaks:
             self._breaks = link.jumps + self._clock.restarts
             return Fault(self._restarted(), needs_initialisation=True)
         current, enabled = sample.coil_current, sample.enabled
-        sentence = self._coil.judge(current, enabled, self._clock.taken(received), now) or self.ripple.judge(
-            current, sample.current_rate, sample.flux_rate, enabled, now
-        )
+        sentence = self._rate.judge(sample)
+        sentence = sentence or self._coil.judge(current, enabled, self._clock.taken(received), now)
+        sentence = sentence or self.ripple.judge(current, sample.current_rate, sample.flux_rate, enabled, now)
         return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:

@@ -1,7 +1,7 @@
 """The inductance over the current as the driver itself saw it in the ramp of the initialisation.
 
-No bus and no clock here. The driver knows nothing of mount_init: the first sweep of the current beyond 2 A and
-back to 0 A after its activation is the reference, whoever asked for it.
+No bus and no clock here. The driver knows nothing of mount_init: the first sweep of the current beyond 2 A
+and back to 0 A after its activation is the reference, whoever asked for it.
 """
 
 from typing import NamedTuple
@@ -68,8 +68,8 @@ class Sweep:
     ) -> Reference | None:
         """Return the reference of the sweep that has ended; None, and a new begin, where it has holes.
 
-        A reading may deviate by `inductance_limit` (1), or by what a gap that differs by `gap_limit` (m) makes
-        of it at the crossing, whichever is more.
+        A reading may deviate by `inductance_limit` (1), or by what a gap that differs by `gap_limit` (m)
+        makes of it at the crossing, whichever is more.
         """
         counts = np.array(self._counts)
         known = counts >= _FEWEST
@@ -115,8 +115,8 @@ def objection(reference: Reference, law: RippleLaw) -> str:
     highest = (1.0 + _INDUCTANCE_MARGIN) * law.rest_inductance_high
     if not least <= inductance <= highest:
         return (
-            f'coil ripple in the ramp gives {1e3 * inductance:.1f} mH at {law.rest_current:g} A; with a gap of '
-            f'{1e6 * law.gap_low:.0f} .. {1e6 * law.gap_high:.0f} um that lies within {1e3 * least:.1f} .. '
-            f'{1e3 * highest:.1f} mH: check gap, springs and ripple measurement'
+            f'coil ripple in the ramp gives {1e3 * inductance:.1f} mH at {law.rest_current:g} A; with a gap '
+            f'of {1e6 * law.gap_low:.0f} .. {1e6 * law.gap_high:.0f} um that lies within {1e3 * least:.1f} '
+            f'.. {1e3 * highest:.1f} mH: check gap, springs and ripple measurement'
         )
     return ''

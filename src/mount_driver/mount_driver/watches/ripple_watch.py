@@ -4,17 +4,19 @@ No bus and no clock here: times are ns by the clock that judges ages (`Clock.now
 
 Two questions. Does the voltage that drives the ripple, N A dB/dt + R(T) i, agree with the supply that the
 status tells? Other turns, another scale of dB/dt or none show at any current. And is the incremental
-inductance L_i = N A (dB/dt) / (di/dt), Eq (5), at this current the one of the ramp (`ripple_sweep`)? There the
-gap of every current passed by once; the means of the deviation, one for each 0.1 A, tell a gap that has changed.
+inductance L_i = N A (dB/dt) / (di/dt), Eq (5), at this current the one of the ramp (`ripple_sweep`)? There
+the gap of every current passed by once; the means of the deviation, one for each 0.1 A, tell a gap that has
+changed.
 
 What the gap does to L_i at a given current, with the shipped actuator: at 0.5 A a blocked gap lowers it by
-7 %, missing pads by 60 %; at 1.4 A both change it by more than 30 %, and 30 um less by 10 %. Blind are 0.7 ..
-0.95 A for a larger gap, where L_i over the gap has its top, 0.5 .. 0.7 A for pads that are worn but there, and
-what lies above 1.8 A, where the core is full, for all but missing pads.
+7 %, missing pads by 60 %; at 1.4 A a blocked gap raises it by 30 %, and one that is 30 um smaller lowers it by
+10 %. Blind for a larger gap are 0.6 .. 1.0 A, where L_i over the gap has its top; for worn pads what lies below
+0.7 A; above 1.8 A, where the core is full, only missing pads show.
 
-Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that of the reference, so a limit of
-5 % lies 16 sigma away, 8 behind an error of temperature and supply of 2.5 %: less than one false alarm in
-1e5 years (6e-16 each 16 ms). A missing pad is told after some 5 readings in 0.1 A, a blocked gap after 10 to 25.
+Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that of the reference. The limit of
+5 % lies 16 sigma away, and 8 behind an error of temperature and supply of 2.5 %: 6e-16 for each mean, and so
+less than one false alarm in 1e5 years. A missing pad is told after 5 readings within 0.1 A, a blocked gap
+after 10 to 25, each what a damped engine gives within 0.1 s.
 """
 
 from typing import Annotated, NamedTuple
@@ -117,7 +119,8 @@ class RippleWatch:
     def judge(self, current: float, current_rate: float, flux_rate: float, enabled: bool, now: int) -> str:
         """Return why the ripple does not fit, empty while it does or while that is not certain.
 
-        Current (A), di/dt (A/s) and dB/dt (T/s) arrived at `now`; a bridge that is not `enabled` has no ripple.
+        Current (A), di/dt (A/s) and dB/dt (T/s) arrived at `now`; a bridge that is not `enabled` has no
+        ripple.
         """
         if not enabled:
             self._finding = ''

@@ -113,10 +113,10 @@ CLOCKS = (
 SENSORS = (
     _simulated('displacement_invalid', _WHILE, 'displacement', third=True),
     _simulated('displacement_stuck', _WHILE, 'displacement', lasts=1.5),
-    _simulated('displacement_step', _TOLERATED),
+    _simulated('displacement_step', _WHILE, 'displacement'),
     _simulated('displacement_out_of_range', _WHILE, 'displacement|invalid', third=True),
-    _simulated('displacement_noisy', _TOLERATED),
-    _simulated('displacement_inverted', _TOLERATED, third=True),
+    _simulated('displacement_noisy', _WHILE, 'noise of the displacement'),
+    _simulated('displacement_inverted', _TOLD, 'displacement', third=True),
     _simulated('displacement_drifting', _TOLERATED, lasts=1.5, third=True),
     _simulated('displacement_sensor', _WHILE, 'displacement sensor', third=True),
     _simulated('ripple_missing', _TOLERATED),

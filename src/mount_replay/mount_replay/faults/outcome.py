@@ -200,7 +200,8 @@ def _check_told(outcome: Outcome, case: FaultCase, course: Course, told: list[To
 def _check_tolerated(
     outcome: Outcome, case: FaultCase, course: Course, told: list[Told], wanted: Wanted
 ) -> None:
-    errors = [each for each in told if each.level >= Level.ERROR]
+    there = [each for each in told if not each.time > course.cleared]  # its end may be a step of its own
+    errors = [each for each in there if each.level >= Level.ERROR]
     if errors:
         complaints = outcome.late if _LATENESS.search(errors[0].sentence) else outcome.complaints
         complaints.append(f'{errors[0].node} tells an error: {errors[0].sentence}')

@@ -8,9 +8,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# chosen: far apart in lightness too, so that they differ on paper without colour
-COLOURS = ('#1f5fa8', '#b03030', '#2f7d32', '#c77700', '#6a3d9a', '#0f8b8d')
-LEVEL_COLOUR, SPAN_COLOUR = '#b03030', '#666666'
 SOLID, DASHED, DOTTED = 'solid', 'dash', 'dot'
 
 

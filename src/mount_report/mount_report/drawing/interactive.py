@@ -6,18 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from mount_report.drawing.chart import (
-    COLOURS,
-    LEVEL_COLOUR,
-    SPAN_COLOUR,
-    Array,
-    Chart,
-    ChartError,
-    Curve,
-    Panel,
-    needs_legend,
-)
+from mount_report.drawing.chart import Array, Chart, ChartError, Curve, Panel, needs_legend
 from mount_report.drawing.envelope import envelope
+from mount_report.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
 
 POINTS = 12_000  # of a curve, chosen: more than a screen has columns, so that one can look closer
 _WIDTH, _PANEL_HEIGHT, _FRAME = 980, 220, 150  # pixels

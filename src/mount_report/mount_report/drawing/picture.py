@@ -11,19 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mount_report.drawing.chart import (
-    COLOURS,
-    DASHED,
-    DOTTED,
-    LEVEL_COLOUR,
-    SOLID,
-    SPAN_COLOUR,
-    Bars,
-    Chart,
-    Panel,
-    Span,
-    needs_legend,
-)
+from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Bars, Chart, Panel, Span, needs_legend
+from mount_report.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
 
 _STYLES: dict[str, Any] = {SOLID: '-', DASHED: '--', DOTTED: ':'}
 _WIDTH, _PANEL_HEIGHT = 10.0, 2.6  # inches, chosen: 1000 pixels wide

@@ -57,7 +57,6 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     _freeze()
     services = [_Service(node, over) for node in nodes]
     over.wait(real_time, logger.warning)
-    real_time.close()
     for node in nodes:
         node.ending.set()
     if over.starter.ended:
@@ -67,6 +66,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         service.end()
     for node in reversed(nodes):
         node.close()
+    real_time.close()  # until here no load keeps the coil from 0 A
     code = 1 if over.failed else 0
     if not leave_middleware(partial(_take_down, nodes)) or code:
         end_process(code)
