@@ -9,9 +9,9 @@ the gap of every current passed by once; the means of the deviation, one for eac
 changed.
 
 What the gap does to L_i at a given current, with the shipped actuator: at 0.5 A a blocked gap lowers it by
-7 %, missing pads by 60 %; at 1.4 A a blocked gap raises it by 30 %, and one that is 30 um smaller lowers it by
-10 %. Blind for a larger gap are 0.6 .. 1.0 A, where L_i over the gap has its top; for worn pads what lies below
-0.7 A; above 1.8 A, where the core is full, only missing pads show.
+7 %, missing pads by 60 %; at 1.4 A a blocked gap raises it by 30 %, one that is 30 um smaller lowers it by
+10 %. Blind for a larger gap are 0.6 .. 1.0 A, where L_i over the gap has its top; for worn pads what lies
+below 0.7 A; above 1.8 A, where the core is full, only missing pads show.
 
 Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that of the reference. The limit of
 5 % lies 16 sigma away, and 8 behind an error of temperature and supply of 2.5 %: 6e-16 for each mean, and so
