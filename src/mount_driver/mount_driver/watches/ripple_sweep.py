@@ -100,9 +100,13 @@ class Sweep:
         )
 
 
-def objection(reference: Reference, law: RippleLaw) -> str:
-    """Return why the reference cannot be that of this actuator, by its specimen; empty if it may be."""
-    low, high = law.crossing[0] - _CURRENT_MARGIN, law.crossing[2] + _CURRENT_MARGIN
+def objection(reference: Reference, law: RippleLaw, wider: float) -> str:
+    """Return why the reference cannot be that of this actuator, by its specimen; empty if it may be.
+
+    An unknown temperature makes the limits `wider` by this share of the inductance, and so many A of the
+    crossing: by 0.1, 100 K shift it by 0.07 A.
+    """
+    low, high = law.crossing[0] - _CURRENT_MARGIN - wider, law.crossing[2] + _CURRENT_MARGIN + wider
     current = reference.crossing_current
     if not low <= current <= high:
         return (
@@ -111,8 +115,8 @@ def objection(reference: Reference, law: RippleLaw) -> str:
             f'{low:.2f} .. {high:.2f} A: check pads, gap and ripple measurement'
         )
     inductance = reference.inductance[round(law.rest_current / NODE)]
-    least = (1.0 - _INDUCTANCE_MARGIN) * law.rest_inductance_low
-    highest = (1.0 + _INDUCTANCE_MARGIN) * law.rest_inductance_high
+    least = (1.0 - _INDUCTANCE_MARGIN - wider) * law.rest_inductance_low
+    highest = (1.0 + _INDUCTANCE_MARGIN + wider) * law.rest_inductance_high
     if not least <= inductance <= highest:
         return (
             f'coil ripple in the ramp gives {1e3 * inductance:.1f} mH at {law.rest_current:g} A; with a gap '

@@ -158,7 +158,7 @@ class RippleWatch:
     def _learn(self, current: float, inductance: float) -> str:
         p = self._parameters
         self._reference = self._sweep.reference(self._law, self._volts, p.inductance_limit, p.gap_limit)
-        return '' if self._reference is None else objection(self._reference, self._law)
+        return '' if self._reference is None else objection(self._reference, self._law, self._wider)
 
     def _compare(self, reference: Reference, current: float, inductance: float) -> str:
         place = int(current / NODE + 0.5)
