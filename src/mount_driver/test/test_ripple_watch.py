@@ -250,3 +250,11 @@ def test_a_ramp_of_another_actuator_is_refused(mechanics, rate, words):
     assert sentence.startswith('coil ripple in the ramp')
     assert words in sentence
     assert 'check' in sentence
+
+
+def test_a_frozen_ripple_is_found_once_the_current_moves(learnt):
+    still, moving = readings(READY), readings(DAMPING)
+    frozen = still[1][-1], still[2][-1]
+    for samples, found in ((still, False), (moving, True)):
+        samples[1][:], samples[2][:] = frozen
+        assert (fed(learnt, samples) is not None) is found
