@@ -15,8 +15,9 @@ below 0.7 A; above 1.8 A, where the core is full, only missing pads show.
 
 Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that of the reference. The limit of
 5 % lies 16 sigma away, and 8 behind an error of temperature and supply of 2.5 %: 6e-16 for each mean, and so
-less than one false alarm in 1e5 years. A missing pad is told after 5 readings within 0.1 A, a blocked gap
-after 10 to 25, each what a damped engine gives within 0.1 s.
+less than one false alarm in 1e5 years. The mean shows a missing pad after 5 readings within 0.1 A and a
+blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Told is what lasts for `duration`:
+three statuses, as supply and temperature are that late.
 """
 
 from typing import Annotated, NamedTuple
@@ -38,7 +39,9 @@ _BY_SUPPLY = (
 _UNKNOWN_CELSIUS = 0.1  # 1, chosen: what 100 K do
 _UNKNOWN_RESISTANCE = 0.4  # 1, chosen: likewise
 _NEAR = 0.2  # A, chosen: so near to the crossing a deviation is told as a gap
+_PAUSE = 50_000_000  # ns, chosen: of a longer time without samples nothing is known
 _ZONES = 32
+_JUMP = 0.03  # 1, chosen: another 35 K from one status to the next; a coil takes a minute for it
 _NOTHING_KNOWN = ('missing', 'voltage')  # findings with which no reading is compared
 
 
@@ -62,9 +65,7 @@ class RippleWatchParameters(NamedTuple):
     ] = 0.05
     duration: Annotated[
         float,
-        Quantity(
-            's', 'a wrong voltage, too much noise or no ripple for so long is a fault', 0.1, 5.0, 'chosen'
-        ),
+        Quantity('s', 'what deviates, scatters or is missing for so long is a fault', 0.1, 5.0, 'chosen'),
     ] = 0.3
 
 
@@ -88,10 +89,13 @@ class RippleWatch:
         self._reference: Reference | None = None
         self._means = [0.0] * _ZONES  # of the deviations in tolerances, each of 0.1 A
         self._noise, self._last = 0.0, 0.0
+        self._beyond_since, self._beyond_last = 0, -10 * self._duration  # ns: when a mean was beyond 1
         self._change = float('nan')  # m
         self._supply = float('nan')
+        self._cold = 1.0  # factor to the temperature of the calibration
         self._volts = float('nan')
         self._missing = 0.0  # share
+        self._judged = 0  # ns: when a sample came last
         self._finding, self._begun = '', 0  # what is wrong with the readings, and since when
         self._take(float('nan'))
 
@@ -114,7 +118,10 @@ class RippleWatch:
         self._resistance = heating.resistance * (1.0 + heating.copper * warmer)
         self._unknown_resistance = 0.0 if known else _UNKNOWN_RESISTANCE * heating.resistance
         self._wider = 0.0 if known else _UNKNOWN_CELSIUS
-        self._cold = 1.0 / warmth(self._law, celsius)
+        before, self._cold = self._cold, 1.0 / warmth(self._law, celsius)
+        if abs(self._cold - before) > _JUMP * before:  # readings of before were carried wrongly
+            self._means = [0.0] * _ZONES
+            self._beyond_last = -10 * self._duration
 
     def judge(self, current: float, current_rate: float, flux_rate: float, enabled: bool, now: int) -> str:
         """Return why the ripple does not fit, empty while it does or while that is not certain.
@@ -122,8 +129,10 @@ class RippleWatch:
         Current (A), di/dt (A/s) and dB/dt (T/s) arrived at `now`; a bridge that is not `enabled` has no
         ripple.
         """
+        elapsed, self._judged = now - self._judged, now
+        if not enabled or elapsed > _PAUSE:
+            self._begun += elapsed  # what was found neither lasts meanwhile nor is gone
         if not enabled:
-            self._finding = ''
             return ''
         flux_volts = self._turns_area * flux_rate
         valid = current_rate > 0.0 and flux_volts > 0.0 and current >= 0.0  # not so for NaN
@@ -142,7 +151,7 @@ class RippleWatch:
         inductance = flux_volts / current_rate * self._cold
         if self._reference is None:
             return self._learn(current, inductance) if self._sweep.take(current, inductance) else ''
-        return self._compare(self._reference, current, inductance)
+        return self._compare(self._reference, current, inductance, now)
 
     def _find(self, current: float) -> str:
         """Return what is wrong with the readings at present, empty where nothing is."""
@@ -160,7 +169,7 @@ class RippleWatch:
         self._reference = self._sweep.reference(self._law, self._volts, p.inductance_limit, p.gap_limit)
         return '' if self._reference is None else objection(self._reference, self._law, self._wider)
 
-    def _compare(self, reference: Reference, current: float, inductance: float) -> str:
+    def _compare(self, reference: Reference, current: float, inductance: float, now: int) -> str:
         place = int(current / NODE + 0.5)
         if place >= len(reference.inductance):
             return ''
@@ -172,7 +181,7 @@ class RippleWatch:
         self._last = deviation
         step = step if step >= 0.0 else -step
         self._noise += _NOISE_SHARE * (_TO_STD * (step if step < _ODD else _ODD) - self._noise)
-        if self._noise > 0.5 * self._parameters.noise_limit:  # such readings tell nothing of the gap
+        if self._noise > self._parameters.noise_limit:  # such readings tell nothing of the gap
             return ''
         by_supply = self._volts / reference.voltage - 1.0
         by_supply = by_supply if by_supply >= 0.0 else -by_supply
@@ -183,9 +192,16 @@ class RippleWatch:
         self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
         if -_NEAR < current - reference.crossing_current < _NEAR:
             self._note_gap(deviation * expected / -reference.slope[place])
-        if mean > 1.0 or mean < -1.0:
+        if (mean > 1.0 or mean < -1.0) and self._lasts_beyond(now):
             return self._gap_sentence(current, expected, mean * tolerance, tolerance)
         return ''
+
+    def _lasts_beyond(self, now: int) -> bool:
+        """Whether means have been beyond the limit again and again for long enough."""
+        if now - self._beyond_last > 2 * self._duration:
+            self._beyond_since = now
+        self._beyond_last = now
+        return now - self._beyond_since >= self._duration
 
     def _note_gap(self, current: float) -> None:
         """Take by how much (A) the crossing has moved by the last reading."""
@@ -198,15 +214,16 @@ class RippleWatch:
         """Return what is to be warned of, empty where nothing is."""
         p = self._parameters
         change = self._change
-        if change > p.gap_warning or -change > p.gap_warning:
+        slow = self._judged - self._beyond_last > 2 * self._duration  # else a fault is about to be told
+        if slow and (change > p.gap_warning or -change > p.gap_warning):
             return (
                 f'closed gap has changed by {1e6 * change:+.0f} um since the initialisation (limit '
                 f'{1e6 * p.gap_warning:g} um), and the force with it: initialise again, check the pads'
             )
-        if self._reference is not None and self._noise > 0.5 * p.noise_limit:
+        if 0.5 * p.noise_limit < self._noise <= p.noise_limit:  # beyond it is a fault
             return (
-                f'coil ripple scatters by more than {50.0 * p.noise_limit:g} %: the gap is not watched; '
-                f'check its sensors and cables'
+                f'coil ripple scatters by more than {50.0 * p.noise_limit:g} % (off at '
+                f'{100.0 * p.noise_limit:g} %): check its sensors and cables'
             )
         return ''
 
