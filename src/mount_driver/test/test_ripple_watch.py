@@ -226,6 +226,13 @@ def test_the_temperature_may_jump_between_two_statuses(learnt, celsius):
     assert fed(learnt, readings(DAMPING, other), 14.0, celsius, begin=10_100) is None
 
 
+def test_what_was_carried_to_the_wrong_temperature_is_forgotten(learnt):
+    warm = coil_at(122.0)
+    assert fed(learnt, readings(READY[:100], warm), begin=10_000) is None
+    assert fed(learnt, readings(np.zeros(250), warm), 14.0, 122.0, begin=10_100) is None
+    assert fed(learnt, readings(READY, warm), 14.0, 122.0, begin=10_350) is None
+
+
 def test_a_deviation_that_goes_is_no_fault(learnt):
     missing = MECHANICS._replace(contact_gap=20e-6)
     for begin in range(10_000, 20_000, 1000):
