@@ -123,7 +123,7 @@ def test_the_supply_may_change_within_a_status(learnt):
     ('currents', 'mechanics', 'within', 'places'),
     [
         (READY, {'contact_gap': 20e-6}, 310, '0.49 A'),
-        (DAMPING, {'contact_gap': 20e-6}, 340, ''),
+        (DAMPING, {'contact_gap': 20e-6}, 400, ''),
         (READY, {'spring_stiffness': 1e9}, 400, '0.49 A'),
         (DAMPING, {'spring_stiffness': 1e9}, 400, ''),
         (DAMPING, {'contact_gap': 200e-6}, 400, ''),

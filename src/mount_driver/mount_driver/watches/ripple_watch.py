@@ -40,6 +40,7 @@ _UNKNOWN_CELSIUS = 0.1  # 1, chosen: what 100 K do
 _UNKNOWN_RESISTANCE = 0.4  # 1, chosen: likewise
 _NEAR = 0.2  # A, chosen: so near to the crossing a deviation is told as a gap
 _PAUSE = 50_000_000  # ns, chosen: of a longer time without samples nothing is known
+_SURE = 24  # readings: so many sound ones bring a mean of `_FARTHEST` back below 1
 _ZONES = 32
 _JUMP = 0.03  # 1, chosen: another 35 K from one status to the next; a coil takes a minute for it
 _NOTHING_KNOWN = ('missing', 'voltage')  # findings with which no reading is compared
@@ -89,7 +90,9 @@ class RippleWatch:
         self._reference: Reference | None = None
         self._means = [0.0] * _ZONES  # of the deviations in tolerances, each of 0.1 A
         self._noise, self._last = 0.0, 0.0
-        self._beyond_since, self._beyond_last = 0, -10 * self._duration  # ns: when a mean was beyond 1
+        self._beyond = [0] * _ZONES  # readings of a zone since its mean has been beyond its limit
+        self._beyond_since = [0] * _ZONES  # ns
+        self._beyond_last = -10 * self._duration  # ns: when a mean was beyond its limit last
         self._change = float('nan')  # m
         self._supply = float('nan')
         self._cold = 1.0  # factor to the temperature of the calibration
@@ -121,7 +124,7 @@ class RippleWatch:
         before, self._cold = self._cold, 1.0 / warmth(self._law, celsius)
         if abs(self._cold - before) > _JUMP * before:  # readings of before were carried wrongly
             self._means = [0.0] * _ZONES
-            self._beyond_last = -10 * self._duration
+            self._beyond = [0] * _ZONES
 
     def judge(self, current: float, current_rate: float, flux_rate: float, enabled: bool, now: int) -> str:
         """Return why the ripple does not fit, empty while it does or while that is not certain.
@@ -192,16 +195,19 @@ class RippleWatch:
         self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
         if -_NEAR < current - reference.crossing_current < _NEAR:
             self._note_gap(deviation * expected / -reference.slope[place])
-        if (mean > 1.0 or mean < -1.0) and self._lasts_beyond(now):
+        if -1.0 <= mean <= 1.0:
+            self._beyond[zone] = 0
+        elif self._lasts_beyond(zone, now):
             return self._gap_sentence(current, expected, mean * tolerance, tolerance)
         return ''
 
-    def _lasts_beyond(self, now: int) -> bool:
-        """Whether means have been beyond the limit again and again for long enough."""
-        if now - self._beyond_last > 2 * self._duration:
-            self._beyond_since = now
+    def _lasts_beyond(self, zone: int, now: int) -> bool:
+        """Whether the mean of a zone, now beyond its limit, has stayed there for long enough."""
+        if self._beyond[zone] == 0:
+            self._beyond_since[zone] = now
+        self._beyond[zone] += 1
         self._beyond_last = now
-        return now - self._beyond_since >= self._duration
+        return self._beyond[zone] >= _SURE and now - self._beyond_since[zone] >= self._duration
 
     def _note_gap(self, current: float) -> None:
         """Take by how much (A) the crossing has moved by the last reading."""
