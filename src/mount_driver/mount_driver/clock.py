@@ -39,9 +39,6 @@ class Clock(Protocol):
     def now(self, monotonic_ns: int) -> int:
         """Return the time (ns) by which ages are judged at the steady time."""
 
-    def taken(self, received_monotonic_ns: int) -> int:
-        """Return by the same time when the last sample was taken, as far as is known."""
-
 
 class CounterClock:
     """Stamps are the electronics' own counter from zero, unwrapped: for lock-step, where no other time is."""
@@ -74,10 +71,6 @@ class CounterClock:
     def now(self, monotonic_ns: int) -> int:
         """Return the latest stamp, 0 before the first."""
         return max(self._stamp, 0)
-
-    def taken(self, received_monotonic_ns: int) -> int:
-        """Return the latest stamp."""
-        return self._stamp
 
 
 class ElectronicsClock:
@@ -141,10 +134,6 @@ class ElectronicsClock:
     def now(self, monotonic_ns: int) -> int:
         """Return the steady time itself."""
         return monotonic_ns
-
-    def taken(self, received_monotonic_ns: int) -> int:
-        """Return the steady time of the last sample, never after it was received."""
-        return min(self._stamp - self._epoch_offset, received_monotonic_ns)
 
     def _begin(self, arrival: int) -> None:
         self._stamp = max(arrival, self._stamp + self._sample_time) if self._running else arrival

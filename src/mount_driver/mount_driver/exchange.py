@@ -121,9 +121,16 @@ class Exchange:
             return sent
 
     def switch_off(self, fault: Fault | None) -> None:
-        """Send 0 A and let no setpoint pass any more; the first fault stays, or a graver one."""
+        """Send 0 A and let no setpoint pass any more.
+
+        The first fault stays, but for a graver one, or for one that names who answers beside the other.
+        """
         link = self.link
-        if fault is None or (link.fault and not (link.needs_initialisation > fault.needs_initialisation)):
+        if fault is None:
+            return
+        graver = link.needs_initialisation and not fault.needs_initialisation
+        nameless = link.fault == link.double_answer
+        if link.fault and not (graver or nameless):
             return
         with self._sending:
             self._send(link.switch_off(*fault))
@@ -245,7 +252,7 @@ class Exchange:
             self.unsent_reason = self.trouble
             return False
         try:
-            self.guard.note_sent(setpoint, self._now())
+            self.guard.note_sent(setpoint)
             self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
             bus.send(self._frame)
         except Exception as error:

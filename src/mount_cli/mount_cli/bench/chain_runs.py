@@ -73,16 +73,15 @@ def run_graph(
             supervisor.start(lambda told: session_text({'parameters': told}), lambda words: None)
             start = time.monotonic() - begin
             _serve(supervisor, _SETTLING)
-            before = {name: int(supervisor.figures(SIM).get(name, 0)) for name in ('samples', 'answered')}
+            before = {name: int(supervisor.figures(DRIVER).get(name, 0)) for name in ('samples', 'setpoints')}
             modules = [f'from {node.package}.node' for node in (DRIVER, INIT, CONTROL)]
             with _watched(children(modules)) as found:
                 _serve(supervisor, seconds)
-            after = supervisor.figures(SIM)
-            samples, answered = (int(after[name]) - before[name] for name in ('samples', 'answered'))
+            after, latency = supervisor.figures(DRIVER), supervisor.figures(SIM)['latency_median_s']
+            samples, answered = (int(after[name]) - before[name] for name in ('samples', 'setpoints'))
         finally:
             supervisor.stop()
-    latency = float(after['latency_median_s'])
-    return ChainRun(latency, found['cpu'], start, found['growth'], 1.0 - answered / max(1, samples))
+    return ChainRun(float(latency), found['cpu'], start, found['growth'], 1.0 - answered / max(1, samples))
 
 
 def run_relay(place: Place, seconds: float, sample_rate: float = SAMPLE_RATE) -> ChainRun:

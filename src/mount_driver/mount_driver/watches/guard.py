@@ -72,10 +72,10 @@ class Guard:
         times = (self._foreign_at, self._samples.last, self._statuses.last)
         return max((time for time in times if time is not None), default=None)
 
-    def note_sent(self, setpoint: Setpoint, now: int) -> None:
-        """Take a setpoint that leaves at `now`; one thread at a time."""
+    def note_sent(self, setpoint: Setpoint) -> None:
+        """Take a setpoint that leaves; one thread at a time."""
         self._sent = setpoint.current
-        self._coil.note_sent(setpoint.current, now)
+        self._coil.note_sent(setpoint)
 
     def judge_sample(self, stamped: Stamped, received: int) -> Fault | None:
         """Take a new sample and lower the link's limits as the watches say."""
@@ -87,10 +87,10 @@ class Guard:
         if link.jumps + self._clock.restarts != self._breaks:
             self._breaks = link.jumps + self._clock.restarts
             return Fault(self._restarted(), needs_initialisation=True)
-        current, enabled = sample.coil_current, sample.enabled
-        sentence = self._rate.judge(sample)
-        sentence = sentence or self._coil.judge(current, enabled, self._clock.taken(received), now)
-        sentence = sentence or self.ripple.judge(current, sample.current_rate, sample.flux_rate, enabled, now)
+        sentence = self._rate.judge(sample) or self._coil.judge(sample)
+        sentence = sentence or self.ripple.judge(
+            sample.coil_current, sample.current_rate, sample.flux_rate, sample.enabled, now
+        )
         return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:

@@ -49,7 +49,7 @@ def measured_resistance(turns_area: float, current: FloatArray, flux_rate: Float
     slope, intercept = _line(current, voltage)
     residual = voltage - intercept - slope * current
     offset = current - mean(current)
-    variance = float(np.sum(residual * residual)) / (current.size - 2) / float(np.sum(offset * offset))
+    variance = mean(residual * residual) / mean(offset * offset) / (current.size - 2)
     return CoilResistance(-slope, math.sqrt(variance), intercept)
 
 
@@ -60,5 +60,5 @@ _ROUNDING = 1e-3  # V, chosen: the resolution of readings without noise
 def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Return slope and value at 0 of the straight line of least squares."""
     offset = x - mean(x)
-    slope = float(np.sum(offset * y)) / float(np.sum(offset * offset))
+    slope = mean(offset * y) / mean(offset * offset)
     return slope, mean(y) - slope * mean(x)

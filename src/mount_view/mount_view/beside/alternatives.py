@@ -14,7 +14,7 @@ from mount_bringup.chosen import Parameters, chosen_control
 from mount_control.controller import ControlLaw, Controller
 from mount_control.policy.registry import POLICIES
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
+from mount_models.sampling import sample_time_ns
 from mount_ros.messages.force_table import ForceTable
 from mount_sim.excitation.excitation import Seat
 from mount_sim.excitation.scenario import STEP_TIME
@@ -22,10 +22,9 @@ from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import seated_mount
 from mount_sim.plant.plant import Plant, PlantSimulation
 
-_STEPS = round(SAMPLE_TIME / STEP_TIME)
 _LONGEST_PAUSE = 1_000_000_000  # ns, chosen: behind a longer one all begin anew, at rest
 _QUIET = np.zeros(5)  # no noise of the sensors
-_FORGETTING = SAMPLE_TIME / 5.0  # chosen: gravity and offset of an accelerometer, averaged over 5 s
+_AVERAGED = 5_000_000_000  # ns, chosen: gravity and offset of an accelerometer are averaged over 5 s
 
 Displacements = NDArray[np.float64]
 
@@ -60,9 +59,11 @@ class Beside:
         self._plant = with_flattened(SimParameters(), parameters.get('mount_sim', {})).plant
         self._parameters = parameters
         self._table, self._offset_current = table, offset_current
-        policy = chosen_control(parameters).parameters.policy
+        control = chosen_control(parameters).parameters
+        self._period = sample_time_ns(control.sample_rate)  # ns
+        self._steps = round(self._period * 1e-9 / STEP_TIME)
         self.alternatives = tuple(
-            found for found in alternatives_to(policy) if not found.policy or table is not None
+            found for found in alternatives_to(control.policy) if not found.policy or table is not None
         )
         self._begin()
 
@@ -86,11 +87,11 @@ class Beside:
             if self._last is not None:
                 self._begin()
             self._last, self._mean = (stamp, 0.0), acceleration
-            return np.zeros(_STEPS)
+            return np.zeros(self._steps)
         before, last = self._last
-        self._mean += _FORGETTING * (acceleration - self._mean)
+        self._mean += self._period / _AVERAGED * (acceleration - self._mean)
         now = acceleration - self._mean
-        steps = _STEPS * max(1, round((stamp - before) / SAMPLE_TIME_NS))
+        steps = self._steps * max(1, round((stamp - before) / self._period))
         self._last = stamp, now
         return last + (now - last) * np.arange(1, steps + 1) / steps
 
