@@ -8,8 +8,6 @@ import pytest
 from mount_driver.quantisation import quantised_current_rate, quantised_flux_rate
 from mount_driver.watches.ripple_law import RippleLaw, gap_of_crossing, ripple_law, warmth
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
-from mount_init.parameters import InitParameters
-from mount_init.ramp import current_ramp
 from mount_models.actuator.closing import ClosingMechanics, closed_state
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.gap import gap_from_crossing_current
@@ -19,7 +17,10 @@ from mount_models.specimen import default_specimen
 
 MS = 1_000_000
 ACTUATOR, COIL, MECHANICS = ReluctanceActuator(), RippleCoil(), ClosingMechanics()
-RAMP = np.concatenate([np.zeros(100), current_ramp(InitParameters(), 0.2).setpoints])
+STEP = np.linspace(0.0, 1.0, 1000)
+UP = 0.2 + 2.8 * STEP**2 * (3.0 - 2.0 * STEP)
+RISE = np.concatenate([np.linspace(0.0, 0.2, 50), np.full(300, 0.2), UP])
+RAMP = np.concatenate([np.zeros(100), RISE, np.full(20, 3.0), RISE[::-1], np.zeros(30)])  # as mount_init's
 DAMPING = 0.5 + 0.9 * np.abs(np.sin(50.0 * 1e-3 * np.arange(2000)))  # 8 Hz, 0.5 .. 1.4 A
 READY = np.full(2000, 0.4935)
 WARMER = 0.0043  # 1/K, of the core's resistivity
