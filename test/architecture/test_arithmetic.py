@@ -56,6 +56,7 @@ ALLOWED = {
     ('mount_bags.messages.time_axis', 'np.interp'): 'times told to people',
     ('mount_bags.messages.stamps', '**'): 'rates of topics, for the eye',
     ('mount_bags.messages.stamps', 'np.mean'): 'rates of topics, for the eye',
+    ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
     ('mount_ros.messages.scalars', 'math.prod'): 'whole numbers',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',

@@ -9,6 +9,7 @@ from mount_driver.e2e_receiver import Outcome
 from mount_driver.exchange import Exchange
 from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
+from mount_driver.watches.ripple_watch import RippleFigures
 from mount_models.sampling import HIGHEST_CURRENT, SETPOINT_TIMEOUT
 from mount_ros.nodes.diagnostics import Level, Verdict
 
@@ -56,6 +57,8 @@ class Snapshot(NamedTuple):
     current_limit: float = HIGHEST_CURRENT  # A, what it may carry
     derated: int = 0  # setpoints that were lowered to that
     held: str = ''  # keeps it at 0 A at present
+    ripple: RippleFigures | None = None
+    ripple_warning: str = ''
     status: Status | None = None
     setpoint_errors: int = 0  # statuses that report setpoint frames with a failed check
 
@@ -105,6 +108,8 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         current_limit=guard.heat.current_limit,
         derated=link.derated,
         held=link.held,
+        ripple=guard.ripple.figures,
+        ripple_warning=guard.ripple.warning,
         status=link.status,
         setpoint_errors=link.setpoint_errors,
     )
@@ -133,6 +138,7 @@ def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, loc
         *(() if lockstep else _silence_findings(now, where, parameters)),
         *_fault_findings(now, earlier, parameters),
         *_heat_findings(now, parameters),
+        *([(Level.WARN, now.ripple_warning)] if now.ripple_warning else []),
         *_quality_findings(now, earlier, parameters),
         *_setpoint_findings(now, earlier, parameters),
     ):
@@ -288,7 +294,18 @@ def _figures(now: Snapshot, parameters: DriverParameters) -> dict[str, object]:
         'current_limit': round(now.current_limit, 3),
         'derated': now.derated,
     }
+    if now.ripple is not None:
+        figures |= _ripple_figures(now.ripple)
     if now.status is not None:
         figures['supply_voltage'] = now.status.supply_voltage
         figures['coil_temperature_celsius'] = now.status.coil_temperature_celsius
     return figures
+
+
+def _ripple_figures(ripple: RippleFigures) -> dict[str, object]:
+    return {
+        'ripple_gap_um': round(1e6 * ripple.gap, 1),
+        'ripple_gap_change_um': round(1e6 * ripple.gap_change, 1),
+        'ripple_noise': round(ripple.noise, 4),
+        'ripple_voltage': round(ripple.voltage, 2),
+    }

@@ -21,6 +21,7 @@ from mount_driver.link import Arrival, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.watches.guard import Fault, Guard
 from mount_driver.watches.heat_watch import HeatWatch
+from mount_driver.watches.ripple_law import RippleLaw
 from mount_models.sampling import sample_time_ns
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
@@ -35,7 +36,7 @@ class Exchange:
     `on_sample(stamped)` is called in the receiving thread for every new sample, and
     `on_temperature(stamp_ns, celsius)` for a status with a coil temperature, with the last sample's stamp.
     `clock` gives the stamps and says by which time ages are judged; `steady() -> ns` is the steady clock.
-    `heat` is the coil's temperature from before, which an activation does not cool.
+    `heat` is the coil's temperature from before, which an activation does not cool; `law` is the ripple's.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Exchange:
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
         steady: Callable[[], int] = time.monotonic_ns,
         heat: HeatWatch | None = None,
+        law: RippleLaw | None = None,
     ):
         sample_time = sample_time_ns(parameters.sample_rate)
         self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9), sample_time)
@@ -72,7 +74,8 @@ class Exchange:
         self._temperature_stamp: int | None = None  # of the temperature told last
         self._clock = clock
         self._steady = steady
-        self.guard = Guard(parameters, codec, clock, self.link, heat or HeatWatch(parameters.heating))
+        heat = heat or HeatWatch(parameters.heating)
+        self.guard = Guard(parameters, codec, clock, self.link, heat, law or RippleLaw())
         self._ids = (codec.measurement.frame_id, codec.status.frame_id, codec.setpoint.frame_id)
         self._bus: can.BusABC | None = None
         self._alive = AliveCounter()

@@ -11,6 +11,7 @@ from mount_driver.link import Refusal, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.watches.guard import Fault
 from mount_driver.watches.heat_watch import HeatWatch
+from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_models.coil.heating import check_heating
 from mount_models.sampling import sample_time_ns
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
@@ -36,7 +37,7 @@ class MountDriver(SafeLifecycleNode):
         self.declare_parameter('parameters_file', '')
         self.declare_parameter('specimen', '')
         self._of_specimen = SpecimenValues(self)
-        self._settings = DriverParameters()
+        self._settings, self._law = DriverParameters(), RippleLaw()
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
         self._watch = LinkWatch()
@@ -77,6 +78,7 @@ class MountDriver(SafeLifecycleNode):
             self._on_sample,
             on_temperature=self._on_temperature,
             heat=self._heat,
+            law=self._law,
         )
         self._watch = LinkWatch()
         self._started_ns = time.monotonic_ns()
@@ -115,12 +117,14 @@ class MountDriver(SafeLifecycleNode):
         return judge(now, self._watch.earlier(now), self._settings, lockstep=self.lockstep)
 
     def _take_specimen(self) -> None:
+        self._law = RippleLaw()
         file = str(self.get_parameter('parameters_file').value)
         if not file:
             return  # the defaults are the shipped specimen's, and its other parts take a second to load
         from mount_models.specimen import chosen_specimen
 
         specimen = chosen_specimen(file, str(self.get_parameter('specimen').value))
+        self._law = ripple_law(specimen)
         self._of_specimen.give(DriverParameters().heating, 'heating', specimen.heating._asdict())
 
     def _on_sample(self, stamped: Stamped) -> None:

@@ -4,6 +4,7 @@ from typing import Annotated, NamedTuple
 
 from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
 from mount_driver.watches.coil_watch import CoilWatchParameters
+from mount_driver.watches.ripple_watch import RippleWatchParameters
 from mount_driver.watches.sender_watch import SenderLimits
 from mount_driver.watches.status_watch import StatusLimits
 from mount_models.coil.heating import CoilHeating
@@ -50,4 +51,5 @@ class DriverParameters(NamedTuple):
     coil: CoilWatchParameters = CoilWatchParameters()
     status: StatusLimits = StatusLimits()
     senders: SenderLimits = SenderLimits()
+    ripple: RippleWatchParameters = RippleWatchParameters()
     heating: CoilHeating = CoilHeating()

@@ -13,14 +13,17 @@ from mount_ros.testing import LIMIT, wait_until
 CODEC = MountCodec()
 
 
+def ripple(current: float) -> dict[str, float]:
+    """Return both slopes of a coil of 45 mH that carries `current` (A) at 14 V, as the bus carries them."""
+    volts = 14.0 - 2.5 * current
+    return {'current_rate': round(volts / 0.045, 3), 'flux_rate': round(volts / 0.11808, 4)}
+
+
 def sample(index: int, **changes) -> Measurement:
     """Return sample number `index`, taken at `index` ms."""
-    values = {
-        'displacement': 1e-6 * (index % 1000),
-        'coil_current': 0.0,
-        'current_rate': 250.0,
-        'flux_rate': 80.0,
-    }
+    values = {'displacement': 1e-6 * (index % 1000), 'coil_current': 0.0} | ripple(
+        changes.get('coil_current', 0.0)
+    )
     return Measurement(index % 65536, index * 1000 % 2**32, **(values | changes))
 
 

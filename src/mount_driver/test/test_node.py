@@ -127,7 +127,9 @@ def test_frames_become_topics_with_true_stamps_and_values(active, controller, fa
         controller.wait_for(index + 1)
     assert controller.received[DISPLACEMENT] == [(k * MS, (k / 1e6,), ()) for k in range(50)]
     for k, (stamp, (current, flux), slopes) in enumerate(controller.received[COIL_RIPPLE]):
-        assert (stamp, current, slopes) == (k * MS, pytest.approx(0.02 * k, abs=1e-12), (250.0, 80.0))
+        sent = sample(k, coil_current=0.02 * k)
+        assert (stamp, current, slopes) == (k * MS, pytest.approx(0.02 * k, abs=1e-12), slopes)
+        assert slopes == (sent.current_rate, sent.flux_rate)
         assert math.isnan(flux)
 
 

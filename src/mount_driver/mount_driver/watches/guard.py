@@ -13,6 +13,8 @@ from mount_driver.parameters import DriverParameters
 from mount_driver.watches.coil_watch import CoilWatch
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.rate_watch import RateWatch
+from mount_driver.watches.ripple_law import RippleLaw
+from mount_driver.watches.ripple_watch import RippleWatch
 from mount_driver.watches.sender_watch import SenderWatch
 from mount_driver.watches.status_watch import StatusWatch
 from mount_models.sampling import sample_time_ns
@@ -32,13 +34,20 @@ class Guard:
     """Judges what comes and remembers what was sent; lives as long as an activation."""
 
     def __init__(
-        self, parameters: DriverParameters, codec: MountCodec, clock: Clock, link: Link, heat: HeatWatch
+        self,
+        parameters: DriverParameters,
+        codec: MountCodec,
+        clock: Clock,
+        link: Link,
+        heat: HeatWatch,
+        law: RippleLaw,
     ):
         self.foreign_setpoints = 0
         """Sound setpoint frames of another sender."""
         self.writer_doubt = ''
         """Why another node may publish setpoints, so that answers are 0 A; empty where none may."""
         self.heat = heat
+        self.ripple = RippleWatch(parameters.ripple, law, parameters.heating)
         self._link, self._clock = link, clock
         self._coil = CoilWatch(parameters.coil, sample_time_ns(parameters.sample_rate))
         self._rate = RateWatch(parameters.sample_rate)
@@ -79,6 +88,9 @@ class Guard:
             self._breaks = link.jumps + self._clock.restarts
             return Fault(self._restarted(), needs_initialisation=True)
         sentence = self._rate.judge(sample) or self._coil.judge(sample)
+        sentence = sentence or self.ripple.judge(
+            sample.coil_current, sample.current_rate, sample.flux_rate, sample.enabled, now
+        )
         return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:
@@ -91,6 +103,7 @@ class Guard:
         sentence = self._statuses.judge(self._link.statuses.strangers, now)
         if status is not None:
             self.heat.take_reported(status.coil_temperature_celsius)
+            self.ripple.take_status(status.supply_voltage, status.coil_temperature_celsius)
             sentence = self._health.judge(status, now) or sentence
         return Fault(sentence) if sentence else None
 
