@@ -9,7 +9,8 @@ from itertools import cycle
 
 import numpy as np
 
-from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Bars, Chart, Curve, Level, Panel, Span
+from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Chart, Curve, Dots, Level, Panel, Span
+from mount_report.drawing.style import COLOUR_OF, COLOURS, DIFFERENCE_COLOUR, UNDAMPED_COLOUR
 
 _MM = 1e3
 TIME_LABEL = 'time from the first sample (s)'
@@ -40,26 +41,37 @@ def time_traces(
     title: str = 'Displacement and current',
     name: str = 'time_traces',
     limits: tuple[float, float] | None = None,
+    undamped: Named | None = None,
+    differ: bool = False,
 ) -> Chart:
     """Return displacement (m) with the levels of its policy above current (A), over time (s), as in Fig. 15.
 
-    `damping` are the stretches in which damping is on.
+    `damping` are the stretches in which damping is on; `undamped` is the displacement of the same mount
+    without current. Where two series `differ`, the second less the first stands below each pair.
     """
     panels = []
     if displacements:
-        panels.append(
-            Panel(
-                'displacement (mm)',
-                [_curve(series, place, 'displacement', _MM) for place, series in enumerate(displacements)],
-                levels=_lines(levels),
-                share=1.5,
-            )
-        )
+        curves = [_curve(series, place, 'displacement', _MM) for place, series in enumerate(displacements)]
+        if undamped is not None:
+            grey = Curve('undamped', undamped.x, _MM * undamped.y, UNDAMPED_COLOUR)
+            curves.insert(0, grey)  # below the others
+        panels.append(Panel('displacement (mm)', curves, levels=_lines(levels), share=1.5))
+        panels += _difference(displacements, 'displacement, B - A (mm)', _MM) if differ else []
     if currents:
         panels.append(
             Panel('current (A)', [_curve(series, place, 'current') for place, series in enumerate(currents)])
         )
+        panels += _difference(currents, 'current, B - A (A)') if differ else []
     return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', limits)
+
+
+def _difference(series: Sequence[Named], label: str, factor: float = 1.0) -> list[Panel]:
+    """Return the panel of the last series less the first one, where both are known."""
+    if len(series) < 2:
+        return []
+    first, other = series[0], series[-1]
+    y = other.y - np.interp(other.x, first.x, first.y, np.nan, np.nan)
+    return [Panel(label, [Curve('B - A', other.x, factor * y, DIFFERENCE_COLOUR)], share=0.7)]
 
 
 def hysteresis_loops(
@@ -80,19 +92,25 @@ def hysteresis_loops(
     return Chart(name, title, 'displacement (mm)', panels)
 
 
-def harmonics_bars(
+def harmonics_dots(
     amplitudes: Sequence[tuple[str, Array]],
     title: str = 'Harmonics of the mount force',
     name: str = 'harmonics',
 ) -> Chart:
-    """Return the amplitudes (N) of harmonics 1, 2, ..., as in Fig. 13 right; logarithmic."""
+    """Return the amplitudes (N) of harmonics 1, 2, ... in dB above 1 N, as in Fig. 13 right."""
     count = max(len(values) for _, values in amplitudes)
-    bars = [
-        Bars(each or 'mount force', np.arange(1.0, len(values) + 1.0), values, place)
+    dots = [
+        Dots(each or 'mount force', np.arange(1.0, len(values) + 1.0), decibels(values), COLOURS[place])
         for place, (each, values) in enumerate(amplitudes)
     ]
     ticks = tuple(float(number) for number in range(1, count + 1))
-    return Chart(name, title, 'harmonic', [Panel('amplitude (N)', bars=bars, log=True)], ticks=ticks)
+    return Chart(name, title, 'harmonic', [Panel('amplitude above 1 N (dB)', dots=dots)], ticks=ticks)
+
+
+def decibels(amplitudes: Array) -> Array:
+    """Return 20 log10 of `amplitudes`, NaN where one is 0."""
+    known = np.where(np.asarray(amplitudes) > 0.0, amplitudes, np.nan)
+    return np.asarray(20.0 * np.log10(known))
 
 
 def spectra(
@@ -122,7 +140,8 @@ def sweep_bands(
 ) -> Chart:
     """Return the peak displacement (m) of each band of frequency (Hz), below it the rms acceleration (m/s^2).
 
-    The x of a series are the lower edges of its bands; as in Fig. 14.
+    The x of a series are the lower edges of its bands; as in Fig. 14, both
+    logarithmic.
     """
     panels = [
         Panel(
@@ -132,6 +151,7 @@ def sweep_bands(
                 for place, series in enumerate(peaks)
             ],
             levels=_lines(levels or Levels(), both=False),
+            log=True,
         )
     ]
     if accelerations:
@@ -142,6 +162,7 @@ def sweep_bands(
                     _curve(_held(series), place, 'acceleration', steps=True)
                     for place, series in enumerate(accelerations)
                 ],
+                log=True,
             )
         )
     return Chart(name, title, 'frequency of the excitation (Hz)', panels)
@@ -156,14 +177,21 @@ def tracking(
     name: str = 'tracking',
 ) -> Chart:
     """Return wanted and true friction force (N) over time (s), and their difference."""
-    forces = [_curve(series, 2 * place, 'wanted', dash=DASHED) for place, series in enumerate(wanted)]
-    forces += [_curve(series, 2 * place + 1, 'true') for place, series in enumerate(actual)]
+    forces = [_curve(series, place, 'true') for place, series in enumerate(actual)]
+    forces += [
+        Curve(f'wanted{_of(series)}', series.x, series.y, _wanted_colour(place), DASHED)
+        for place, series in enumerate(wanted)
+    ]
     errors = [
-        _curve(Named(one.name, other.x, other.y - np.interp(other.x, one.x, one.y)), 2 * place + 1, 'error')
+        _curve(Named(one.name, other.x, other.y - np.interp(other.x, one.x, one.y)), place, 'error')
         for place, (one, other) in enumerate(zip(wanted, actual, strict=True))
     ]
     panels = [Panel('friction force (N)', forces, share=1.6), Panel('true minus wanted (N)', errors)]
-    return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', limits)
+    return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', view=limits)
+
+
+def _wanted_colour(place: int) -> str:
+    return COLOUR_OF['desired_force'] if place == 0 else COLOURS[(place + 1) % len(COLOURS)]
 
 
 def plain_traces(
@@ -179,15 +207,18 @@ def plain_traces(
 
 def _curve(
     series: Named,
-    colour: int,
+    place: int,
     what: str,
     factor: float = 1.0,
     x_factor: float = 1.0,
-    dash: str = SOLID,
     steps: bool = False,
 ) -> Curve:
-    named = f'{what}, {series.name}' if series.name else what
-    return Curve(named, x_factor * series.x, factor * series.y, colour, dash, steps)
+    colour = COLOURS[place % len(COLOURS)]
+    return Curve(f'{what}{_of(series)}', x_factor * series.x, factor * series.y, colour, SOLID, steps)
+
+
+def _of(series: Named) -> str:
+    return f', {series.name}' if series.name else ''
 
 
 def _lines(levels: Levels, both: bool = True) -> list[Level]:

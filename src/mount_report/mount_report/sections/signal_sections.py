@@ -102,7 +102,7 @@ def loops(subjects: Sequence[Subject]) -> Section:
 def harmonics(subjects: Sequence[Subject]) -> Section:
     """Return harmonics 1 to 8 of the mount force, its distortion and the work per cycle."""
     said = Sentences(subjects)
-    bars, rows = [], []
+    found_of, rows = [], []
     for subject in subjects:
         steady, force = subject.steady, subject.mount_force()
         moved = subject.true_displacement() or subject.displacement()
@@ -113,7 +113,7 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
         elif (found := _harmonics_of(moved, force, steady)) is None:
             said.say(subject, 'the mount force was not recorded for long enough there: no harmonics')
         else:
-            bars.append((_name(subjects, subject), found.amplitudes))
+            found_of.append((_name(subjects, subject), found.amplitudes))
             rows.append((subject.name, *found.cells))
             said.say(subject, f'over the last {found.periods} periods until {found.end:.2f} s')
     head = (
@@ -121,7 +121,7 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
         *(f'h{number} (N)' for number in range(1, 9)),
     )  # fmt: skip
     tables = [Table(head, rows)] if rows else []
-    chart = charts.harmonics_bars(bars) if bars else None
+    chart = charts.harmonics_dots(found_of) if found_of else None
     return Section('harmonics', 'Harmonics of the mount force', said.told(), chart, tables)
 
 
