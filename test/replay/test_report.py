@@ -17,7 +17,7 @@ from mount_bags.events.recorded_events import event_time, recorded_events
 from mount_cli.command import app
 from mount_report import report
 from mount_report.pages import default_pictures
-from mount_report.sections import run_sections
+from mount_report.sections import overview as overview_section
 from mount_report.signals import Signals
 from mount_ros.messages.cdr import serialised
 
@@ -113,7 +113,7 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 
     made = tuple(harmonics if make.__name__ == 'harmonics' else make for make in report.SECTIONS)
     monkeypatch.setattr(report, 'SECTIONS', made)
-    monkeypatch.setattr(run_sections, 'overview', overview)
+    monkeypatch.setattr(overview_section, 'overview', overview)
     short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
     result = command('drive', '--core', *short, '--out', tmp_path / 'run')
     assert result.exit_code == 0, result.output

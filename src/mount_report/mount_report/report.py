@@ -7,7 +7,7 @@ from pathlib import Path
 from mount_bags.bag.recording import Recording
 from mount_bags.compare.alignment import ComparisonError, align
 from mount_report.drawing.page import page
-from mount_report.sections import run_sections, signal_sections
+from mount_report.sections import overview, run_sections, signal_sections
 from mount_report.sections.section import Section
 from mount_report.sections.subject import RunFacts, Subject
 from mount_report.signals import Signals
@@ -94,9 +94,9 @@ def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda what, shar
         on_step(make.__name__, place / len(SECTIONS))
         made += _section_or_reason(make, subjects, failures)
     # Last, because it also says what the others did not find.
-    overview = _section_or_reason(run_sections.overview, subjects, failures)
+    first = _section_or_reason(overview.overview, subjects, failures)
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
-    return Report(title, [*overview, *made], failures)
+    return Report(title, [*first, *made], failures)
 
 
 def _section_or_reason(make: MakeSection, subjects: Sequence[Subject], failures: list[str]) -> list[Section]:

@@ -161,6 +161,7 @@ def test_a_long_gap_stays_a_gap_in_the_envelope():
     assert np.isnan(inside).all()
 
 
+HARMONICS = np.arange(1.0, 9.0)
 LEVELS = {'switch-on level': 8e-4, 'switch-off level': 3.5e-4}
 
 
@@ -170,7 +171,7 @@ def all_charts() -> list[Chart]:
     return [
         charts.time_traces(two, two, levels, [(0.5, 1.0)]),
         charts.hysteresis_loops(two, two[:1]),
-        charts.harmonics_dots([('A', np.array([200.0, 1.0])), ('B', np.array([100.0, 2.0]))]),
+        charts.harmonics_dots([Named('', HARMONICS, np.ones(8)), Named('B', HARMONICS, np.ones(8))]),
         charts.spectra([('displacement (mm/√Hz)', two)]),
         charts.sweep_bands([Named('', np.arange(3.0), np.ones(3))], [Named('', np.arange(3.0), np.ones(3))]),
         charts.tracking(two[:1], two[1:], [(0.5, 1.0)], (0.4, 1.1)),
@@ -240,7 +241,7 @@ def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy():
 
 
 def test_harmonics_are_dots_in_decibels_and_none_is_no_dot():
-    (panel,) = charts.harmonics_dots([('', np.array([100.0, 1.0, 0.0]))]).panels
+    (panel,) = charts.harmonics_dots([Named('', HARMONICS[:3], np.array([100.0, 1.0, 0.0]))]).panels
     assert panel.dots[0].y[:2].tolist() == [40.0, 0.0]
     assert np.isnan(panel.dots[0].y[2])
 

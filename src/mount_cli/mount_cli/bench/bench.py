@@ -128,4 +128,4 @@ def _median_time(call: Callable[[], object], rounds: int = _ROUNDS) -> float:
 
 
 def _duration(seconds: float) -> str:
-    return f'{1e6 * seconds:.2f} us'
+    return f'{1e6 * seconds:.2f} µs'

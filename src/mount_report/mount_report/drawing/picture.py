@@ -65,11 +65,14 @@ def name_lines(axes: Axes, panel: Panel) -> None:
         if not single or label not in names
     ]
     if kept:
-        axes.legend(
+        legend = axes.legend(
             *zip(*kept, strict=True), loc='lower right', bbox_to_anchor=(1.0, 0.99), ncols=len(kept),
             frameon=False, fontsize='small', labelcolor='linecolor', handlelength=1.4, columnspacing=1.2,
             borderaxespad=0.1,
         )  # fmt: skip
+        for text, (_, label) in zip(legend.get_texts(), kept, strict=True):
+            if label not in names:
+                text.set_color(SPAN_COLOUR)  # a shaded stretch, whose own colour is too pale to read
 
 
 def _draw_curve(axes: Axes, curve: Curve, limits: tuple[float, float] | None) -> None:

@@ -16,6 +16,8 @@ COLOUR_OF = {
     'displacement': '#1f5fa8',
     'friction': '#1f5fa8',
     'hydro': HYDROMOUNT_COLOUR,
+    'friction_off': UNDAMPED_COLOUR,
+    'elastomer': UNDAMPED_COLOUR,
     'undamped': UNDAMPED_COLOUR,
     'switched_viscous': '#c77700',
     'continuous_viscous': '#6a3d9a',

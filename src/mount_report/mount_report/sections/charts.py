@@ -4,7 +4,7 @@ They take arrays, so no recording is needed.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import cycle
 
 import numpy as np
@@ -18,11 +18,15 @@ TIME_LABEL = 'time from the first sample (s)'
 
 @dataclass(frozen=True)
 class Named:
-    """A series of numbers `y` over `x` with the name that the legend gives it; empty: only one is drawn."""
+    """A series of numbers `y` over `x` with the name that the legend gives it; empty: only one is drawn.
+
+    `colour` is that of a thing with a colour of its own, empty: that of its place among the others.
+    """
 
     name: str
     x: Array
     y: Array
+    colour: str = ''
 
 
 @dataclass(frozen=True)
@@ -93,17 +97,16 @@ def hysteresis_loops(
 
 
 def harmonics_dots(
-    amplitudes: Sequence[tuple[str, Array]],
+    amplitudes: Sequence[Named],
     title: str = 'Harmonics of the mount force',
     name: str = 'harmonics',
 ) -> Chart:
-    """Return the amplitudes (N) of harmonics 1, 2, ... in dB above 1 N, as in Fig. 13 right."""
-    count = max(len(values) for _, values in amplitudes)
+    """Return the amplitudes (N) of harmonics (their numbers as x) in dB above 1 N, as in Fig. 13 right."""
     dots = [
-        Dots(each or 'mount force', np.arange(1.0, len(values) + 1.0), decibels(values), COLOURS[place])
-        for place, (each, values) in enumerate(amplitudes)
+        Dots(each.name or 'mount force', each.x, decibels(each.y), each.colour or COLOURS[place])
+        for place, each in enumerate(amplitudes)
     ]
-    ticks = tuple(float(number) for number in range(1, count + 1))
+    ticks = tuple(max((each.x for each in amplitudes), key=len).tolist())
     return Chart(name, title, 'harmonic', [Panel('amplitude above 1 N (dB)', dots=dots)], ticks=ticks)
 
 
@@ -213,7 +216,7 @@ def _curve(
     x_factor: float = 1.0,
     steps: bool = False,
 ) -> Curve:
-    colour = COLOURS[place % len(COLOURS)]
+    colour = series.colour or COLOURS[place % len(COLOURS)]
     return Curve(f'{what}{_of(series)}', x_factor * series.x, factor * series.y, colour, SOLID, steps)
 
 
@@ -235,10 +238,10 @@ def _spans(stretches: Sequence[tuple[float, float]]) -> list[Span]:
 
 def _within(series: Named, highest: float) -> Named:
     shown = (series.x > 0.0) & (series.x <= highest)
-    return Named(series.name, series.x[shown], series.y[shown])
+    return replace(series, x=series.x[shown], y=series.y[shown])
 
 
 def _held(series: Named) -> Named:
     """Return the series with the end of its last band, so that steps show all of it."""
     width = float(np.min(np.diff(series.x))) if len(series.x) > 1 else 1.0
-    return Named(series.name, np.append(series.x, series.x[-1] + width), np.append(series.y, series.y[-1]))
+    return replace(series, x=np.append(series.x, series.x[-1] + width), y=np.append(series.y, series.y[-1]))

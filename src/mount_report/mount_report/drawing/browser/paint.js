@@ -1,7 +1,7 @@
 // ---- drawing
 
-function colourOf(name) {
-  if (!dark.matches || printing) return name;
+function colourOf(name) { // lighter on dark paper; grey stays behind
+  if (!dark.matches || printing || name.slice(1, 3) === name.slice(3, 5)) return name;
   const part = (place) => parseInt(name.slice(place, place + 2), 16);
   return `rgb(${[1, 3, 5].map((place) => Math.round(part(place) + 0.42 * (255 - part(place)))).join(',')})`;
 }
@@ -13,7 +13,7 @@ function draw(chart) {
 }
 
 function paintChart(chart) {
-  const style = getComputedStyle(root), ink = (name) => (printing ? { '--ink': '#222', '--quiet': '#666', '--line': '#ddd' }[name] : style.getPropertyValue(name));
+  const style = getComputedStyle(root), ink = (name) => (printing ? { '--ink': '#222', '--quiet': '#666', '--line': '#ddd', '--paper': '#fff' }[name] : style.getPropertyValue(name));
   const width = Math.max(200, chart.place.clientWidth);
   for (const panel of chart.panels) paintPanel(chart, panel, width, ink);
   const unit = (chart.told.x_label.match(/\(([^()]*)\)\s*$/) || ['', ''])[1];
@@ -61,7 +61,7 @@ function paintPanel(chart, panel, width, ink) {
   paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
   for (const curve of told.curves) if (!curve.hidden) paintCurve(paint, curve, chart, area);
   for (const dots of told.dots) if (!dots.hidden) paintDots(paint, dots, area);
-  paintLevels(paint, told, area);
+  paintLevels(paint, told, area, ink);
   if (chart.spike !== null && chart.spike >= from && chart.spike <= to) paintSpike(paint, area, chart.spike, ink);
   if (chart.dragged) {
     const [begin, end] = chart.dragged.map(area.x);
@@ -103,13 +103,16 @@ function paintFrame(paint, chart, panel, area, [low, high], last, width, ink) {
 
 function line(paint, x0, y0, x1, y1) { paint.beginPath(); paint.moveTo(x0, y0); paint.lineTo(x1, y1); paint.stroke(); }
 
-function paintLevels(paint, told, area) {
+function paintLevels(paint, told, area, ink) {
   paint.textAlign = 'left'; paint.textBaseline = 'bottom';
   for (const level of told.levels) {
     paint.strokeStyle = paint.fillStyle = colourOf(level.colour);
     paint.setLineDash(level.dash === 'dot' ? [2, 3] : [7, 4]);
     for (const value of level.both ? [level.value, -level.value] : [level.value]) line(paint, area.left, area.y(value), area.right, area.y(value));
     paint.setLineDash([]);
+    paint.strokeStyle = ink('--paper'); paint.lineWidth = 3; paint.globalAlpha = 0.8;
+    paint.strokeText(level.name, area.left + 4, area.y(level.value) - 1);
+    paint.lineWidth = 1; paint.globalAlpha = 1;
     paint.fillText(level.name, area.left + 4, area.y(level.value) - 1);
   }
 }
