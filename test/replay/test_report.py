@@ -1,5 +1,6 @@
 """`engine-mount report` on drives of the simulated car, on foreign and damaged recordings, in a browser."""
 
+import html
 import json
 import re
 import shutil
@@ -253,28 +254,89 @@ def browser() -> str:
     return found
 
 
-def test_a_browser_draws_every_figure_and_has_nothing_to_complain_about(browser, bench, page, tmp_path):
+def shown(browser: str, file: Path, profile: Path) -> subprocess.CompletedProcess:
+    """Return what a browser without network makes of a page, and what it logs."""
     quiet = (
         '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
         '--disable-background-networking', '--disable-component-update', '--disable-sync',
         '--host-resolver-rules=MAP * ~NOTFOUND',  # no network at all
     )  # fmt: skip
-    shown = subprocess.run(
+    return subprocess.run(
         [
-            browser, *quiet, f'--user-data-dir={tmp_path}', '--enable-logging=stderr',
+            browser, *quiet, f'--user-data-dir={profile}', '--enable-logging=stderr',
             '--window-size=1080,3000', '--virtual-time-budget=30000', '--dump-dom',
-            (bench / 'report.html').resolve().as_uri(),
+            file.resolve().as_uri(),
         ],
         capture_output=True, text=True, timeout=240, check=True,
     )  # fmt: skip
-    root = re.search(r'<html[^>]*>', shown.stdout)
+
+
+def test_a_browser_draws_every_figure_and_has_nothing_to_complain_about(browser, bench, page, tmp_path):
+    found = shown(browser, bench / 'report.html', tmp_path)
+    root = re.search(r'<html[^>]*>', found.stdout)
     assert root is not None
     assert 'data-ready="yes"' in root[0]
     assert 'data-error' not in root[0]
     assert f'data-drawn="{len(page.figures)}"' in root[0]
     # the browser's own console
-    assert not [line for line in shown.stderr.splitlines() if 'CONSOLE' in line]
-    assert shown.stdout.count('<canvas') == sum(len(figure['panels']) for figure in page.figures)
+    assert not [line for line in found.stderr.splitlines() if 'CONSOLE' in line]
+    assert found.stdout.count('<canvas') == sum(len(figure['panels']) for figure in page.figures)
+
+
+USED = """
+(function use() {
+if (!root.dataset.ready) return setTimeout(use, 20);
+const traces = charts.find((each) => each.place.dataset.chart === 'traces');
+const key = (key) => traces.place.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true }));
+const canvas = traces.panels[0].canvas, told = {};
+canvas.setPointerCapture = () => {};
+function point(pointerType, pointerId, type, share) {
+  const box = canvas.getBoundingClientRect(), clientX = box.left + LEFT + share * (box.width - LEFT - RIGHT);
+  canvas.dispatchEvent(new PointerEvent(type, { pointerType, pointerId, clientX, bubbles: true }));
+}
+const link = [...document.querySelectorAll('a[data-at]')].find((each) => each.dataset.chart === '#traces');
+link.click();
+told.at = Number(link.dataset.at);
+told.linked = traces.shown;
+told.spikes = charts.map((each) => each.spike);
+charts.forEach(paintChart);
+told.numbers = [...traces.place.querySelectorAll('output')].map((each) => each.textContent.trim());
+key('+'); told.zoomed = traces.shown;
+key('ArrowRight'); told.moved = traces.shown;
+key('0'); told.whole = traces.shown;
+point('mouse', 1, 'pointerdown', 0.25);
+point('mouse', 1, 'pointermove', 0.75);
+point('mouse', 1, 'pointerup', 0.75);
+told.dragged = traces.shown;
+key('0');
+point('touch', 2, 'pointerdown', 0.4);
+point('touch', 3, 'pointerdown', 0.6);
+point('touch', 2, 'pointermove', 0.2);
+point('touch', 3, 'pointermove', 0.8);
+told.pinched = traces.shown;
+document.body.dataset.told = JSON.stringify(told);
+})();
+"""
+
+
+def test_links_keys_mouse_and_touch_move_a_chart_and_one_line_reads_all_of_them(browser, bench, tmp_path):
+    text = (bench / 'report.html').read_text(encoding='utf-8')
+    used = tmp_path / 'used.html'
+    used.write_text(text.replace('</body>', f'<script>{USED}</script></body>'), encoding='utf-8')
+    found = re.search(r'data-told="([^"]*)"', shown(browser, used, tmp_path / 'profile').stdout)
+    assert found is not None
+    told = json.loads(html.unescape(found[1]))
+    first, last = told['whole']
+    assert told['linked'] == pytest.approx([told['at'] - 0.5, told['at'] + 0.5], abs=1e-3)
+    assert told['spikes'].count(pytest.approx(told['at'])) == 2  # displacement and current, tracking
+    assert all(re.fullmatch(r'-?[0-9.]+( … -?[0-9.]+)? (mm|A)', number) for number in told['numbers'])
+    middle, half = told['at'], 0.25
+    assert told['zoomed'] == pytest.approx([middle - half, middle + half], abs=1e-3)
+    assert told['moved'] == pytest.approx([middle - half + 0.1, middle + half + 0.1], abs=1e-3)
+    assert told['dragged'] == pytest.approx(
+        [first + 0.25 * (last - first), first + 0.75 * (last - first)], abs=0.02
+    )
+    assert told['pinched'][1] - told['pinched'][0] == pytest.approx((last - first) / 3.0, rel=0.02)
 
 
 def test_a_moment_has_the_same_time_in_a_report_and_among_the_events(bench, tmp_path):

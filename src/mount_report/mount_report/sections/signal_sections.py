@@ -59,6 +59,8 @@ def traces(subjects: Sequence[Subject]) -> Section:
             of = f' of {subjects[0].name}' if len(subjects) > 1 else ''
             words.append(f'Grey: the undamped mount on the same excitation{of}, computed with 0 A.')
         differ = subjects[-1].comparison is not None
+        if differ:
+            words.append(f'B - A: {subjects[-1].name} less {subjects[0].name}.')
         chart = charts.time_traces(
             moved, currents, levels, damping, limits=(first, last), undamped=grey, differ=differ
         )

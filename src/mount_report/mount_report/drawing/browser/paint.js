@@ -82,7 +82,7 @@ function paintFrame(paint, chart, panel, area, [low, high], last, width, ink) {
   paint.globalAlpha = 1;
   paint.strokeStyle = ink('--line'); paint.fillStyle = ink('--quiet'); paint.lineWidth = 1;
   paint.textAlign = 'right'; paint.textBaseline = 'middle';
-  const step = told.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, (bottom - top) / 42);
+  const step = told.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, Math.max(3, (bottom - top) / 42));
   for (let place = Math.ceil(low / step); place * step <= high; place += 1) {
     const y = Math.round(bottom - ((bottom - top) * (place * step - low)) / (high - low)) + 0.5;
     line(paint, left, y, right, y);
