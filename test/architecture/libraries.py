@@ -15,10 +15,12 @@ class Library(NamedTuple):
 
 LIBRARIES = {
     'PIL': Library('pillow', 'python3-pil'),
+    'aiohttp': Library('aiohttp', 'python3-aiohttp'),
     'bitstruct': Library('bitstruct'),
     'can': Library('python-can', 'python3-can'),
     'cantools': Library('cantools', 'python3-cantools-pip'),
     'e2e': Library('autosar-e2e'),
+    'foxglove': Library('foxglove-sdk'),
     'hypothesis': Library('hypothesis', 'python3-hypothesis'),
     'lz4': Library('lz4'),
     'matplotlib': Library('matplotlib', 'python3-matplotlib'),

@@ -16,7 +16,11 @@ CAR = (
     ('mount_sim',),
     ('mount_bringup',),
 )
-DESK = (('mount_replay', 'mount_identification', 'mount_report'), ('mount_experiments',), ('mount_cli',))
+DESK = (
+    ('mount_replay', 'mount_identification', 'mount_report'),
+    ('mount_experiments', 'mount_view'),
+    ('mount_cli',),
+)
 FLOORS = (*CAR, *DESK)
 """The packages from the ground up; none imports one beside it or above it."""
 MAY_IMPORT = {

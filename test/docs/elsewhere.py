@@ -3,11 +3,11 @@
 _INSTALLATION = 'on a ROS 2 installation; test/architecture/test_car.py holds what it installs and loads'
 _LAUNCH = 'on a ROS 2 installation; test/graph/test_drive.py drives the same nodes'
 _RECORD = 'beside a running graph in test/graph/test_recording.py'
+_VIEW = 'with clients of its own in src/mount_view/test'
 _SET = 'on a running node in test/replay/test_parameter_changes.py'
 
 ELSEWHERE = {
     'make drive': 'in real time by test/graph/test_drive.py',
-    'engine-mount faults': 'in real time by test/graph/test_faults.py',
     'make test': 'it is what runs this',
     'make setup-dev': 'it made the environment that this runs in',
     'make lint': 'by .ci/run',
@@ -22,6 +22,8 @@ ELSEWHERE = {
     'ros2 topic pub --once /mount_right/event': _RECORD,
     'ros2 param set /mount_right/mount_control': _SET,
     'engine-mount record --': _RECORD,
+    'engine-mount view': _VIEW,
+    'engine-mount status': _VIEW,
     'engine-mount identify friction': 'it takes long; src/mount_cli/test/test_identify_friction.py',
 }
 """{beginning of the commands: where they are run}."""

@@ -9,6 +9,8 @@ import mount_bags
 from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
 from mount_bags.audit.node_reports import node_reports
+from mount_bags.run.session import recorded_sample_rate
+from mount_replay.replay import ReplayOrder, replay_without_output
 
 DATA_TOPICS = (
     'displacement',
@@ -77,6 +79,23 @@ def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switchin
     active = mount_bags.open(core.folder / 'recording')['control_trace']['damping_active']
     assert bool(active[:200].all()) is False
     assert bool(active[200:].all()) is True
+
+
+def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(command):
+    options = ('--sample-rate', '2000', '--scenario', 'bench', '--duration', '0.5')
+    options += ('--set', 'mount_sim.timeline.start=2.9')
+    lockstep, core = command.drive('--lockstep', *options), command.drive('--core', *options)
+    assert lockstep.code == core.code == 0, lockstep.output + core.output
+    for topic in DATA_TOPICS:
+        assert _payloads(lockstep.folder, topic) == _payloads(core.folder, topic), topic
+    for result in (lockstep, core):
+        recording = mount_bags.open(result.folder / 'recording')
+        assert recorded_sample_rate(recording) == 2000.0
+        assert set(np.diff(recording['displacement'].stamps)) == {500_000}
+        assert result.figures['lost_samples'] == result.figures['unanswered_samples'] == 0
+    replayed = replay_without_output(ReplayOrder(core.folder / 'recording'))
+    assert replayed.agreement is not None
+    assert replayed.agreement.equal
 
 
 @pytest.mark.real_time

@@ -6,16 +6,12 @@ import os
 import re
 import signal
 import subprocess
-import threading
 
 import pytest
 
 import mount_bags
 from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
-from mount_bringup.graph.domain import can_port
-from mount_driver.bus import MULTICAST_GROUP, open_bus
-from mount_driver.codec import MountCodec
 from mount_ros.testing import wait_until
 
 # One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
@@ -25,33 +21,6 @@ ENDLESS = (
 )  # fmt: skip
 
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long
-
-
-@pytest.fixture
-def bus_listener(domain):
-    """The setpoints seen on the CAN bus, by a peer that was there all the time."""
-    codec = MountCodec()
-    setpoints = []
-    bus = open_bus(
-        'udp_multicast',
-        MULTICAST_GROUP,
-        port=can_port(domain, ''),
-        receive=[codec.setpoint.frame_id],
-    )
-    ending = threading.Event()
-
-    def listen():
-        while not ending.is_set():
-            frame = bus.recv(0.1)
-            if frame is not None:
-                setpoints.append(codec.decode_setpoint(frame.data)[1])
-
-    thread = threading.Thread(target=listen)
-    thread.start()
-    yield setpoints
-    ending.set()
-    thread.join()
-    bus.shutdown()
 
 
 def _node_pids(parent: int) -> dict[str, int]:

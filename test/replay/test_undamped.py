@@ -42,6 +42,14 @@ def test_it_is_the_drive_of_the_mount_whose_coil_driver_opens(drive, tmp_path):
     assert np.abs(undamped.displacement).max() > 1.3 * np.abs(drive['sim/truth']['displacement']).max()
 
 
+def test_it_has_the_sample_rate_of_the_drive(tmp_path):
+    slow = (*SHORT, '--sample-rate', '500')
+    recording = driven(tmp_path / 'slow', *slow)
+    undamped = undamped_of(recording, parameters_of(recording))
+    assert len(undamped.stamps) == pytest.approx(5.8 * 500, abs=2)
+    assert (undamped.begin - undamped.stamps[0]) / 1e9 == pytest.approx(2.8)
+
+
 def test_of_a_part_of_a_drive_it_is_the_same_part(drive, tmp_path):
     cut(drive, tmp_path / 'part', 3.5, 4.5)
     part = open_recording(tmp_path / 'part')

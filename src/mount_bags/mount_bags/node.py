@@ -22,6 +22,7 @@ from mount_bags.recorder.recorder import Recorder
 from mount_bags.recorder.snapshot import Snapshot, SnapshotRule
 from mount_bags.recorder.space import SpaceGuard
 from mount_bags.recorder.watching import watch_topic
+from mount_models.sampling import SAMPLE_RATE
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import BY_HAND, Mark, mark_text
 from mount_ros.nodes.diagnostics import Verdict
@@ -57,6 +58,7 @@ class MountRecorder(SafeLifecycleNode):
         self._marks: AutomaticMarks | None = None
         self._subscriptions_by_topic: dict[str, Subscription] = {}
         self._on_full = OnFull.STOP
+        self._sample_rate = SAMPLE_RATE
         self._event = EVENT.name
         self._announced_failure = ''
         self._announced_malformed: set[str] = set()
@@ -66,6 +68,7 @@ class MountRecorder(SafeLifecycleNode):
     def configure(self) -> None:
         parameters = read(self, RecorderParameters())
         self._on_full = _on_full(parameters.on_full)
+        self._sample_rate = parameters.sample_rate
         topics = [_registered(name) for name in self.get_parameter('topics').value]
         mounts = [name.strip() for name in self.get_parameter('mounts').value.split(',')]
         uri = self.get_parameter('uri').value
@@ -179,7 +182,7 @@ class MountRecorder(SafeLifecycleNode):
         name = data_path.node.resolve_topic_name(placed.name)
         latched = entry.delivery is Delivery.LATCHED
         sink.add_topic(name, entry.type, partial(_offers, data_path, name), latched=latched)
-        watch_topic(recorder, entry, name, marks, self.get_namespace(), self._present_time)
+        watch_topic(recorder, entry, name, marks, self.get_namespace(), self._present_time, self._sample_rate)
         receive = recorder.latched_receiver(name) if latched else recorder.receiver(name)
         self._subscriptions_by_topic[name] = data_path.collect(placed, receive)
 

@@ -8,7 +8,6 @@ from mount_control.policy.contract import Policy
 from mount_control.policy.registry import UNPREFIXED
 from mount_control.settings import ControlSettings, control_settings, policy_parameters
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME
 from mount_models.specimen import Specimen
 from mount_models.specimen import chosen_specimen as specimen_of
 
@@ -24,7 +23,7 @@ def control_parameters(parameters: Parameters) -> ControlParameters:
 def check_policy(parameters: Parameters) -> None:
     """Refuse what the chosen policy cannot work with; raises a `ValueError`."""
     policy, own = policy_of(parameters)
-    policy.design(own, SAMPLE_TIME)
+    policy.design(own, 1.0 / control_parameters(parameters).sample_rate)
 
 
 def policy_of(parameters: Parameters) -> tuple[Policy, Any]:

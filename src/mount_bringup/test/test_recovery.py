@@ -15,7 +15,7 @@ from mount_bringup.graph.restarts import Loss, NodesLostError, Remedy
 
 LABELS = {Transition.TRANSITION_CONFIGURE: 'configure', Transition.TRANSITION_DEACTIVATE: 'deactivate'}
 DRIVING = {'state': 'active', 'restarts': '0', 'gaps': '0', 'samples': '9000', 'lost': '0',
-           'last_stamp': '9000000000'}  # fmt: skip
+           'last_stamp': '9000000000', 'sample_rate': '1000'}  # fmt: skip
 TABLE = {'state': 'active', 'last_stamp': '5000000000'}
 
 

@@ -87,7 +87,7 @@ def test_the_loss_of_the_simulated_electronics_ends_the_graph():
 
 
 MEASURING = {'state': 'active', 'restarts': '0', 'gaps': '0', 'samples': '9000', 'lost': '5',
-             'last_stamp': '10000000000'}  # fmt: skip
+             'last_stamp': '10000000000', 'sample_rate': '1000.0'}  # fmt: skip
 LATCHED = {'state': 'active', 'last_stamp': '4000000000'}
 
 
@@ -98,6 +98,7 @@ LATCHED = {'state': 'active', 'last_stamp': '4000000000'}
         ({'gaps': '1'}, {}, False),
         ({'restarts': '1'}, {}, False),
         ({'samples': '5900'}, {}, False),  # activated since: electronics and driver may have been away
+        ({'sample_rate': '2000.0'}, {}, False),  # 9000 samples are 4.5 s
         ({'state': 'inactive'}, {}, False),
         ({'needs_initialisation': 'True'}, {}, False),
         ({}, {'state': 'inactive'}, False),

@@ -1,6 +1,7 @@
 """How often a node that refuses to be activated is asked again, and in which order nodes end."""
 
 import pytest
+from lifecycle_msgs.msg import Transition
 
 from mount_bringup.graph import activation
 from mount_bringup.graph.errors import GraphError
@@ -54,7 +55,8 @@ def test_refusals_of_a_machine_that_was_late_do_not_count(tmp_path, pace):
     graph = Refused(tmp_path, 9, **pace)
     graph.activate_init()
     assert graph.asked == 10
-    assert 'this machine was too late for 1 kHz' in graph.notes[0]
+    late = 'mount_init refused (this machine was too late for 1 kHz)'
+    assert graph.notes == [f'{late}; it was activated again, the last of 9 times']
 
 
 def test_a_machine_that_stays_late_is_given_up(tmp_path, monkeypatch):
@@ -63,6 +65,45 @@ def test_a_machine_that_stays_late_is_given_up(tmp_path, monkeypatch):
     with pytest.raises(GraphError):
         graph.activate_init()
     assert graph.asked == 1
+
+
+class OffUntilInitialised(Refused):
+    """Its mount_init refuses until the driver, which is off, was activated anew `resets` times."""
+
+    def __init__(self, folder, resets, **told):
+        super().__init__(folder, 0)
+        self.done, self.resets, self.told = [], resets, {'needs_initialisation': 'True', **told}
+        self.verdicts.forget = lambda node: self.done.append(f'forget {node.name}')
+
+    def transition(self, node, transition):
+        labels = {Transition.TRANSITION_ACTIVATE: 'activate', Transition.TRANSITION_DEACTIVATE: 'deactivate'}
+        self.done.append(f'{labels[transition]} {node.name}')
+        if node == DRIVER and transition == Transition.TRANSITION_ACTIVATE:
+            self.resets -= 1
+        if node == INIT and self.resets > 0:
+            raise GraphError('mount_init refused')
+
+    def figures(self, node):
+        return {'sentence': 'the electronics were reset', **self.told} if self.resets > 0 else {}
+
+
+@pytest.mark.parametrize('resets', [1, 4])
+def test_a_driver_that_is_off_until_initialised_is_activated_anew_before_the_initialisation(tmp_path, resets):
+    graph = OffUntilInitialised(tmp_path, resets)
+    graph.activate_init()
+    anew = ['activate mount_init', 'deactivate mount_driver', 'forget mount_driver', 'activate mount_driver']
+    assert graph.done == [*anew * resets, 'activate mount_init']
+    assert [note.partition(';')[0] for note in graph.notes] == [
+        'mount_init refused',
+        'the electronics were reset',
+    ]
+
+
+def test_a_driver_that_is_off_for_good_is_not_activated_anew(tmp_path):
+    graph = OffUntilInitialised(tmp_path, 1, needs_initialisation='False')
+    with pytest.raises(GraphError):
+        graph.activate_init()
+    assert graph.done == ['activate mount_init'] * 2
 
 
 def test_electronics_outlive_whoever_watches_them_and_the_recorder_outlives_all():

@@ -8,6 +8,7 @@ import typer
 from mount_cli.commands import (
     accept,
     audit,
+    bench,
     calibrate,
     compare,
     cut,
@@ -20,6 +21,7 @@ from mount_cli.commands import (
     recover,
     replay,
     report,
+    view,
 )
 from mount_cli.commands.identify_arguments import with_repeated_options
 from mount_cli.terminal import refuse, terminal
@@ -43,14 +45,6 @@ app.command(name='drive', epilog=drive.EPILOG)(drive.drive)
 
 
 @app.command()
-def bench() -> None:
-    """Measure what matters for speed, each figure beside its alternative in the same run."""
-    from mount_cli.bench.bench import print_bench
-
-    print_bench(terminal())
-
-
-@app.command()
 def prepare() -> None:
     """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""
     from mount_control.policy.registry import POLICIES
@@ -63,12 +57,15 @@ def prepare() -> None:
             run_core({'mount_sim': sim, 'mount_control': {'policy': policy}}, lambda *_: None)
 
 
+app.command(name='bench', epilog=bench.EPILOG)(bench.bench)
 app.command(name='audit', epilog=audit.EPILOG)(audit.audit)
 app.command(name='record', epilog=record.EPILOG)(record.record)
 app.command(name='recover', epilog=recover.EPILOG)(recover.recover)
 app.command(name='replay', epilog=replay.EPILOG)(replay.replay)
 app.command(name='compare', epilog=compare.EPILOG)(compare.compare)
 app.command(name='report', epilog=report.EPILOG)(report.report)
+app.command(name='view', epilog=view.EPILOG)(view.view)
+app.command(name='status', epilog=view.STATUS_EPILOG)(view.status)
 app.command(name='cut', epilog=cut.EPILOG)(cut.cut)
 app.command(name='merge', epilog=merge.EPILOG)(merge.merge)
 app.command(name='experiment', epilog=experiment.EPILOG)(experiment.experiment)

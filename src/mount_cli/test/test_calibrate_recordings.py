@@ -17,12 +17,13 @@ from mount_identification.rack.recordings import GivenValues, read_force, read_r
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import evaluate
+from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
-from mount_sim.electronics.electronics import STATUS_EVERY
+from mount_sim.electronics.electronics import status_every
 from mount_sim.rack.coil import drawn_rack, record_ripple
 
 RACK = drawn_rack(5)
@@ -55,7 +56,7 @@ def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
             ripple = ripples.pack(stamp, (i, math.nan), (of_current, of_flux))
             writer.write(f'/{COIL_RIPPLE.name}', ripple, at)
             writer.write(f'/{SIM_CLAMP_FORCE.name}', forces.pack(stamp, force), at)
-            if sample % STATUS_EVERY == 0:
+            if sample % status_every(SAMPLE_RATE) == 0:
                 writer.write(
                     f'/{COIL_TEMPERATURE.name}',
                     temperatures.pack(stamp, celsius + warming * 1e-9 * stamp),

@@ -78,6 +78,7 @@ REFUSED = {
     'recover': (MISSING,),
     'replay': (MISSING,),
     'report': (MISSING,),
+    'view': (MISSING,),
 }
 WITHOUT_A_FILE = {
     'bench': (),
@@ -85,6 +86,8 @@ WITHOUT_A_FILE = {
     'calibrate rack': (),
     'experiment': ('[/x]',),
     'record': ('--split', '[/x]'),
+    'faults': ('--only', '[/x]'),
+    'status': (),
 }
 
 

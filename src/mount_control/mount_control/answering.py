@@ -45,6 +45,7 @@ _WITHOUT_STEP = {
         Judgement.INVALID: OFF,
         Judgement.IMPLAUSIBLE: OFF,
         Judgement.INTERRUPTED: OFF,
+        Judgement.FOREIGN: OFF,
         Judgement.IGNORE: None,
         Judgement.EARLY: None,
         Judgement.INACTIVE: None,
@@ -100,6 +101,11 @@ class Answering:
     def end(self) -> None:
         """Answer nothing from now on; the watch goes on."""
         self.controller = None
+
+    def heed_writers(self, foreign: str, doubt: str) -> None:
+        """Answer with 0 A: until the next activation for a `foreign` writer, and while there is a `doubt`."""
+        self.watch.foreign = self.watch.foreign or foreign
+        self.watch.writer_doubt = doubt
 
     def change(self, settings: ControlSettings, told: str = '') -> None:
         """Go on with other settings from the next usable sample on; may come from another thread."""

@@ -17,7 +17,6 @@ from mount_control.policy.contract import Policy, trace_dtype, trace_fields
 from mount_control.settings import ControlSettings
 from mount_models.arithmetic.compiled import compiled, specialised
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
-from mount_models.sampling import SAMPLE_TIME
 
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 _EXPONENT = 0x7FF0000000000000  # bits that are all set where a float64 is no finite number
@@ -56,7 +55,8 @@ class ControlLaw:
 
     def __init__(self, settings: ControlSettings, table: force_to_current.CurrentTable):
         self.compiled = compiled_with(settings.policy)
-        maker = force_maker.Law(settings.friction, settings.contact, table.limits, SAMPLE_TIME)
+        sample_time = 1.0 / settings.parameters.sample_rate
+        maker = force_maker.design(settings.friction, settings.contact, table.limits, sample_time)
         self.record = record_bytes(self.compiled.law(settings.design.law, maker))
         self.tables = Tables(settings.design.table, table.currents)
         self.window = np.zeros(settings.design.window)
@@ -102,7 +102,7 @@ class Controller:
         """Go on with another law of the same policy, from the next sample on and without a jump.
 
         The policy carries its memory over, and where damping is on the current goes over to what the new law
-        asks for within `force_maker.FADE_SAMPLES`.
+        asks for within `force_maker.FADE_TIME`.
         """
         self.compiled.transfer(self._law, law.record, self._state, self._window, law.window)
         self._law, self._tables, self._window = law.record, law.tables, law.window
@@ -174,7 +174,7 @@ def _transfer(law, new_law, state, window, new_window):
     """Make the memory of one law that of a new one; arguments are the bytes of records and two windows."""
     memory = state.view(STATE)[0]
     policy.transfer(law.view(LAW)[0].policy, new_law.view(LAW)[0].policy, memory.policy, window, new_window)
-    force_maker.begin_fade(memory.maker)
+    force_maker.begin_fade(new_law.view(LAW)[0].maker, memory.maker)
 
 
 def _single(law, tables, state, window, trace, displacement, bridged_samples):

@@ -1,10 +1,25 @@
 """The control node's verdict on itself, from counts alone."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mount_control.plausibility import HOLD
 from mount_control.sample_watch import SampleCounts
 from mount_ros.nodes.diagnostics import Level, Verdict
+
+
+class Unread(NamedTuple):
+    """How many messages could not be read since the node was configured, and why the last could not."""
+
+    messages: int = 0
+    reason: str = ''
+
+    def and_another(self, error: Exception) -> 'Unread':
+        """Return the count with another one."""
+        return Unread(self.messages + 1, str(error))
+
+
+_ALL_READ = Unread()
 
 
 @dataclass(frozen=True)
@@ -27,6 +42,9 @@ class ControlFigures:
     parameter_changes: int = 0  # since the node was configured
     doubt: str = ''  # why displacements were not believed last, or empty
     doubted: bool = False  # whether they are not believed at present
+    foreign: str = ''  # which other node has sent what only one may, or empty
+    writer_doubt: str = ''  # which other node may, at present
+    unread: Unread = _ALL_READ
 
 
 def verdict(figures: ControlFigures) -> Verdict:
@@ -49,14 +67,20 @@ def verdict(figures: ControlFigures) -> Verdict:
         'damper': figures.damper,
         'parameter_changes': figures.parameter_changes,
         'needs_initialisation': bool(figures.table_refusal),
+        'messages_malformed': figures.unread.messages,
+        'fatal': bool(figures.foreign),  # a supervisor ends the graph
     }
     level, sentence = _judgement(figures)
     return Verdict(level, sentence, values)
 
 
 def _judgement(figures: ControlFigures) -> tuple[Level, str]:
+    if figures.foreign:
+        return Level.ERROR, f'0 A: {figures.foreign}, then activate mount_init and mount_control again'
     if figures.table_refusal:
         return Level.ERROR, f'0 A: {figures.table_refusal}'
+    if figures.writer_doubt:
+        return Level.ERROR, f'0 A while this lasts: {figures.writer_doubt}'
     if figures.silence > figures.longest_silence:
         return Level.ERROR, (
             f'0 A: no displacement for {figures.silence:.2f} s (limit {figures.longest_silence:g} s); '
@@ -81,6 +105,11 @@ def _judgement(figures: ControlFigures) -> tuple[Level, str]:
         return Level.WARN, (
             f'{counts.bridged} of {counts.samples} samples were missing and bridged (limit 0.1 %); '
             "look at mount_driver's counts of lost frames"
+        )
+    if figures.unread.messages:
+        return Level.WARN, (
+            f'{figures.unread.messages} messages could not be read and were not answered (limit: none), the '
+            f'last for {figures.unread.reason:.200}; which node publishes them?'
         )
     return Level.OK, 'damping on' if figures.damping_active else 'damping off'
 

@@ -16,9 +16,9 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step
 
-FADE_SAMPLES = 50
-"""Samples (chosen, 50 ms) in which the current goes over to a new law: first it stands for a sample, and its
-distance from what the new law asks for then falls evenly to zero."""
+FADE_TIME = 0.050
+"""s, chosen: in it the current goes over to a new law: first it stands for a sample, and its distance from
+what the new law asks for then falls evenly to zero."""
 
 
 class Law(NamedTuple):
@@ -28,6 +28,7 @@ class Law(NamedTuple):
     contact: FrictionContact
     limits: force_to_current.CurrentLimits
     sample_time: float
+    fade_samples: int
 
 
 STATE = record_type(
@@ -42,6 +43,16 @@ STATE = record_type(
 )
 
 
+def design(
+    friction: FrictionCoefficients,
+    contact: FrictionContact,
+    limits: force_to_current.CurrentLimits,
+    sample_time: float,
+) -> Law:
+    """Return the law for samples that come `sample_time` s apart."""
+    return Law(friction, contact, limits, sample_time, round(FADE_TIME / sample_time))
+
+
 @compiled
 def rest(state):
     """Set the memory to pads that are not pressed."""
@@ -54,9 +65,9 @@ def rest(state):
 
 
 @compiled
-def begin_fade(state):
+def begin_fade(law, state):
     """Let the current go over to a new law from where it is; off, the new law acts at once."""
-    state.fading = FADE_SAMPLES if state.on == 1 else 0
+    state.fading = law.fade_samples if state.on == 1 else 0
 
 
 @compiled
@@ -88,9 +99,9 @@ def _faded(law, state, wanted):
     """Return the current (A) instead of the `wanted` one, beside it for a while after a change of the law."""
     if state.fading == 0:
         return wanted
-    if state.fading == FADE_SAMPLES:
+    if state.fading == law.fade_samples:
         state.distance = state.current - wanted
-    current = wanted + state.distance * state.fading / FADE_SAMPLES
+    current = wanted + state.distance * state.fading / law.fade_samples
     state.fading -= 1
     return min(max(current, law.limits.offset_current), law.limits.highest_current)
 

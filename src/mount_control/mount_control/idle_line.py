@@ -17,17 +17,17 @@ LOWEST_FREQUENCY, HIGHEST_FREQUENCY = 18.0, 36.0
 """Hz (chosen): the first line of four cylinders from 540 to 1080 turns per minute."""
 _FIRST_FREQUENCY = 27.0  # Hz, chosen: in the middle
 _CORNER = 24.0  # Hz, chosen: of the high-pass, four poles; engine and wheel shake at 6 to 13 Hz
-_FOLLOWING = 0.012
-"""Share of what was not expected that a line takes up at each sample (chosen): settled in 0.25 s."""
-_PULLING = 1.6e-5
-"""Turns by which the frequency follows at each sample (chosen): from the middle to either end within 1 s."""
+_FOLLOWING = 12.0
+"""1/s: share of what was not expected that a line takes up in a time (chosen): settled in 0.25 s."""
+_PULLING = 16.0
+"""Hz/s by which the frequency follows (chosen): from the middle to either end within 1 s."""
 _SMALLEST_LINE = 5e-6  # m, chosen: smaller ones pull the frequency less
 _LARGEST_SURPRISE = 5e-5  # m, chosen: beyond it and twice the line, what comes is an impact, no line
 _AMPLITUDE_TIME = 0.2  # s, chosen
 
 
 class IdleLine(NamedTuple):
-    """One of two equal high-passes, b = (gain, -2 gain, gain), and the limits in turns per sample."""
+    """One of two equal high-passes, b = (gain, -2 gain, gain), the limits in turns per sample, and gains."""
 
     gain: float
     a1: float
@@ -36,6 +36,8 @@ class IdleLine(NamedTuple):
     highest: float
     first: float
     averaging: float
+    following: float
+    pulling: float
     lead_samples: float
     sample_time: float
 
@@ -67,6 +69,8 @@ def design(lead_time: float, sample_time: float) -> IdleLine:
         highest=HIGHEST_FREQUENCY * sample_time,
         first=_FIRST_FREQUENCY * sample_time,
         averaging=sample_time / _AMPLITUDE_TIME,
+        following=_FOLLOWING * sample_time,
+        pulling=_PULLING * sample_time * sample_time,
         lead_samples=lead_time / sample_time,
         sample_time=sample_time,
     )
@@ -103,10 +107,10 @@ def step(line, state, displacement):
     square = real * real + imaginary * imaginary
     limit = 2.0 * math.sqrt(square) + _LARGEST_SURPRISE
     surprise = min(max(seen - real - double_real, -limit), limit)
-    pull = _PULLING * imaginary * surprise / (square + _SMALLEST_LINE * _SMALLEST_LINE)
+    pull = line.pulling * imaginary * surprise / (square + _SMALLEST_LINE * _SMALLEST_LINE)
     state.turns = min(max(turns - pull, line.lowest), line.highest)
-    state.cosine_part, state.sine_part = real + _FOLLOWING * surprise, imaginary
-    state.double_real, state.double_imaginary = double_real + _FOLLOWING * surprise, double_imaginary
+    state.cosine_part, state.sine_part = real + line.following * surprise, imaginary
+    state.double_real, state.double_imaginary = double_real + line.following * surprise, double_imaginary
 
     real, imaginary = _unfiltered(line, state.cosine_part, imaginary, cosine, sine)
     double_real, double_imaginary = _unfiltered(

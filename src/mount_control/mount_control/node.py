@@ -13,7 +13,7 @@ from std_msgs.msg import String
 from mount_control.activation import Activation, AirGap
 from mount_control.answering import OFF, Answering
 from mount_control.controller import load_compiled_law
-from mount_control.diagnosis import ControlFigures, verdict
+from mount_control.diagnosis import ControlFigures, Unread, verdict
 from mount_control.policy.contract import trace_fields
 from mount_control.sample_watch import Judgement
 from mount_control.settings import (
@@ -32,7 +32,7 @@ from mount_ros import topics
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import change_text, dated
 from mount_ros.messages.force_table import ForceTableMessageError, from_bytes
-from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameter_gate import Change
@@ -66,7 +66,9 @@ class MountControl(SafeLifecycleNode):
         self._of_specimen = SpecimenValues(self)
         self.answering = Answering()
         self._activation = Activation()
-        self._last_message: bytes | None = None
+        self._foreign = False  # whether another node publishes what this one hears
+        self._unread = Unread()
+        self._last_sample: tuple[int, float] | None = None  # stamp ns, m
         self._last_setpoint = (0, OFF)  # stamp ns, A
         self._order = threading.Lock()  # in lock-step the first answer may come from the activation's thread
 
@@ -80,6 +82,7 @@ class MountControl(SafeLifecycleNode):
         usual = defaults()
         self._warn_without_effect(name for name, value in self._values().items() if value != usual.get(name))
         self._parameter_changes = 0
+        self._foreign, self._unread = False, Unread()
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
@@ -97,13 +100,16 @@ class MountControl(SafeLifecycleNode):
         path.start()
 
     def activate(self) -> None:
+        self.wait_for_own_writers()
         table, air_gap = self._activation.wait(self.answering.watch, self.ending)
+        self.answering.watch.check_rate(self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
         self._latency = LatencyHistogram()
         self._heard = time.monotonic()
         self.answering.begin(self._settings, currents, air_gap.stamp)
-        if self.lockstep and self._last_message is not None:
-            self._answer(self._last_message)  # the electronics wait for an answer to what came before
+        self.tell_writers()
+        if self.lockstep and self._last_sample is not None:
+            self._answer(*self._last_sample)  # the electronics wait for an answer to what came before
 
     def deactivate(self) -> None:
         with self._order:  # no answer may overtake the last 0 A
@@ -112,7 +118,13 @@ class MountControl(SafeLifecycleNode):
                 self._publish_setpoint(self._last_setpoint[0], OFF)
 
     def cleanup(self) -> None:
-        self.answering, self._activation, self._last_message = Answering(), Activation(), None
+        self.answering, self._activation, self._last_sample = Answering(), Activation(), None
+
+    def heed_writers(self, foreign: str, doubt: str) -> None:
+        self._foreign = bool(foreign)
+        if foreign:
+            self._activation = Activation()  # the table may be another node's
+        self.answering.heed_writers(foreign, doubt)
 
     def check_parameters(self, values: Mapping[str, Any]) -> None:
         control_settings(values, self._specimen)
@@ -136,6 +148,9 @@ class MountControl(SafeLifecycleNode):
                 silence=0.0 if self.lockstep else time.monotonic() - self._heard,
                 longest_silence=self._settings.parameters.longest_bridge,
                 table_refusal=answering.refusal,
+                writer_doubt=answering.watch.writer_doubt,
+                foreign=answering.watch.foreign,
+                unread=self._unread,
                 damping_active=answering.damping_active,
                 current=answering.current,
                 step_median=self._latency.quantile(0.5),
@@ -153,13 +168,17 @@ class MountControl(SafeLifecycleNode):
 
     def _on_displacement(self, raw: bytes) -> None:
         begin = time.monotonic()
-        self._last_message = raw
-        if self._answer(raw) is not Judgement.INACTIVE:
+        try:
+            stamp, (displacement,), _ = self._displacement.unpack(raw)
+        except ScalarsError as error:
+            self._note_unread(error)
+            return
+        self._last_sample = stamp, displacement
+        if self._answer(stamp, displacement) is not Judgement.INACTIVE:
             self._heard = begin
             self._latency.add(time.monotonic() - begin)
 
-    def _answer(self, raw: bytes) -> Judgement:
-        stamp, (displacement,), _ = self._displacement.unpack(raw)
+    def _answer(self, stamp: int, displacement: float) -> Judgement:
         with self._order:
             answer = self.answering.answer(stamp, displacement)
             if answer.current is not None:
@@ -178,16 +197,29 @@ class MountControl(SafeLifecycleNode):
         self._send_event(serialised(String(data=dated(stamp, text))))
 
     def _on_air_gap(self, raw: bytes) -> None:
-        stamp, numbers, _ = self._gap_layout.unpack(raw)
+        self._activation.air_gap = None
+        if self._foreign:
+            return
+        try:
+            stamp, numbers, _ = self._gap_layout.unpack(raw)
+        except ScalarsError as error:
+            self._note_unread(error)
+            return
         offset_current = numbers[self._gap_layout.names.index('offset_current')]
         self._activation.air_gap = AirGap(stamp, offset_current)
 
     def _on_table(self, raw: bytes) -> None:
+        self._activation.table = None
+        if self._foreign:
+            return
         try:
             self._activation.table = from_bytes(raw)
         except ForceTableMessageError as error:
-            self._activation.table = None
-            self.get_logger().error(str(error))
+            self._note_unread(error)
+
+    def _note_unread(self, error: ValueError) -> None:
+        self._unread = self._unread.and_another(error)
+        self.get_logger().error(str(error), throttle_duration_sec=1.0)
 
     def _warn_without_effect(self, names: Iterable[str]) -> None:
         if sentence := without_effect(names, self._settings.parameters.policy):

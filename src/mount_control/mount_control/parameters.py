@@ -4,13 +4,14 @@ from typing import Annotated, NamedTuple
 
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import Quantity
-from mount_models.sampling import HIGHEST_CURRENT
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SampleRate
 
 
 class ControlParameters(NamedTuple):
-    """Name of the policy, what is believed of the samples, and the limit of the output."""
+    """Name of the policy, rate of the samples, what is believed of them, and the limit of the output."""
 
     policy: str = DEFAULT
+    sample_rate: SampleRate = SAMPLE_RATE
     longest_bridge: Annotated[
         float,
         Quantity(

@@ -13,7 +13,6 @@ import numpy as np
 from mount_control.parameters import ControlParameters
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
-from mount_models.sampling import SAMPLE_TIME
 
 HOLD = 1.0
 """After the last implausible sample none is believed for so long, s; chosen."""
@@ -21,7 +20,7 @@ HOLD = 1.0
 _LEAST_NOISE = 0.5e-6  # m, chosen: five steps of the signal; a sensor with less may well repeat itself
 _ORDER = 4  # of the difference that leaves noise and takes motion away: at 50 Hz 1 % of it remains
 _NOISE_OF_DIFFERENCE = math.sqrt(70.0 * 2.0 / math.pi)  # mean of |4th difference| of white noise of 1
-_SHARE = 0.01  # chosen: of each sample in the mean, over about 100 samples
+_SHARE = 10.0  # 1/s, chosen: of each sample in the mean, over about 0.1 s
 _CUT = 4.0  # chosen: of the limit; no single reading counts for more
 
 
@@ -35,10 +34,12 @@ class Doubt(IntEnum):
 
 
 class Limits(NamedTuple):
-    """What a displacement keeps to: m/s, m, and numbers of samples."""
+    """What a displacement keeps to: m/s, m; s between samples, share of each in the mean; samples."""
 
     velocity: float
     noise: float
+    sample_time: float
+    share: float
     stuck: int
     hold: int
 
@@ -61,8 +62,10 @@ class Plausibility:
             Limits(
                 parameters.displacement_velocity,
                 parameters.displacement_noise,
-                round(parameters.displacement_stuck / SAMPLE_TIME),
-                round(HOLD / SAMPLE_TIME),
+                1.0 / parameters.sample_rate,
+                _SHARE / parameters.sample_rate,
+                round(parameters.displacement_stuck * parameters.sample_rate),
+                round(HOLD * parameters.sample_rate),
             )
         )
         self.memory = np.zeros(1, MEMORY).view(np.uint8)
@@ -129,7 +132,7 @@ def doubt_of(limits, memory, displacement, missing):
 def _compare(law, now, displacement, missing):
     if now.known == 0:
         return
-    velocity = abs(displacement - now.newest) / ((missing + 1) * SAMPLE_TIME)
+    velocity = abs(displacement - now.newest) / ((missing + 1) * law.sample_time)
     if velocity > law.velocity:
         _raise(law, now, _STEP, velocity)
     if displacement == now.newest:
@@ -141,7 +144,7 @@ def _compare(law, now, displacement, missing):
     if now.known == _ORDER:
         difference = displacement - 4.0 * (now.newest + now.third) + 6.0 * now.second + now.fourth
         noise = min(abs(difference) / _NOISE_OF_DIFFERENCE, _CUT * law.noise)
-        now.noise += _SHARE * (noise - now.noise)
+        now.noise += law.share * (noise - now.noise)
         if now.noise > law.noise:
             _raise(law, now, _NOISE, now.noise)
 

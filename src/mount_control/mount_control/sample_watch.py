@@ -1,6 +1,7 @@
 """Judges each displacement sample by its stamp before the controller sees it; knows no clock."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
@@ -10,9 +11,14 @@ from numpy.typing import NDArray
 from mount_control.force_to_current import ForceTableError
 from mount_control.parameters import ControlParameters
 from mount_control.plausibility import Plausibility
-from mount_models.sampling import SAMPLE_TIME_NS
+from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
 
 _NANOSECONDS = 1e9
+_COUNTED = 50  # chosen: samples from which their rate is known
+_RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses before an activation
+_CLOSEST = 0.75  # of a period, chosen: mount_driver's stamps lie 0.9 of a period apart or more
+_INTRUSIONS = 3  # chosen: samples between those of the stream
+_INTRUSION_PERIOD = 1_000_000_000  # ns, chosen: in it they are those of another sender
 _STREAM_BREAK = 1_000_000_000  # ns, chosen: a longer silence may have been a loss of power
 
 INTERRUPTED = (
@@ -30,6 +36,7 @@ class Judgement(Enum):
     IMPLAUSIBLE = 'implausible'  # it moves as no mount does, see `plausibility`: answered with 0 A
     INTERRUPTED = 'interrupted'  # the table may be of another state of the mount: answered with 0 A
     IGNORE = 'ignore'  # repeated or out of order: already answered
+    FOREIGN = 'foreign'  # another sender is or may be there: answered with 0 A
     EARLY = 'early'  # not after the activation: mount_init answers
     INACTIVE = 'inactive'  # nobody asked for an answer
 
@@ -58,11 +65,17 @@ class SampleWatch:
         self.measured_before = False
         """Whether the measurements are known to have come without a break before the first sample, too."""
         self.interrupted = False  # since the activation
+        self.foreign = ''  # which other sender there is, since the activation
+        self.writer_doubt = ''  # which other sender there may be at present
         self.counts = SampleCounts()
+        self._intruded: deque[int] = deque(maxlen=_INTRUSIONS)  # stamps of samples that came too soon, ns
         self._used: int | None = None  # stamp of the last sample that the controller took, ns
         self._activation = 0  # ns
         self._longest_bridge = 0  # ns
         self._range = 0.0  # m
+        self._period = SAMPLE_TIME_NS  # ns between two samples
+        self._closest = round(_CLOSEST * SAMPLE_TIME_NS)
+        self._counted_from, self._noted = 0, 0  # stamp (ns) of a sample, and samples from it on
         self._seen: int | None = None  # stamp of the last sample that was compared with those before, ns
         self.plausibility = Plausibility(ControlParameters())
 
@@ -70,10 +83,13 @@ class SampleWatch:
         """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
         if self.last is None:
             self.first, self.last = 0 if self.measured_before else stamp, stamp
+            self._counted_from, self._noted = stamp, 1
         elif abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
+            self._counted_from, self._noted = stamp, 1
         elif stamp > self.last:
             self.last = stamp
+            self._noted += 1
 
     def check_belongs(self, table_stamp: int | None, air_gap_stamp: int | None) -> None:
         """Raise `ForceTableError` unless the table was measured on the present uninterrupted measurements.
@@ -83,7 +99,7 @@ class SampleWatch:
         remedy = 'activate mount_init (again)'
         if table_stamp is None or air_gap_stamp is None:
             missing = 'current_force_table' if table_stamp is None else 'air_gap'
-            raise ForceTableError(f'no {missing} was received; {remedy}')
+            raise ForceTableError(f'no {missing} was received (0 messages, needed is 1); {remedy}')
         if table_stamp != air_gap_stamp:
             raise ForceTableError(
                 f'current_force_table (activation {_seconds(table_stamp)}) and air_gap '
@@ -103,13 +119,28 @@ class SampleWatch:
                 f'{remedy}'
             )
 
+    def check_rate(self, sample_rate: float) -> None:
+        """Raise `ForceTableError` if the samples so far did not come at `sample_rate` (Hz)."""
+        if self.last is None or self._noted < _COUNTED:
+            return
+        rate = 1e9 * (self._noted - 1) / (self.last - self._counted_from)
+        if abs(rate - sample_rate) > _RATE_TOLERANCE * sample_rate:
+            raise ForceTableError(
+                f'displacement comes at {rate:.0f} Hz, but sample_rate of mount_control is {sample_rate:g} '
+                f'Hz (limit {100.0 * _RATE_TOLERANCE:g} %); start the whole graph with one sample_rate'
+            )
+
     def begin(self, activation: int, parameters: ControlParameters) -> None:
         """Count anew: what comes after `activation` (ns) is to be answered."""
         self._activation = activation
         self._longest_bridge = round(parameters.longest_bridge * _NANOSECONDS)
         self._range = parameters.displacement_range
+        self._period = sample_time_ns(parameters.sample_rate)
+        self._closest = round(_CLOSEST * self._period)
         self.plausibility = Plausibility(parameters)
         self._used, self._seen, self.interrupted, self.counts = None, None, False, SampleCounts()
+        self.foreign = ''
+        self._intruded.clear()
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
         """Return the judgement on a noted sample (ns, m), and how many are missing before it."""
@@ -119,13 +150,19 @@ class SampleWatch:
             return Judgement.INTERRUPTED, 0
         if stamp <= self._activation:
             return Judgement.EARLY, 0
+        if self._used is not None and stamp - self._used < self._closest:
+            self._note_intrusion(stamp)
+        if self.foreign or self.writer_doubt:
+            return Judgement.FOREIGN, 0
         if self._used is not None and stamp <= self._used:
             self.counts.ignored += 1
             return Judgement.IGNORE, 0
         if not math.fabs(displacement) <= self._range:  # also NaN
             self.counts.invalid += 1
             return Judgement.INVALID, 0
-        if self.plausibility.doubt(displacement, 0 if self._seen is None else _missing(stamp - self._seen)):
+        if self.plausibility.doubt(
+            displacement, 0 if self._seen is None else self._missing(stamp - self._seen)
+        ):
             self._seen = stamp
             self.counts.implausible += 1
             return Judgement.IMPLAUSIBLE, 0
@@ -136,20 +173,20 @@ class SampleWatch:
         if elapsed > self._longest_bridge:
             self.counts.restarts += 1
             return Judgement.RESTART, 0
-        missing = _missing(elapsed)
+        missing = self._missing(elapsed)
         self.counts.bridged += missing
         return Judgement.USE, missing
 
     def expects(self, stamp: int) -> bool:
         """Whether a believable sample of time `stamp` (ns) just goes on where the last one used ended."""
-        return self._used == stamp - SAMPLE_TIME_NS
+        return self._used == stamp - self._period
 
     def following(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which of the samples (n,) are believable and one period after the one before."""
         valid = np.abs(displacement) <= self._range  # not so for NaN
         follows = np.zeros(len(stamps), bool)
         steps = np.diff(stamps)
-        follows[1:] = valid[1:] & (steps > 0) & (steps < SAMPLE_TIME_NS + SAMPLE_TIME_NS // 2)
+        follows[1:] = valid[1:] & (steps >= self._closest) & (steps < self._period + self._period // 2)
         return follows
 
     def believed(self, stamps: NDArray[np.int64], displacement: NDArray[np.float64]) -> int:
@@ -167,10 +204,19 @@ class SampleWatch:
         self.last = self._used = self._seen = last_stamp
         self.counts.samples += count
 
+    def _missing(self, elapsed: int) -> int:
+        """Return how many samples are missing between two that are `elapsed` ns apart."""
+        return max(0, (elapsed + self._period // 2) // self._period - 1)
 
-def _missing(elapsed: int) -> int:
-    """Return how many samples are missing between two that are `elapsed` ns apart."""
-    return max(0, (elapsed + SAMPLE_TIME_NS // 2) // SAMPLE_TIME_NS - 1)
+    def _note_intrusion(self, stamp: int) -> None:
+        found = self._intruded
+        found.append(stamp)
+        if len(found) == _INTRUSIONS and stamp - found[0] <= _INTRUSION_PERIOD and not self.foreign:
+            self.foreign = (
+                f'{len(found)} displacement samples within {_INTRUSION_PERIOD * 1e-9:g} s were repeated, '
+                f'older than the one before or less than {self._closest * 1e-6:g} ms behind it: end one of '
+                'the two nodes that publish displacement'
+            )
 
 
 def _seconds(stamp: int) -> str:

@@ -13,7 +13,7 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import check_friction
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, flattened, with_flattened, with_values
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import sample_time_ns
 from mount_models.specimen import Specimen, SpecimenError
 
 P = TypeVar('P', bound=NamedTuple)
@@ -64,8 +64,9 @@ def control_settings(values: Mapping[str, Any], specimen: Specimen) -> ControlSe
     Raises a `ValueError` for what cannot be.
     """
     parameters = with_flattened(ControlParameters(), values)
+    sample_time_ns(parameters.sample_rate)  # refuses what the electronics cannot count
     policy, own = policy_parameters(values)
-    design = policy.design(own, SAMPLE_TIME)
+    design = policy.design(own, 1.0 / parameters.sample_rate)
     check_fits(parameters, specimen)
     friction = _identified(specimen, FrictionCoefficients(), values, 'friction')
     contact = _identified(specimen, FrictionContact(), values, 'contact')
@@ -75,8 +76,9 @@ def control_settings(values: Mapping[str, Any], specimen: Specimen) -> ControlSe
 
 def check_policies(values: Mapping[str, Any]) -> None:
     """Raise a `ValueError` if a policy, chosen or not, could not go on with its {parameter: value}."""
+    sample_time = 1.0 / with_flattened(ControlParameters(), values).sample_rate
     for name, policy in POLICIES.items():
-        policy.design(with_flattened(policy.Parameters(), values, prefix_of(name)), SAMPLE_TIME)
+        policy.design(with_flattened(policy.Parameters(), values, prefix_of(name)), sample_time)
 
 
 def policy_parameters(values: Mapping[str, Any]) -> tuple[Policy, Any]:

@@ -14,7 +14,7 @@ from mount_control.controller import (
     Controller,
     compiled_with,
 )
-from mount_control.force_maker import FADE_SAMPLES
+from mount_control.force_maker import FADE_TIME
 from mount_control.policy import switched_viscous
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
@@ -214,7 +214,7 @@ def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, 
     traces = make_controller(eigenfrequency=10.0).run(sine(10.0, 1e-3, 1.0))
     exceeded = int((traces['magnitude'] > 0.0008).argmax())
     assert int(traces['damping_active'].argmax()) == exceeded + 99
-    assert switched_viscous.Parameters(eigenfrequency=10.0).period_samples == 100
+    assert switched_viscous.Parameters(eigenfrequency=10.0).period_samples(0.001) == 100
     assert damper_curve('viscous_2000').force(0.104) == pytest.approx(200.0)
 
 
@@ -339,7 +339,7 @@ def test_a_change_of_the_law_makes_no_jump(make_controller, make_law, sine, chan
     farthest = np.abs(free['current'][moment:] - undisturbed['current'][moment:]).max() + natural
     # a filter of a higher frequency accelerates more from the same place, by the square of the ratio
     stiffer = max(1.0, (CHANGES[change].get('eigenfrequency', 8.0) / 8.0) ** 2)
-    assert np.abs(np.diff(after['current'][:60])).max() <= stiffer * natural + farthest / FADE_SAMPLES
+    assert np.abs(np.diff(after['current'][:60])).max() <= stiffer * natural + farthest / (1e3 * FADE_TIME)
     # displacement and velocity in the band have no jump either
     for name, share in (('band_displacement', 1.02), ('band_velocity', 1.2 * stiffer)):
         steps = np.abs(np.diff(np.r_[before[name], after[name]]))
@@ -382,7 +382,7 @@ def test_the_magnitude_stays_the_highest_of_the_last_period_over_a_change_of_it(
     controller.change(make_law(eigenfrequency=eigenfrequency))
     after = controller.run(displacement[333:])
     distances = np.abs(np.r_[before['band_displacement'], after['band_displacement']])
-    period = switched_viscous.Parameters(eigenfrequency=eigenfrequency).period_samples
+    period = switched_viscous.Parameters(eigenfrequency=eigenfrequency).period_samples(0.001)
     seen_from = max(0, 333 - 125)  # what the window of the old period held
     for number in range(333, 600):
         begin = max(number + 1 - period, seen_from)

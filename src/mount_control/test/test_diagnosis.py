@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from mount_control.diagnosis import ControlFigures, verdict
+from mount_control.diagnosis import ControlFigures, Unread, verdict
 from mount_control.sample_watch import SampleCounts
 from mount_ros.nodes.diagnostics import Level
 
@@ -92,6 +92,8 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
         'damper': 'viscous_2000',
         'parameter_changes': 0,
         'needs_initialisation': False,
+        'messages_malformed': 0,
+        'fatal': False,
     }
 
 
@@ -99,3 +101,27 @@ def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
     judged = verdict(replace(GOOD, faults=2, damping_active=True))
     assert judged.level is Level.ERROR
     assert judged.sentence.startswith('the controller held what is no finite number, 2 times: damping')
+
+
+def test_another_writer_is_an_error_that_ends_the_graph():
+    judged = verdict(replace(GOOD, foreign='/evil must not publish displacement: end it'))
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, True)
+    assert judged.sentence == (
+        '0 A: /evil must not publish displacement: end it, then activate mount_init and mount_control again'
+    )
+
+
+def test_a_writer_in_doubt_is_an_error_while_it_lasts():
+    judged = verdict(replace(GOOD, writer_doubt='two of them: end one'))
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
+    assert judged.sentence == '0 A while this lasts: two of them: end one'
+
+
+def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
+    unread = Unread().and_another(ValueError('first')).and_another(ValueError('cut'))
+    judged = verdict(replace(GOOD, unread=unread))
+    assert (judged.level, judged.figures['messages_malformed']) == (Level.WARN, 2)
+    assert judged.sentence == (
+        '2 messages could not be read and were not answered (limit: none), the last for cut; which node '
+        'publishes them?'
+    )

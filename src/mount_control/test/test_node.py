@@ -28,7 +28,9 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import Mark, ParametersChanged, read_change, read_mark
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.messages.types import message_class
 from mount_ros.nodes.diagnostics import Level
+from mount_ros.qos import publisher_qos
 from mount_ros.testing import wait_until
 
 MS = 1_000_000  # ns
@@ -81,6 +83,9 @@ class Surroundings:
 
     def send_raw_table(self, raw):
         self._table.publish(raw)
+
+    def send_raw_displacement(self, raw):
+        self._displacement.publish(raw)
 
     def initialise(self):
         """Send what a finished initialisation leaves behind."""
@@ -237,6 +242,83 @@ def test_an_invalid_displacement_is_answered_with_0_ampere_and_no_trace(active, 
     assert verdict.sentence.startswith('2 of 403 displacement samples were invalid')
 
 
+def test_a_displacement_that_cannot_be_read_is_counted_and_named(active, around):
+    control = active()
+    around.send_raw_displacement(ScalarsLayout(topics.CURRENT_SETPOINT).pack(ACTIVATION + MS, (1.0,)))
+    around.send(2.0)
+    assert _answers(around, 1) == [(2.0, 0.0)]
+    verdict = control.judge()
+    assert (verdict.level, verdict.figures['messages_malformed']) == (Level.WARN, 1)
+    assert verdict.sentence == (
+        '1 messages could not be read and were not answered (limit: none), the last for displacement: the '
+        "message names ['coil_current'] with 1 positions; needed are ['mount'] with one position each; which "
+        'node publishes them?'
+    )
+
+
+@pytest.fixture
+def stranger(context):
+    """Return a function that lets another node publish a topic."""
+    nodes = []
+
+    def publish(topic, name='/elsewhere/evil'):
+        namespace, _, name = name.rpartition('/')
+        nodes.append(Node(name, namespace=namespace, context=context))
+        nodes[-1].create_publisher(message_class(topic.type), f'/{topic.name}', publisher_qos(topic))
+        return nodes[-1]
+
+    yield publish
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.mark.parametrize('topic', [topics.DISPLACEMENT, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE])
+def test_another_node_that_publishes_what_control_hears_ends_the_damping_at_0_ampere(
+    active, around, sine, stranger, topic
+):
+    control = active()
+    assert _shake(around, sine)[-1][1] > 0.4
+    other = stranger(topic)
+    wait_until(lambda: control.answering.watch.foreign, 'the other to be noticed')
+    around.send(401, 0.0)
+    around.send(402, 0.0)
+    assert _answers(around, 402)[400:] == [(401.0, 0.0), (402.0, 0.0)]
+    verdict = control.judge()
+    own = topic.writers[0]
+    assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, True)
+    assert verdict.sentence == (
+        f'0 A: /elsewhere/evil and /surroundings_io must not publish {topic.name} too (limit: one writer, '
+        f'{own}): end it, then activate mount_init and mount_control again'
+    )
+    assert control.trigger_deactivate() == SUCCESS
+    assert control.trigger_activate() == FAILURE
+    assert control.sentence.startswith('/elsewhere/evil and /surroundings_io must not publish')
+    other.destroy_node()
+    wait_until(lambda: not control.data_path.writers.foreign, 'the end of the other')
+    assert control.trigger_activate() == FAILURE  # the table may have been the other's
+    assert 'activate mount_init' in control.sentence
+    around.initialise()
+    assert control.trigger_activate() == SUCCESS
+    around.send(403, 0.0)
+    assert _answers(around, 403)[-1] == (403.0, 0.0)
+
+
+def test_while_a_writer_may_be_one_that_was_killed_control_answers_0_ampere_and_then_goes_on(
+    active, around, sine, stranger
+):
+    control = active()
+    assert _shake(around, sine)[-1][1] > 0.4
+    twin = stranger(topics.DISPLACEMENT, '/surroundings_io')
+    wait_until(lambda: control.answering.watch.writer_doubt, 'the doubt')
+    around.send(401, 0.0)
+    assert _answers(around, 401)[-1] == (401.0, 0.0)
+    assert control.judge().sentence.startswith('0 A while this lasts: /surroundings_io must not publish')
+    twin.destroy_node()
+    wait_until(lambda: not control.answering.watch.writer_doubt, 'the end of the doubt')
+    around.send(402, 0.0)
+    assert _answers(around, 402)[-1][1] > 0.4
+
+
 def test_deactivation_leaves_0_ampere_and_silence(active, around, sine):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
@@ -281,7 +363,10 @@ def test_measurements_whose_time_goes_back_make_the_table_invalid(active, around
 @pytest.mark.parametrize(
     ('sent', 'reason'),
     [
-        (lambda around: None, 'no current_force_table was received; activate mount_init (again)'),
+        (
+            lambda around: None,
+            'no current_force_table was received (0 messages, needed is 1); activate mount_init (again)',
+        ),
         (lambda around: around.send_air_gap(), 'no current_force_table was received'),
         (lambda around: around.send_table(), 'no air_gap was received'),
         (

@@ -77,7 +77,7 @@ def test_at_least_one_missing_sample_can_be_bridged():
     ('frequency', 'samples'), [(8.0, 125), (7.9, 127), (2.0, 500), (20.0, 50), (3.0, 333)]
 )
 def test_a_period_is_counted_in_whole_samples(frequency, samples):
-    assert switched_viscous.Parameters(eigenfrequency=frequency).period_samples == samples
+    assert switched_viscous.Parameters(eigenfrequency=frequency).period_samples(SAMPLE_TIME) == samples
 
 
 def test_another_switching_is_refused_with_the_known_ones():

@@ -102,8 +102,14 @@ def test_a_table_of_the_present_stream_is_accepted():
 
 def test_without_table_or_air_gap_it_is_refused():
     stream = _stream(S)
-    assert _refusal(None, S, stream) == 'no current_force_table was received; activate mount_init (again)'
-    assert _refusal(S, None, stream) == 'no air_gap was received; activate mount_init (again)'
+    assert (
+        _refusal(None, S, stream)
+        == 'no current_force_table was received (0 messages, needed is 1); activate mount_init (again)'
+    )
+    assert (
+        _refusal(S, None, stream)
+        == 'no air_gap was received (0 messages, needed is 1); activate mount_init (again)'
+    )
     assert 'no current_force_table' in _refusal(None, None, stream)
 
 
@@ -161,3 +167,56 @@ def test_an_interruption_stands_until_the_next_activation(watch):
     watch.begin(2003 * MS, ControlParameters())
     assert _judge(watch, 1004) == [(Judgement.RESTART, 0)]
     assert watch.counts == SampleCounts(samples=1, restarts=1)
+
+
+def test_a_controller_made_for_another_rate_is_not_activated():
+    stream = SampleWatch()
+    for k in range(200):
+        stream.note(S + k * MS // 2)
+    with pytest.raises(ForceTableError, match='at 2000 Hz, but sample_rate of mount_control is 1000 Hz'):
+        stream.check_rate(1000.0)
+    stream.check_rate(2000.0)
+
+
+def test_samples_at_2_khz_are_bridged_by_their_own_period():
+    stream = SampleWatch()
+    stream.note(600 * MS)
+    stream.begin(600 * MS, ControlParameters(sample_rate=2000.0))
+    judged = _judge(stream, 0.0, 0.5, 1.5, 2.0)
+    assert judged[1:] == [(Judgement.USE, 0), (Judgement.USE, 1), (Judgement.USE, 0)]
+
+
+@pytest.mark.parametrize(
+    'stamps',
+    [
+        (1, 1.5, 2, 2.5),  # a second sender half a sample beside the first
+        (1, 1.2, 2, 2.2, 3, 3.2),
+        (1, 1, 2, 2, 3, 3),  # one that repeats the stamps of the other
+        (1, 2, 3, 1, 4, 2, 5, 3),  # one that is behind
+    ],
+)
+def test_a_second_sender_is_noticed_by_its_stamps_and_answered_with_0_ampere(watch, stamps):
+    judged = [judgement for judgement, _ in _judge(watch, *stamps)]
+    assert judged[-1] is Judgement.FOREIGN
+    assert watch.foreign == (
+        '3 displacement samples within 1 s were repeated, older than the one before or less than 0.75 ms '
+        'behind it: end one of the two nodes that publish displacement'
+    )
+    assert _judge(watch, 100, 101) == [(Judgement.FOREIGN, 0)] * 2
+    watch.begin(1100 * MS, ControlParameters())
+    assert _judge(watch, 101) == [(Judgement.RESTART, 0)]
+
+
+def test_repeated_samples_now_and_then_are_no_second_sender(watch):
+    for second in range(5):
+        begin = 800 * second
+        assert _judge(watch, begin + 1, begin + 1)[1] == (Judgement.IGNORE, 0)
+        _judge(watch, *range(begin + 2, begin + 800))
+    assert watch.foreign == ''
+
+
+def test_while_another_writer_is_in_doubt_samples_are_answered_with_0_ampere(watch):
+    watch.writer_doubt = 'mount_driver_io is there twice'
+    assert _judge(watch, 1, 2) == [(Judgement.FOREIGN, 0)] * 2
+    watch.writer_doubt = ''
+    assert _judge(watch, 3, 4) == [(Judgement.USE, 2), (Judgement.USE, 0)]

@@ -12,7 +12,7 @@ _WRAP = 1 << 32  # us: the counter wraps after 71.6 min
 _NS = 1000  # ns per us
 
 _GAP_US = 1_000_000  # chosen: after a second without samples a new mapping is started
-_BLOCK_US = 500_000  # chosen: 500 samples, of which at least one usually arrives without delay
+_BLOCK_US = 500_000  # chosen: 250 samples or more, of which at least one usually arrives without delay
 
 # Second-order loop per block: share of the error corrected in the next block, and share that goes to the
 # estimated drift. Poles at 0.75 +- 0.19j: it settles in about 10 blocks without ringing. Chosen.
@@ -39,30 +39,29 @@ class Clock(Protocol):
     def now(self, monotonic_ns: int) -> int:
         """Return the time (ns) by which ages are judged at the steady time."""
 
-    def taken(self, received_monotonic_ns: int) -> int:
-        """Return by the same time when the last sample was taken, as far as is known."""
-
 
 class CounterClock:
     """Stamps are the electronics' own counter from zero, unwrapped: for lock-step, where no other time is."""
 
     lockstep = True
 
-    def __init__(self) -> None:
+    def __init__(self, sample_time: int = SAMPLE_TIME_NS) -> None:
+        """`sample_time` in ns."""
         self.restarts = 0
         self.gaps = 0
+        self._sample_time = sample_time
         self._microseconds = 0
         self._base = 0
         self._stamp = -1
 
     def stamp(self, microseconds: int, received_monotonic_ns: int = 0) -> int:
-        """Return the time of the sample in ns; after a restart stamps go on 1 ms behind the last one."""
+        """Return the time of the sample in ns; after a restart stamps go on a sample behind the last."""
         step = (microseconds - self._microseconds) % _WRAP
         if self._stamp < 0:
             self._base = 0
         elif step >= _WRAP // 2:
             self.restarts += 1
-            self._base = self._stamp + SAMPLE_TIME_NS - microseconds * _NS
+            self._base = self._stamp + self._sample_time - microseconds * _NS
         elif microseconds < self._microseconds:
             self._base += _WRAP * _NS
         self._microseconds = microseconds
@@ -73,10 +72,6 @@ class CounterClock:
         """Return the latest stamp, 0 before the first."""
         return max(self._stamp, 0)
 
-    def taken(self, received_monotonic_ns: int) -> int:
-        """Return the latest stamp."""
-        return self._stamp
-
 
 class ElectronicsClock:
     """Maps the counter to ROS time: offset and drift from the frames that arrived fastest.
@@ -85,7 +80,7 @@ class ElectronicsClock:
     of samples is the offset between the clocks. Within a block the mapping is one straight line; from
     block to block only its slope changes, by no more than 1000 ppm, so stamps are evenly spaced and rise
     strictly. `epoch_offset_ns` (ROS time minus steady clock, taken once) is the only tie to the system's
-    clock, whose steps therefore do not move the stamps.
+    clock, whose steps therefore do not move the stamps. `sample_time` is in ns.
 
     A new mapping begins when the counter jumps back (restart) or forward by more than a second (gap), and
     when all frames have come late for 4 s. It never leads back behind the last stamp. Frames must come in
@@ -94,7 +89,7 @@ class ElectronicsClock:
 
     lockstep = False
 
-    def __init__(self, epoch_offset_ns: int):
+    def __init__(self, epoch_offset_ns: int, sample_time: int = SAMPLE_TIME_NS):
         self.restarts = 0
         """Jumps of the counter that time does not explain."""
         self.gaps = 0
@@ -104,6 +99,7 @@ class ElectronicsClock:
         self.drift = 0.0
         """Estimated drift of the steady clock against the electronics' clock, 1e-6 = 1 ppm."""
         self._epoch_offset = epoch_offset_ns
+        self._sample_time = sample_time
         self._running = False
         self._microseconds = 0
         self._received = 0
@@ -139,12 +135,8 @@ class ElectronicsClock:
         """Return the steady time itself."""
         return monotonic_ns
 
-    def taken(self, received_monotonic_ns: int) -> int:
-        """Return the steady time of the last sample, never after it was received."""
-        return min(self._stamp - self._epoch_offset, received_monotonic_ns)
-
     def _begin(self, arrival: int) -> None:
-        self._stamp = max(arrival, self._stamp + SAMPLE_TIME_NS) if self._running else arrival
+        self._stamp = max(arrival, self._stamp + self._sample_time) if self._running else arrival
         self._running = True
         self._late_blocks = 0
         self._begin_block(0.0)

@@ -136,8 +136,8 @@ def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, loc
         *_quality_findings(now, earlier, parameters),
         *_setpoint_findings(now, earlier, parameters),
     ):
-        return Verdict(level, sentence, _figures(now))
-    return Verdict(Level.OK, 'link to the electronics is up', _figures(now))
+        return Verdict(level, sentence, _figures(now, parameters))
+    return Verdict(Level.OK, 'link to the electronics is up', _figures(now, parameters))
 
 
 Findings = list[tuple[Level, str]]
@@ -254,9 +254,10 @@ def _setpoint_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParam
     return found
 
 
-def _figures(now: Snapshot) -> dict[str, object]:
+def _figures(now: Snapshot, parameters: DriverParameters) -> dict[str, object]:
     figures: dict[str, object] = {
         'last_stamp': now.latest_stamp,
+        'sample_rate': parameters.sample_rate,
         'frame_age_s': round(now.frame_age, 4),
         'samples': now.samples,
         'lost': now.lost,
@@ -278,6 +279,7 @@ def _figures(now: Snapshot) -> dict[str, object]:
         'error_frames': now.error_frames,
         'unreadable': now.unreadable,
         'switched_off': bool(now.fault),
+        'held': bool(now.held),
         # A supervisor ends the graph on the one, and initialises it anew on the other.
         'fatal': bool(now.fault) and not now.needs_initialisation,
         'needs_initialisation': bool(now.fault) and now.needs_initialisation,

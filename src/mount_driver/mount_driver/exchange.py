@@ -21,6 +21,7 @@ from mount_driver.link import Arrival, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.watches.guard import Fault, Guard
 from mount_driver.watches.heat_watch import HeatWatch
+from mount_models.sampling import sample_time_ns
 
 _WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
 _REOPEN_PERIOD = 0.2  # s, chosen
@@ -48,7 +49,8 @@ class Exchange:
         steady: Callable[[], int] = time.monotonic_ns,
         heat: HeatWatch | None = None,
     ):
-        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9))
+        sample_time = sample_time_ns(parameters.sample_rate)
+        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9), sample_time)
         self.reception = Reception()
         self.failure = ''
         """Why the exchange has ended on its own; empty while it runs."""
@@ -109,7 +111,26 @@ class Exchange:
                 self.link.refuse(Refusal.BUS_LOST)
                 return False
             setpoint = self.link.answer(stamp, current, self._now())
-            return setpoint is not None and self._send(setpoint)
+            sent = setpoint is not None and self._send(setpoint)
+            if self.link.double_answer and not self.link.fault:
+                self._send(self.link.switch_off(self.link.double_answer, needs_initialisation=False))
+                return False
+            return sent
+
+    def switch_off(self, fault: Fault | None) -> None:
+        """Send 0 A and let no setpoint pass any more.
+
+        The first fault stays, but for a graver one, or for one that names who answers beside the other.
+        """
+        link = self.link
+        if fault is None:
+            return
+        graver = link.needs_initialisation and not fault.needs_initialisation
+        nameless = link.fault == link.double_answer
+        if link.fault and not (graver or nameless):
+            return
+        with self._sending:
+            self._send(link.switch_off(*fault))
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
@@ -176,16 +197,16 @@ class Exchange:
         if stamped is not None:
             self.bus_off = False
             self.last_received = received
-            self._switch_off(self.guard.judge_sample(stamped, received))
+            self.switch_off(self.guard.judge_sample(stamped, received))
             self._on_sample(stamped)
             return
-        self._switch_off(self.guard.judge_frame(received))
+        self.switch_off(self.guard.judge_frame(received))
         if self.link.arrival is Arrival.RESENT:
             self._answer_again()
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
-        self._switch_off(self.guard.judge_status(status, self._now()))
+        self.switch_off(self.guard.judge_status(status, self._now()))
         if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
             return
         # The frame has no time of its own. A second one without a sample between has none at all.
@@ -198,19 +219,11 @@ class Exchange:
             _, setpoint = self._codec.decode_setpoint(message.data)
         except (WrongCrcError, WrongLengthError):
             return  # nor do the electronics use it; their status tells of it
-        self._switch_off(self.guard.judge_foreign(setpoint, self._now()))
+        self.switch_off(self.guard.judge_foreign(setpoint, self._now()))
         with self._sending:
             # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
             if self._accepting:
                 self._send(self.link.off())
-
-    def _switch_off(self, fault: Fault | None) -> None:
-        """Send 0 A and let no setpoint pass any more; the first fault stays, but for a graver one."""
-        link = self.link
-        if fault is None or (link.fault and not (link.needs_initialisation > fault.needs_initialisation)):
-            return
-        with self._sending:
-            self._send(link.switch_off(*fault))
 
     def _take_error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
@@ -236,7 +249,7 @@ class Exchange:
             self.unsent_reason = self.trouble
             return False
         try:
-            self.guard.note_sent(setpoint, self._now())
+            self.guard.note_sent(setpoint)
             self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
             bus.send(self._frame)
         except Exception as error:

@@ -7,6 +7,7 @@ The hold: a current stands on the bus only while the sample that it answers has 
 setpoint timeout. So nothing but a new sample and its own answer prolongs it, even if either is repeated.
 """
 
+from collections import deque
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
@@ -20,7 +21,8 @@ _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFF_FFFF
 _DISAGREEMENT_US = 10_000  # chosen: from one sample to the next its two counters agree to this
 _LATE_US = 1_000_000  # chosen: beyond it a step of the clock back is a restart, forward a pause
-_SAMPLE_TIME_US = SAMPLE_TIME_NS // 1000
+_DOUBLE_ANSWERS = 3  # chosen: a node that ends makes one, a ramp that gives way to another node two
+_DOUBLE_PERIOD = 1_000_000_000  # ns, chosen: in it a node does not end three times
 _MEASURED = 6  # fields of a measurement, without its status bits: when sent again these are the same
 _SLACK = 2  # samples, chosen: more may have been taken in a time than fit in by the clock's steps
 
@@ -59,7 +61,13 @@ class Stamped(NamedTuple):
 class Link:
     """Judges and stamps every measurement, judges every setpoint, and counts."""
 
-    def __init__(self, codec: MountCodec, clock: Clock, setpoint_timeout_ns: int):
+    def __init__(
+        self,
+        codec: MountCodec,
+        clock: Clock,
+        setpoint_timeout_ns: int,
+        sample_time_ns: int = SAMPLE_TIME_NS,
+    ):
         self.clock = clock
         self.samples = E2EReceiver(codec.decode_measurement, codec.measurement)
         self.statuses = E2EReceiver(codec.decode_status, codec.status)
@@ -85,6 +93,8 @@ class Link:
         """Whether nothing but a new initialisation is needed to end the fault."""
         self.held = ''
         """Why every answer is lowered to 0 A at present; empty while none is."""
+        self.double_answer = ''
+        """Which sample was answered differently by two senders; empty while none was for certain."""
         self.current_limit = codec.current.high
         """What the coil may carry at present, A."""
         self.setpoints = 0
@@ -100,8 +110,11 @@ class Link:
 
         self._highest_current = codec.current.high
         self._timeout = setpoint_timeout_ns
+        self._sample_time_us = sample_time_ns // 1000
         self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, oldest first
         self._answered_stamp = -1
+        self._answered_current = 0.0  # A, as it was asked for
+        self._answered_twice: deque[int] = deque(maxlen=_DOUBLE_ANSWERS)  # stamps of such samples
         # No sample of the first minute bears this number: 0 A sent before any answer answers nothing.
         self._last_setpoint = Setpoint(0.0, _COUNTER_MASK, False)
         self._off_at: int | None = None  # time after which 0 A is due; the watch begins with its first look
@@ -148,10 +161,13 @@ class Link:
             self.refuse(Refusal.UNKNOWN_SAMPLE)
             return None
         counter, arrival = sample
+        if stamp == self._answered_stamp:
+            self._compare(stamp, current)
         reason = self._objection(stamp, current, now - arrival)
         if reason is not None:
             self.refuse(reason)
             return None
+        self._answered_stamp, self._answered_current = stamp, current
         if current > self._highest_current:
             self.limited += 1
             current = self._highest_current
@@ -161,7 +177,6 @@ class Link:
         if self.held:
             current = 0.0
         self.setpoints += 1
-        self._answered_stamp = stamp
         self._off_at = arrival + self._timeout
         self._last_setpoint = Setpoint(current, counter, True)
         return self._last_setpoint
@@ -226,6 +241,19 @@ class Link:
             return Refusal.NOT_LOWER
         return None
 
+    def _compare(self, stamp: int, current: float) -> None:
+        """Note another answer to the sample of `stamp`; a node that ends adds one of 0 A, once."""
+        first, found = self._answered_current, self._answered_twice
+        if current == first or (found and found[-1] == stamp):
+            return
+        found.append(stamp)
+        if len(found) == _DOUBLE_ANSWERS and stamp - found[0] <= _DOUBLE_PERIOD:
+            self.double_answer = (
+                f'{len(found)} samples within {1e-9 * _DOUBLE_PERIOD:g} s were answered twice, the '
+                f'last with {first:.3f} A and {current:.3f} A (limit: one answer each): end one of the two '
+                'nodes that publish current_setpoint'
+            )
+
     def _arrival_of_none(self) -> Arrival:
         return Arrival.CORRUPT if self.samples.outcome >= Outcome.WRONG_CRC else Arrival.DISORDERED
 
@@ -247,11 +275,10 @@ class Link:
         if step_us < _LATE_US and not self._agree(step, step_us):
             self.jumps += 1
         # Nor were more samples taken than there was time for.
-        if step > 1 and (step - _SLACK) * _SAMPLE_TIME_US <= step_us < _LATE_US:
+        if step > 1 and (step - _SLACK) * self._sample_time_us <= step_us < _LATE_US:
             self.lost += step - 1
         return Arrival.NEW
 
-    @staticmethod
-    def _agree(step: int, step_us: int) -> bool:
+    def _agree(self, step: int, step_us: int) -> bool:
         """Whether so many samples fit into so many microseconds; neither counter may stand still alone."""
-        return step > 0 and step_us > 0 and abs(step_us - step * _SAMPLE_TIME_US) < _DISAGREEMENT_US
+        return step > 0 and step_us > 0 and abs(step_us - step * self._sample_time_us) < _DISAGREEMENT_US

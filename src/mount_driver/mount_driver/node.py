@@ -9,8 +9,10 @@ from mount_driver.diagnosis import LinkWatch, judge, snapshot
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal, Stamped
 from mount_driver.parameters import DriverParameters
+from mount_driver.watches.guard import Fault
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_models.coil.heating import check_heating
+from mount_models.sampling import sample_time_ns
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.nodes.diagnostics import Level, Verdict
@@ -48,6 +50,7 @@ class MountDriver(SafeLifecycleNode):
     def configure(self) -> None:
         self._take_specimen()
         self._settings = read(self, DriverParameters())
+        sample_time_ns(self._settings.sample_rate)  # refuses what the electronics cannot count
         check_heating(self._settings.heating)
         self._heat = HeatWatch(self._settings.heating)
         self._codec = MountCodec()
@@ -62,9 +65,11 @@ class MountDriver(SafeLifecycleNode):
     def activate(self) -> None:
         assert self._codec is not None
         self.ending.wait(max(0.0, self._not_before - time.monotonic()))
+        self.wait_for_own_writers()
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
-        clock = CounterClock() if self.lockstep else ElectronicsClock(epoch_offset)
+        period = sample_time_ns(self._settings.sample_rate)
+        clock = CounterClock(period) if self.lockstep else ElectronicsClock(epoch_offset, period)
         exchange = Exchange(
             self._settings,
             self._codec,
@@ -79,6 +84,7 @@ class MountDriver(SafeLifecycleNode):
         attended = self.lockstep and self._settings.interface == 'virtual'
         exchange.start(threaded=not attended)
         self._exchange = exchange
+        self.tell_writers()
         if attended:
             self._path.attend(exchange.poll)
 
@@ -94,6 +100,12 @@ class MountDriver(SafeLifecycleNode):
 
     def cleanup(self) -> None:
         self._codec = None
+
+    def heed_writers(self, foreign: str, doubt: str) -> None:
+        exchange = self._exchange
+        if exchange is not None:
+            exchange.guard.writer_doubt = doubt
+            exchange.switch_off(Fault(foreign) if foreign else None)
 
     def judge(self) -> Verdict:
         exchange = self._exchange

@@ -8,7 +8,7 @@ from mount_driver.watches.sender_watch import SenderLimits
 from mount_driver.watches.status_watch import StatusLimits
 from mount_models.coil.heating import CoilHeating
 from mount_models.quantity import Quantity
-from mount_models.sampling import SETPOINT_TIMEOUT
+from mount_models.sampling import SAMPLE_RATE, SETPOINT_TIMEOUT, SampleRate
 
 
 class DriverParameters(NamedTuple):
@@ -28,6 +28,7 @@ class DriverParameters(NamedTuple):
     data_bitrate: Annotated[
         int, Quantity('bit/s', 'data bit rate of CAN FD, likewise', 10_000, 8_000_000)
     ] = 2_000_000
+    sample_rate: SampleRate = SAMPLE_RATE
     setpoint_timeout: Annotated[
         float,
         Quantity('s', 'greatest age of the sample that a current answers; then 0 A', 0.002, SETPOINT_TIMEOUT),

@@ -65,6 +65,19 @@ def test_a_sample_is_handed_out_with_its_stamp(make, samples, interface):
     assert samples == [(7 * MS, sample(7))]
 
 
+def test_electronics_of_another_rate_take_the_coil_to_0_a_until_the_next_activation(make, samples):
+    exchange, far = make(interface='virtual', threaded=False, sample_rate=2000.0)
+    for index in range(30):
+        far.send(sample(index))
+        assert exchange.poll()
+        exchange.send_setpoint(index * MS, 1.0)
+    assert 'sample every 1000 us, but sample_rate (2000 Hz) means 500 us' in exchange.link.fault
+    assert exchange.link.last_refusal is Refusal.SWITCHED_OFF
+    setpoints = [far.setpoint() for _ in range(exchange.link.setpoints)]
+    assert far.setpoint()._replace(answered_counter=0) == Setpoint(0.0, 0, False)
+    assert len(setpoints) < 20
+
+
 def test_without_a_thread_each_poll_handles_one_frame(make, samples):
     exchange, far = make(interface='virtual', threaded=False)
     assert not exchange.poll()

@@ -102,10 +102,10 @@ def stuck(car):
 
 
 def test_a_coil_that_does_not_follow_is_switched_off_in_time_and_stays_so(car):
-    """The setpoint falls from 3 A to 1 A: 14 ms for the slowest coil and the way, 20 ms of deviation."""
+    """The setpoint falls from 3 A to 1 A: 20 ms in which a late one may be followed, 20 ms of deviation."""
     car.drive(3000, lambda: car.exchange.send_setpoint(car.stamps[-1], 1.0), electronics=stuck(car))
     last = [time for time, setpoint in car.sent if setpoint.enable][-1]
-    assert GOOD + 20 <= last // MS <= GOOD + 40
+    assert GOOD + 20 <= last // MS <= GOOD + 45
     assert {setpoint for time, setpoint in car.sent if time > last} == {
         Setpoint(0.0, car.on_bus().answered_counter, False)
     }

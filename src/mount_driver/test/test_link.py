@@ -322,6 +322,32 @@ def test_a_second_answer_to_a_sample_may_only_lower_and_does_not_prolong(link):
     assert link.off_is_due(20 * MS + 1)
 
 
+def _answer_twice(link, index, first, second):
+    feed(link, [index], first_alive=index)
+    for current in (first, second):
+        link.answer(index * MS, current, now=index * MS)
+
+
+@pytest.mark.parametrize(
+    ('first', 'second'), [(1.0, 3.0), (3.0, 1.0), (3.0, 0.0), (0.0, 3.0), (1.0, math.nan)]
+)
+def test_samples_that_are_answered_twice_and_differently_tell_of_a_second_sender(link, first, second):
+    for index in range(3):
+        assert link.double_answer == ''
+        _answer_twice(link, index, first, second)
+    assert link.double_answer == (
+        f'3 samples within 1 s were answered twice, the last with {first:.3f} A and {second:.3f} A (limit: '
+        'one answer each): end one of the two nodes that publish current_setpoint'
+    )
+
+
+def test_equal_answers_and_a_node_that_ends_now_and_then_are_no_second_sender(link):
+    for index in range(9):
+        _answer_twice(link, 600 * index, 1.0, 0.0)
+        _answer_twice(link, 600 * index + 1, 1.0, 1.0)
+    assert link.double_answer == ''
+
+
 events = st.lists(
     st.one_of(
         st.tuples(st.just('wait'), st.integers(0, 30 * MS)),

@@ -28,6 +28,7 @@ from mount_models.specimen import default_specimen, save_specimen
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.messages.temperature import temperature_of
+from mount_ros.messages.types import message_class
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
@@ -238,6 +239,81 @@ def test_after_a_fault_of_the_coil_an_activation_leaves_the_hole_that_makes_the_
     assert driver.trigger_activate() == SUCCESS
     assert time.monotonic() - ended > 1.0
     assert driver._exchange.link.fault == ''
+
+
+@pytest.fixture
+def stranger(context):
+    """Return a function that lets another node publish setpoints, and returns its publisher."""
+    nodes = []
+
+    def publish(name='evil'):
+        nodes.append(Node(name, namespace='/elsewhere', context=context))
+        kind = message_class(CURRENT_SETPOINT.type)
+        return nodes[-1].create_publisher(kind, f'/{CURRENT_SETPOINT.name}', publisher_qos(CURRENT_SETPOINT))
+
+    yield publish
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_another_node_that_publishes_setpoints_takes_the_coil_to_0_ampere_for_good(
+    active, controller, far, stranger, lockstep
+):
+    driver = active(lockstep=lockstep)
+    far.send(sample(0))
+    controller.wait_for(1)
+    stranger()
+    wait_until(lambda: not far.setpoint().enable and driver._exchange.link.fault, '0 A')
+    names = '/controller_io and /elsewhere/evil'
+    verdict = driver.judge()
+    assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, True)
+    assert verdict.sentence == (
+        f'coil switched off: {names} must not publish current_setpoint too (limit: one writer, mount_control '
+        'and mount_init): end it, then activate mount_driver, mount_init and mount_control again'
+    )
+    assert driver.trigger_deactivate() == SUCCESS
+    assert driver.trigger_activate() == FAILURE
+    assert driver.sentence.startswith(f'{names} must not publish current_setpoint too')
+
+
+def test_while_a_writer_may_be_one_that_was_killed_every_answer_is_0_ampere(active, controller, far, context):
+    driver = active()
+    far.send(sample(0))
+    controller.wait_for(1)
+    controller.setpoint(0, 1.0)
+    assert far.setpoint() == Setpoint(1.0, 0, True)
+    twin = Node('controller_io', context=context)
+    twin.create_publisher(
+        message_class(CURRENT_SETPOINT.type), CURRENT_SETPOINT.name, publisher_qos(CURRENT_SETPOINT)
+    )
+    wait_until(
+        lambda: driver._exchange.guard.writer_doubt.startswith('/controller_io must not publish'), 'the doubt'
+    )
+    far.send(sample(1))
+    controller.wait_for(2)
+    controller.setpoint(MS, 1.0)
+    assert far.setpoint() == Setpoint(0.0, 1, True)
+    assert driver.judge().sentence.startswith('coil at 0 A while this lasts: /controller_io must not publish')
+    assert driver.judge().figures['held']
+    twin.destroy_node()
+    wait_until(lambda: not driver._exchange.guard.writer_doubt, 'the end of the doubt')
+    far.send(sample(2))
+    controller.wait_for(3)
+    controller.setpoint(2 * MS, 1.0)
+    assert far.setpoint() == Setpoint(1.0, 2, True)
+
+
+def test_two_senders_behind_one_publisher_are_told_by_their_answers(active, controller, far):
+    driver = active()
+    for index in range(3):
+        far.send(sample(index))
+        controller.wait_for(index + 1)
+        controller.setpoint(index * MS, 1.0)
+        controller.setpoint(index * MS, 3.0)
+    assert far.setpoint_where(lambda setpoint: not setpoint.enable).current == 0.0
+    wait_until(lambda: driver.judge().level == Level.ERROR, 'the verdict')
+    assert driver.judge().sentence.startswith('coil switched off: 3 samples within 1 s were answered twice')
 
 
 def test_a_corrupt_frame_is_not_published_and_counted(active, controller, far):

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mount_init.errors import CoilBusyError, InitialisationError
+from mount_init.errors import CoilBusyError, DriverRefusalError, InitialisationError
 from mount_init.initialisation import OFF, Initialisation
 
 _LOOK_PERIOD = 0.05  # s: how soon silence, a timeout or the end of the process is noticed
@@ -73,6 +73,13 @@ class CoilDialogue:
                 )
                 self._end()
 
+    def give_way(self, sentence: str) -> None:
+        """End the ramp, if one runs, because of what `sentence` says; `run` raises it."""
+        with self._lock:
+            if self._ramp is not None:
+                self._intruder = CoilBusyError(sentence)
+                self._end()
+
     # What the transition does.
 
     def forget_streams(self) -> None:
@@ -98,18 +105,26 @@ class CoilDialogue:
             )
 
     def run(
-        self, ramp: Initialisation, silence_timeout: float, total_timeout: float, ending: threading.Event
+        self,
+        ramp: Initialisation,
+        silence_timeout: float,
+        total_timeout: float,
+        ending: threading.Event,
+        objection: Callable[[], str] = str,
     ) -> None:
         """Answer samples until `ramp` is finished; an unanswered sample that is already here comes first.
 
         Raises `InitialisationError` after `silence_timeout` (s) without a sample, after `total_timeout` (s),
-        if another node answers too, and if the process is ending. Leaves 0 A behind in every case.
+        if another node answers too, if `objection` says something, and if the process is ending. Leaves 0 A
+        behind in every case.
         """
         try:
             self._begin(ramp)
             start = time.monotonic()
             while not self._over.wait(_LOOK_PERIOD):
                 self._check_progress(ramp, start, silence_timeout, total_timeout, ending)
+                if reason := objection():
+                    raise DriverRefusalError(reason)
             if self._intruder is not None:
                 raise self._intruder
         finally:

@@ -25,6 +25,10 @@ class OutsideCalibrationError(InitialisationError):
     """A gap estimate lies where the specimen was never calibrated."""
 
 
+class WrongCoilError(InitialisationError):
+    """The resistance of the coil is not that of the specimen."""
+
+
 class NoContactError(InitialisationError):
     """The pads never came into contact, or never left it."""
 
@@ -39,6 +43,10 @@ class ImpreciseError(InitialisationError):
 
 class SpecimenMismatchError(InitialisationError):
     """The parameters of the ramp do not fit the specimen."""
+
+
+class DriverRefusalError(InitialisationError):
+    """The driver keeps the coil at 0 A, so no ramp reaches it."""
 
 
 class CoilBusyError(InitialisationError):

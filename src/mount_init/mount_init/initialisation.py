@@ -33,6 +33,7 @@ from mount_init.plausibility import (
     check_contact,
     check_peak_force,
     check_precision,
+    check_resistance,
     check_rest_current,
     check_same_crossing,
     check_same_rest_gap,
@@ -40,10 +41,11 @@ from mount_init.plausibility import (
     check_steady_fall,
 )
 from mount_init.ramp import Ramp, current_ramp
-from mount_init.readings import Readings, check_readings
+from mount_init.readings import Readings, check_rate, check_readings
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, find_crossing
+from mount_models.coil.resistance import CoilResistance, measured_resistance
 from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
 from mount_models.specimen import Specimen
 
@@ -69,6 +71,7 @@ class Evidence:
     contact: ContactGap
     curve: InductanceCurve
     temperature: CoilTemperature
+    resistance: CoilResistance
     samples: int
     skipped: int
 
@@ -113,6 +116,7 @@ class Initialisation:
         self.ramp: Ramp = current_ramp(parameters, specimen.rest_current)
         self.readings = Readings(self.ramp.setpoints.size)
         self.last_stamp: int | None = None
+        self._first_stamp: int | None = None
         self._temperatures = temperatures or TemperatureReadings()
         self._middle_stamp: int | None = None
         self._setpoints: list[float] = self.ramp.setpoints.tolist()
@@ -141,6 +145,8 @@ class Initialisation:
             return OFF
         number = self.readings.received
         self.last_stamp = stamp
+        if number == 0:
+            self._first_stamp = stamp
         if number == self.length // 2:
             self._middle_stamp = stamp
         valid = self.readings.add(current, current_rate, flux_rate)
@@ -163,6 +169,9 @@ class Initialisation:
                 f'air gap not estimated: {self.readings.received} of {self.length} ripple samples '
                 'received; is mount_driver active?'
             )
+        assert self._first_stamp is not None
+        assert self.last_stamp is not None
+        check_rate(self.last_stamp - self._first_stamp, self.length, self.parameters)
         check_readings(self.readings, self.ramp, self.parameters)
         temperature = coil_temperature(
             self._temperatures, self._middle_stamp, self.parameters.coil_temperature_celsius
@@ -212,6 +221,10 @@ def _estimate(
 ) -> Evidence:
     current, inductance = readings.current, readings.inductance(specimen.turns_area)
     level = specimen.crossing_inductance
+    celsius = temperature.celsius
+
+    driven = slice(ramp.up.start, ramp.down.stop)
+    resistance = measured_resistance(specimen.turns_area, current[driven], readings.flux_rate[driven])
 
     dwells = [
         dwell_inductance(current[part], inductance[part], parameters)
@@ -219,11 +232,11 @@ def _estimate(
     ]
     for dwell in dwells:
         check_rest_current(specimen, dwell, parameters)
-    celsius = temperature.celsius
     before, after = (rest_gap(specimen, dwell.inductance, dwell.inductance_std, celsius) for dwell in dwells)
     check_same_rest_gap(before, after, parameters)
     mean = _mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells])
     rest = rest_gap(specimen, *mean, celsius)
+    check_resistance(specimen, resistance, celsius, parameters)
 
     curve = inductance_curve(current, inductance, ramp.up, ramp.down, parameters.peak_current)
     check_single_crossing(curve, level, specimen.rest_current)
@@ -250,6 +263,7 @@ def _estimate(
         contact=contact,
         curve=curve,
         temperature=temperature,
+        resistance=resistance,
         samples=readings.valid,
         skipped=readings.skipped,
     )

@@ -5,6 +5,8 @@ import math
 from mount_init.coil_temperature import TemperatureReadings
 from mount_init.diagnosis import InitFigures, verdict
 from mount_init.dialogue import CoilDialogue
+from mount_init.driver_report import DriverReport
+from mount_init.errors import DriverRefusalError, InitialisationError
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
 from mount_models.specimen import chosen_specimen
@@ -14,10 +16,13 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_of
+from mount_ros.messages.verdicts import verdicts_of
 from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
+
+_DRIVER_PATIENCE = 0.3  # s, chosen: the driver looks at itself ten times a second
 
 
 class MountInit(SafeLifecycleNode):
@@ -40,6 +45,7 @@ class MountInit(SafeLifecycleNode):
         load_compiled_laws(self._specimen)
         self._malformed, self._malformed_reason = 0, ''
         self._temperatures = TemperatureReadings()
+        self._driver = DriverReport(self.get_namespace())
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
@@ -56,13 +62,18 @@ class MountInit(SafeLifecycleNode):
         assert self._dialogue is not None
         self.real_time.begin(self)  # the ramp is part of the activation
         self._resume_streams()
+        self.wait_for_own_writers()
         parameters = self._init_parameters
         self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
+        if reason := self._driver.settled(False, _DRIVER_PATIENCE, self.ending):
+            raise DriverRefusalError(reason)
         ramp = Initialisation(self._specimen, parameters, self._temperatures)
-        # in lock-step only silence can tell a stalled chain from a slow machine
-        total_timeout = math.inf if self.lockstep else parameters.total_timeout
-        self._dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending)
-        result = ramp.result()
+        try:
+            result = self._ramp(self._dialogue, ramp)
+        except InitialisationError as error:
+            if reason := self._driver.settled(True, _DRIVER_PATIENCE, self.ending):
+                raise DriverRefusalError(reason) from error
+            raise
         assert ramp.last_stamp is not None
         self._publish_result(ramp.last_stamp, result)
         self._end_streams()
@@ -76,17 +87,34 @@ class MountInit(SafeLifecycleNode):
     def cleanup(self) -> None:
         self.deactivate()
 
+    def heed_writers(self, foreign: str, doubt: str) -> None:
+        if self._dialogue is not None and (foreign or doubt):
+            self._dialogue.give_way(foreign or doubt)
+
     def judge(self) -> Verdict:
         assert self._result is not None
         stamp, result = self._result
         figures = InitFigures(result, stamp, self._malformed, self._malformed_reason)
         return verdict(figures, self._specimen, self._init_parameters)
 
+    def _ramp(self, dialogue: CoilDialogue, ramp: Initialisation) -> InitialisationResult:
+        parameters = self._init_parameters
+        # in lock-step only silence can tell a stalled chain from a slow machine
+        total_timeout = math.inf if self.lockstep else parameters.total_timeout
+        dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
+        return ramp.result()
+
+    def _objection(self) -> str:
+        assert isinstance(self.data_path, DataPath)
+        self.data_path.writers.look()  # a thread that polls the messages does not hear who comes
+        return self._driver.refusal
+
     # With the result latched no sample is answered, so the streams are unsubscribed: that saves CPU time.
 
     def _subscribe_streams(self, path: DataPath) -> None:
         path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
         path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
+        path.subscribe(topics.DIAGNOSTICS, self._on_verdicts)
         self._unsubscribed = False
 
     def _resume_streams(self) -> None:
@@ -102,6 +130,7 @@ class MountInit(SafeLifecycleNode):
             return  # the sample that waits for the next ramp must not be missed
         self.data_path.unsubscribe(topics.COIL_RIPPLE)
         self.data_path.unsubscribe(topics.CURRENT_SETPOINT)
+        self.data_path.unsubscribe(topics.DIAGNOSTICS)
         self._unsubscribed = True
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
@@ -128,6 +157,10 @@ class MountInit(SafeLifecycleNode):
 
     def _on_temperature(self, raw: bytes) -> None:
         self._temperatures.take(*temperature_of(raw))
+
+    def _on_verdicts(self, raw: bytes) -> None:
+        for told in verdicts_of(raw):
+            self._driver.take(*told)
 
     def _on_setpoint(self, raw: bytes) -> None:
         try:

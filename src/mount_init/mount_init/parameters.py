@@ -8,7 +8,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.quantity import Quantity
-from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SampleRate
 
 _WIDE = 'chosen: seven standard deviations or more at 1 % ripple noise'
 
@@ -16,10 +16,7 @@ _WIDE = 'chosen: seven standard deviations or more at 1 % ripple noise'
 class InitParameters(NamedTuple):
     """All parameters of `mount_init`; the ramp with these values takes 2.75 s."""
 
-    sample_rate: Annotated[
-        float,
-        Quantity('Hz', 'ripple samples per second: turns durations into counts', 100, 10e3),
-    ] = SAMPLE_RATE
+    sample_rate: SampleRate = SAMPLE_RATE
     rise_duration: Annotated[
         float, Quantity('s', 'smooth rise from 0 A to the rest current, and fall back to 0 A', 0.02, 1.0)
     ] = 0.05
@@ -83,6 +80,12 @@ class InitParameters(NamedTuple):
     crossing_gap_tolerance: Annotated[
         float, Quantity('m', 'largest difference of the crossing gap up and down', 1e-6, 1e-4, _WIDE)
     ] = 6e-6
+    resistance_tolerance: Annotated[
+        float,
+        Quantity(
+            '1', 'largest relative deviation of the resistance of the coil at its temperature', 0.02, 0.5
+        ),
+    ] = 0.15
     smallest_travel: Annotated[
         float,
         Quantity('m', 'least way of the halves from the rest current to contact', 2e-6, 2e-4),

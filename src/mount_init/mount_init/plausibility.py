@@ -1,5 +1,6 @@
 """Whether the estimates fit the specimen, the laws and each other; every doubt is a refusal."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,11 +11,15 @@ from mount_init.errors import (
     CurrentNotFollowingError,
     ImpreciseError,
     NoContactError,
+    WrongCoilError,
 )
 from mount_init.estimation import ContactGap, Dwell, FloatArray, InductanceCurve, RestGap
 from mount_init.parameters import InitParameters
 from mount_models.actuator.law import checked_force
+from mount_models.coil.resistance import CoilResistance, resistance_at
 from mount_models.specimen import Specimen
+
+_WORKING_CELSIUS = -40.0, 180.0  # degC, chosen: ISO 16750-4, insulation class H
 
 
 def check_rest_current(specimen: Specimen, dwell: Dwell, parameters: InitParameters) -> None:
@@ -26,6 +31,32 @@ def check_rest_current(specimen: Specimen, dwell: Dwell, parameters: InitParamet
             f'{parameters.rest_current_tolerance * 1e3:.1f} mA of {specimen.rest_current:.3f} A, for which '
             'the gap curve is calibrated; check the current control of the electronics'
         )
+
+
+def check_resistance(
+    specimen: Specimen, resistance: CoilResistance, celsius: float, parameters: InitParameters
+) -> None:
+    """Raise `WrongCoilError` unless the resistance is that of the specimen at a temperature (degC).
+
+    Where that is unknown (NaN), any temperature of a working coil is granted.
+    """
+    if specimen.coil_resistance is None:
+        return
+    known = not math.isnan(celsius)
+    coldest, hottest = (celsius, celsius) if known else _WORKING_CELSIUS
+    low = (1.0 - parameters.resistance_tolerance) * resistance_at(specimen.coil_resistance, coldest)
+    high = (1.0 + parameters.resistance_tolerance) * resistance_at(specimen.coil_resistance, hottest)
+    if low <= resistance.ohm <= high:
+        return
+    where = f'at {celsius:.0f} degC' if known else f'at {coldest:g} .. {hottest:g} degC, its own is unknown'
+    cause = (
+        'are turns shorted?' if resistance.ohm < low else 'is a contact loose, or the coil hotter than told?'
+    )
+    raise WrongCoilError(
+        f'resistance of the coil ({resistance.ohm:.3f} ohm, link voltage {resistance.link_voltage:.1f} V) '
+        f'must lie within {low:.3f} .. {high:.3f} ohm, that of {specimen.name} {where}; {cause} Check coil '
+        'and cable, coil_temperature and the specimen'
+    )
 
 
 def check_single_crossing(curve: InductanceCurve, level: float, rest_current: float) -> None:

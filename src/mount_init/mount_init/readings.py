@@ -11,6 +11,7 @@ from mount_init.ramp import Ramp
 from mount_models.coil.gap import measured_inductance
 
 FloatArray = npt.NDArray[np.float64]
+_RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses in a ramp
 BoolArray = npt.NDArray[np.bool_]
 
 
@@ -57,6 +58,16 @@ class Readings:
         current_rate = np.where(self.current_rate > 0.0, self.current_rate, np.nan)
         flux_rate = np.where(self.flux_rate > 0.0, self.flux_rate, np.nan)
         return measured_inductance(turns_area, flux_rate, current_rate)
+
+
+def check_rate(duration: int, count: int, parameters: InitParameters) -> None:
+    """Raise `UnusableReadingsError` unless the `count` samples of a ramp took the right time (ns)."""
+    rate = 1e9 * (count - 1) / max(1, duration)
+    if abs(rate - parameters.sample_rate) > _RATE_TOLERANCE * parameters.sample_rate:
+        raise UnusableReadingsError(
+            f'coil_ripple came at {rate:.0f} Hz, but sample_rate of mount_init is {parameters.sample_rate:g} '
+            f'Hz (limit {100.0 * _RATE_TOLERANCE:g} %); start the whole graph with one sample_rate'
+        )
 
 
 def check_readings(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:

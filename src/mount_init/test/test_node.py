@@ -4,6 +4,7 @@ import threading
 import time
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
@@ -17,6 +18,8 @@ from mount_ros.data_path import DataPath
 from mount_ros.messages.force_table import from_bytes
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
+from mount_ros.messages.types import message_class
+from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
 
 STEP = 1_000_000  # ns
@@ -38,7 +41,11 @@ class Electronics:
         self.node = Node('electronics', context=context)
         self.path = DataPath(self.node, lockstep=True)
         self._publisher = self.path.publisher(topics.COIL_RIPPLE)
-        self.foreign = self.path.publisher(topics.CURRENT_SETPOINT)
+        self._diagnostics = self.path.publisher(topics.DIAGNOSTICS)
+        self._actions = {}
+        self._control_node = Node('mount_control', context=context)
+        self._control = DataPath(self._control_node, lockstep=True)
+        self.foreign = self._control.publisher(topics.CURRENT_SETPOINT)
         self._send_temperature = self.path.sender(topics.COIL_TEMPERATURE)
         self.path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
         self.path.subscribe(topics.AIR_GAP, lambda raw: self.results.append(self._air_gap.unpack(raw)))
@@ -70,20 +77,32 @@ class Electronics:
             time.sleep(0.002)
         return len(self.setpoints) > answered
 
+    def speak_as_driver(self, sentence, **figures):
+        values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
+        status = DiagnosticStatus(name='mount_driver', message=sentence, values=values)
+        self._diagnostics.publish(DiagnosticArray(status=[status]))
+
+    def at(self, number, action):
+        """Do `action` when this many setpoints have come."""
+        self._actions[number] = action
+
     def drive_as_another_node(self, current):
         self.foreign.publish(self._setpoint.pack(self.stamp, (current,)))
 
     def _on_setpoint(self, raw):
         stamp, (current,), _ = self._setpoint.unpack(raw)
         self.setpoints.append((stamp, current))
+        self._actions.pop(len(self.setpoints), lambda: None)()
         if stamp != self.stamp or (self.silent_after is not None and stamp >= self.silent_after * STEP):
             return
         self.plant.follow(current)
         self.send_sample()
 
     def close(self):
-        self.path.stop()
+        for path in (self.path, self._control):
+            path.stop()
         self.node.destroy_node()
+        self._control_node.destroy_node()
 
 
 class Graph:
@@ -358,6 +377,56 @@ def test_while_another_node_drives_the_coil_activation_is_refused(graph):
     assert 'another node sent a current_setpoint' in g.refusal()
     assert 'deactivate mount_control first' in g.refusal()
     assert {current for _, current in g.electronics.setpoints} == {0.5}
+
+
+@pytest.mark.parametrize('figure', ['switched_off', 'held'])
+def test_what_the_driver_refuses_is_refused_with_its_reason(graph, figure):
+    g = graph()
+    g.configure()
+    g.electronics.send_sample()
+
+    def heard():
+        g.electronics.speak_as_driver('coil switched off: the cable is open', **{figure: True})
+        return g.init._driver.refusal
+
+    wait_until(heard, 'the verdict of the driver')
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    assert g.refusal() == 'mount_driver keeps the coil at 0 A: coil switched off: the cable is open'
+    assert g.electronics.setpoints == []
+
+
+def test_a_driver_that_switches_off_during_the_ramp_ends_it_with_its_reason(graph):
+    g = graph()
+    g.electronics.at(
+        500, lambda: g.electronics.speak_as_driver('coil switched off: too hot', switched_off=True)
+    )
+    g.electronics.silent_after = 1000
+    g.configure()
+    g.electronics.send_sample()
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    assert g.refusal() == 'mount_driver keeps the coil at 0 A: coil switched off: too hot'
+    wait_until(lambda: g.electronics.setpoints[-1][1] == 0.0, '0 A')
+    assert g.electronics.results == []
+
+
+def test_another_node_that_publishes_the_ripple_ends_the_ramp(graph, context):
+    g = graph()
+    g.electronics.silent_after = 1000
+    g.configure()
+    g.electronics.send_sample()
+    others = []
+
+    def publish():
+        others.append(Node('evil', namespace='/elsewhere', context=context))
+        kind = message_class(topics.COIL_RIPPLE.type)
+        others[0].create_publisher(kind, '/coil_ripple', publisher_qos(topics.COIL_RIPPLE))
+
+    g.electronics.at(500, publish)
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    assert g.refusal().startswith('/electronics_io and /elsewhere/evil must not publish coil_ripple too')
+    wait_until(lambda: g.electronics.setpoints[-1][1] == 0.0, '0 A')
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    others[0].destroy_node()
 
 
 def test_the_end_of_the_process_ends_a_ramp_with_zero_current(graph):

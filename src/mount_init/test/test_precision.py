@@ -21,6 +21,7 @@ GAPS_UM = [
     (440, 540),
 ]
 SEEDS = range(20)
+MS = 1_000_000
 
 
 @pytest.fixture(scope='module')
@@ -32,7 +33,7 @@ def recorded(simulated_actuator, specimen):
         initialisation, samples = Initialisation(specimen, InitParameters()), []
         while not initialisation.finished:
             samples.append(plant.sample())
-            plant.follow(initialisation.step(len(samples), *samples[-1]))
+            plant.follow(initialisation.step(len(samples) * MS, *samples[-1]))
         return np.array(samples), plant
 
     return record
@@ -40,8 +41,8 @@ def recorded(simulated_actuator, specimen):
 
 def estimate(samples, specimen):
     initialisation = Initialisation(specimen, InitParameters())
-    for stamp, sample in enumerate(samples.tolist()):
-        initialisation.step(stamp, *sample)
+    for number, sample in enumerate(samples.tolist()):
+        initialisation.step(number * MS, *sample)
     return initialisation.result()
 
 

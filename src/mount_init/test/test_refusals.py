@@ -16,6 +16,7 @@ from mount_init.errors import (
     SpecimenMismatchError,
     TooFewRipplesError,
     UnusableReadingsError,
+    WrongCoilError,
 )
 from mount_init.initialisation import OFF, Initialisation
 from mount_init.parameters import InitParameters
@@ -280,3 +281,53 @@ def test_after_the_end_only_zero_is_answered(specimen, simulated_actuator, run_r
 def test_every_refusal_names_a_remedy(refusal):
     for error in (refusal(supply=6.0), refusal(rest_gap=590e-6), refusal(contact_gap=100e-6)):
         assert any(word in str(error) for word in ('check', 'is the coil', 'activate', 'calibrate'))
+
+
+def test_ripple_at_another_rate_than_the_ramp_is_made_for_is_refused(specimen, simulated_actuator):
+    plant, initialisation = simulated_actuator(), Initialisation(specimen, InitParameters())
+    while not initialisation.finished:
+        plant.follow(initialisation.step((plant.number + 1) * 500_000, *plant.sample()))
+    with pytest.raises(UnusableReadingsError, match='at 2000 Hz, but sample_rate of mount_init is 1000 Hz'):
+        initialisation.result()
+
+
+def of_resistance(ohm):
+    """Return a distortion that gives the flux the slope of a coil of `ohm` instead of 2.5 ohm."""
+
+    def distort(number, sample):
+        current, current_rate, flux_rate = sample
+        share = (14.0 - ohm * current) / (14.0 - 2.5 * current)
+        return current, current_rate * share, flux_rate * share
+
+    return distort
+
+
+def test_a_coil_with_shorted_turns_is_refused_with_value_limit_and_remedy(refusal):
+    error = refusal(InitParameters(coil_temperature_celsius=20.0), distort=of_resistance(0.1))
+    assert isinstance(error, WrongCoilError)
+    assert str(error) == (
+        'resistance of the coil (0.100 ohm, link voltage 14.0 V) must lie within 2.125 .. 2.875 ohm, that of '
+        'default at 20 degC; are turns shorted? Check coil and cable, coil_temperature and the specimen'
+    )
+
+
+def test_a_coil_of_forty_per_cent_more_resistance_is_judged_by_its_temperature(
+    refusal, simulated_actuator, specimen, run_initialisation
+):
+    error = refusal(InitParameters(coil_temperature_celsius=20.0), distort=of_resistance(3.5))
+    assert 'is a contact loose, or the coil hotter than told?' in str(error)
+    assert isinstance(refusal(InitParameters(), distort=of_resistance(4.7)), WrongCoilError)
+    for celsius in (100.0, float('nan')):
+        plant = simulated_actuator(distort=of_resistance(3.5))
+        parameters = InitParameters(coil_temperature_celsius=celsius, smallest_travel=2e-6)
+        result = run_initialisation(plant, dataclasses.replace(specimen, temperature=None), parameters)
+        assert result.evidence.resistance.ohm == pytest.approx(3.5, abs=1e-6)
+        assert result.evidence.resistance.link_voltage == pytest.approx(14.0, abs=1e-6)
+
+
+def test_without_a_resistance_in_the_specimen_none_is_asked_for(
+    simulated_actuator, specimen, run_initialisation
+):
+    unknown = dataclasses.replace(specimen, coil_resistance=None)
+    result = run_initialisation(simulated_actuator(distort=of_resistance(0.1)), unknown)
+    assert result.evidence.resistance.ohm == pytest.approx(0.1, abs=1e-6)

@@ -65,6 +65,7 @@ class Specimen:
     current_limit: Annotated[
         float, Quantity('A', 'largest current of the coil', 0.1, 20.0, 'section 3.2')
     ] = HIGHEST_CURRENT
+    coil_resistance: float | None = None  # ohm at 20 degC; None: not known, so not held against the ripple
     temperature: TemperatureCompensation | None = None
     heating: CoilHeating = field(default_factory=CoilHeating)
     friction: dict[str, float] = field(default_factory=dict)
@@ -154,7 +155,7 @@ def specimen_from_mapping(content: Any) -> Specimen:
     hints = get_type_hints(Specimen)
     _check_version(content)
     if isinstance(content, Mapping):
-        content = {'heating': CoilHeating()._asdict(), **content}
+        content = {**_OPTIONAL, **content}
     values = _complete(content, ['schema_version', *hints], 'specimen')
     del values['schema_version']
     for name, kind in hints.items():
@@ -179,6 +180,8 @@ def checked_specimen(specimen: Specimen) -> Specimen:
             check_compensation(specimen.temperature, specimen.gap_curves)
     except (ForceLawRefusedError, GapCurvesRefusedError, CompensationError) as error:
         raise SpecimenError(f'{error}') from error
+    if specimen.coil_resistance is not None:
+        _check_limits(specimen.coil_resistance, _COIL_RESISTANCE, 'coil_resistance')
     for name, quantity in quantities(CoilHeating).items():
         _check_limits(getattr(specimen.heating, name), quantity, f'heating.{name}')
     try:
@@ -199,6 +202,8 @@ def checked_specimen(specimen: Specimen) -> Specimen:
 
 
 _READABLE = 0o644
+_COIL_RESISTANCE = Quantity('ohm', 'resistance of the coil at 20 degC', 0.01, 100.0)
+_OPTIONAL = {'coil_resistance': None, 'heating': CoilHeating()._asdict()}  # not in calibrations of before
 
 
 # Several parts of a run load the same file, and to check it takes some 20 ms.

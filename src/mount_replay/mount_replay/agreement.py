@@ -9,7 +9,6 @@ from mount_bags.compare.signal_difference import Column, SignalDifference, signa
 from mount_bags.compare.tolerances import EXACT
 from mount_bags.compare.words import signal_sentences, switching_sentence
 from mount_bags.events.switching_changes import Switching, paired_switchings, switching_times
-from mount_models.sampling import SAMPLE_TIME
 from mount_replay.core import ControlAnswers, RampAnswers, Replayed
 from mount_replay.given.input import ReplayInput, Times
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
@@ -82,7 +81,12 @@ def agreement(given: ReplayInput, replayed: Replayed) -> Agreement | None:
         return None
     time = _seconds(given, stamps[judged])
     setpoints = _judged(
-        CURRENT_SETPOINT, 'coil_current', time, recorded.currents[places[judged]], currents[judged]
+        CURRENT_SETPOINT,
+        'coil_current',
+        time,
+        recorded.currents[places[judged]],
+        currents[judged],
+        given.sample_time,
     )
     samples = np.concatenate([part.stamps for part in given.parts])
     return Agreement(
@@ -112,10 +116,10 @@ def recorded_switching(given: ReplayInput) -> Switching | None:
     return _switching(given, [(answers.trace_stamps[run], answers.traces[_ACTIVE][run]) for run in inside])
 
 
-def switching_changes(recorded: Switching, replayed: Switching) -> list[str]:
-    """Return the switchings that appeared, vanished or moved, in words."""
+def switching_changes(recorded: Switching, replayed: Switching, sample_time: float) -> list[str]:
+    """Return the switchings that appeared, vanished or moved, in words; `sample_time` in s."""
     a, b = ((np.array(times.on), np.array(times.off)) for times in (recorded, replayed))
-    changes = paired_switchings(a, b, SAMPLE_TIME)
+    changes = paired_switchings(a, b, sample_time)
     return [switching_sentence(change, *_NAMES) for change in changes if change.alone or change.moved]
 
 
@@ -133,16 +137,18 @@ def _intermediates(
     places, known = _matched(given.answers.trace_stamps, stamps)
     time = _seconds(given, stamps[known])
     return tuple(
-        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known])
+        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known], given.sample_time)
         for name, values in given.answers.traces.items()
         if name in (traces.dtype.names or ())  # another policy traces something else
     )
 
 
-def _judged(topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray) -> SignalDifference:
+def _judged(
+    topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray, sample_time: float
+) -> SignalDifference:
     unit = topic.unit(signal)
     column = Column('', topic.name, signal, '' if unit == '1' else unit, time, a, b)
-    return signal_difference(column, EXACT, None, SAMPLE_TIME)
+    return signal_difference(column, EXACT, None, sample_time)
 
 
 def _settled(part: object, answers: RampAnswers | ControlAnswers) -> NDArray[np.bool_]:

@@ -118,7 +118,7 @@ def run_control(
 
 
 def activation_before(run: ControlRun) -> int:
-    """Return the stamp (ns) by which a run is activated: one sample before its first.
+    """Return the stamp (ns) by which a run is activated: 1 ms before its first sample.
 
     The recording may begin long after the activation; the controller asks whether the measurements went on
     from there without a break.

@@ -105,7 +105,7 @@ def replay(order: ReplayOrder, progress: Progress = lambda share: None) -> Repla
 def replay_without_output(order: ReplayOrder, progress: Progress = lambda share: None) -> ReplayOutcome:
     """Replay and compare."""
     given, reading_time, decoding_time = _read(order)
-    parameters = _changed(given, order.changes)
+    parameters = _changed(given, order)
     check_parameters(parameters)
     given.changes = without(given.changes, order.changes.get('mount_control', {}))
     given.notes += _told(given, order.mode)
@@ -196,10 +196,23 @@ def _load_displacement(recording: Recording) -> float:
     return time.perf_counter() - begin
 
 
-def _changed(given: ReplayInput, changes: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+def _changed(given: ReplayInput, order: ReplayOrder) -> dict[str, dict[str, Any]]:
+    changes = order.changes
+    if order.foreign is None:
+        _refuse_other_rate(given.parameters, changes)
     if 'mount_init' in changes and not any(part not in given.controls for part in given.parts):
         raise ReplayError('there is no initialisation to replay, so parameters of mount_init change nothing')
     return with_changes(given.parameters, changes)
+
+
+def _refuse_other_rate(recorded: Parameters, changes: Mapping[str, Mapping[str, Any]]) -> None:
+    rate = control_parameters(recorded).sample_rate
+    for node, values in changes.items():
+        if values.get('sample_rate', rate) != rate:
+            raise ReplayError(
+                f'{node}.sample_rate ({values["sample_rate"]:g} Hz) must be that of the recording '
+                f'({rate:g} Hz): its samples were taken once; drive anew with --sample-rate'
+            )
 
 
 def with_changes(

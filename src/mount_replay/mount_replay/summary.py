@@ -10,7 +10,6 @@ from mount_bags.compare.signal_difference import Moment
 from mount_bags.events.switching_changes import Switching
 from mount_bags.run.screen import Screen, Table
 from mount_bags.run.versions import version_differences, versions, versions_sentence
-from mount_models.sampling import SAMPLE_TIME
 from mount_replay.agreement import (
     SETTLED,
     SETTLING,
@@ -36,7 +35,7 @@ def replay_figures(outcome: ReplayOutcome) -> dict[str, Any]:
         'mode': outcome.order.mode,
         'changed': {node: dict(values) for node, values in outcome.order.changes.items()},
         'samples': samples,
-        'duration_s': samples * SAMPLE_TIME,
+        'duration_s': samples * given.sample_time,
         'activations': len(replayed.runs),
         'initialisations': len(replayed.ramps),
         'bridged_samples': sum(run.counts.bridged for run in replayed.runs),
@@ -55,15 +54,15 @@ def replay_figures(outcome: ReplayOutcome) -> dict[str, Any]:
         'switch_off_s': list(now.off),
         'recorded_switch_on_s': list(before.on) if before else None,
         'recorded_switch_off_s': list(before.off) if before else None,
-        'switching_changes': switching_changes(before, now) if before else [],
+        'switching_changes': switching_changes(before, now, given.sample_time) if before else [],
         'peak_current_a': _peak(replayed),
         'recorded_peak_current_a': _recorded_peak(given),
         'control_run_s': replayed.control_time,
         'decoding_displacement_s': outcome.decoding_time,
         'reading_displacement_s': outcome.reading_time,
-        'real_time_factor': samples * SAMPLE_TIME / outcome.computing_time,
+        'real_time_factor': samples * given.sample_time / outcome.computing_time,
         'real_time_factor_with_reading': samples
-        * SAMPLE_TIME
+        * given.sample_time
         / (replayed.control_time + outcome.reading_time),
         'notes': list(given.notes),
     }

@@ -100,8 +100,8 @@ def test_switching_is_told_in_the_words_of_a_comparison():
     _, given = judged()
     before = recorded_switching(given)
     assert before == Switching((pytest.approx(0.1),), ())
-    assert switching_changes(before, before) == []
-    assert switching_changes(before, Switching((0.112,), (0.2,))) == [
+    assert switching_changes(before, before, 1e-3) == []
+    assert switching_changes(before, Switching((0.112,), (0.2,)), 1e-3) == [
         'switched on 12 ms later in the replay, at 0.112 s',
         'damping is switched off at 0.200 s in the replay, in the recording it is not',
     ]

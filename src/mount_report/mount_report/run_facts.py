@@ -11,7 +11,7 @@ from mount_control.policy.contract import Policy
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
 from mount_report.drawing.style import COLOUR_OF
-from mount_report.drive.evaluation import ACTS_AFTER, levels_of, tracking_error, wanted_force
+from mount_report.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from mount_report.drive.signals import load_drive
 from mount_report.drive.undamped import UndampedError, undamped_of
 from mount_report.sections.charts import Levels
@@ -105,10 +105,11 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
     active = np.interp(drive.truth.time, drive.seen.time, drive.seen.damping_active.astype(float)) > 0.5
     shown = np.where(active, wanted, 0.0)
     tracking = Tracking(drive.truth.time + shift, shown, drive.truth.friction_force, error)
-    return tracking, _wanted_words(policy, own)
+    return tracking, _wanted_words(policy, own, drive.sample_time)
 
 
-def _wanted_words(policy: Policy, own: Any) -> str:
+def _wanted_words(policy: Policy, own: Any, sample_time: float) -> str:
     if not hasattr(policy, 'wanted_force'):
-        return f'wanted is the force that the policy asked for, {1e3 * ACTS_AFTER:g} ms later, when it acts'
+        later = f'{1e3 * acts_after(sample_time):g} ms later'
+        return f'wanted is the force that the policy asked for, {later}, when it acts'
     return f'wanted is the force of damper {own.damper} at the true velocity in the band, without delay'

@@ -1,5 +1,6 @@
 """The signals of a recording as arrays over seconds, and what it lacks, in words."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from mount_bags.bag.recording import ReadingError, Recording
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import switching_times
 from mount_bags.messages.series import Series, SeriesError
-from mount_bags.run.session import recorded_session
+from mount_bags.run.session import recorded_sample_rate, recorded_session
 from mount_report.drawing.chart import Array
 from mount_ros.messages.event import Mark
 from mount_ros.topics import (
@@ -66,6 +67,11 @@ class Signals:
             return recorded_session(self.recording)
         except (ReadingError, SeriesError):
             return ''
+
+    @functools.cached_property
+    def sample_rate(self) -> float:
+        """Hz, as its session tells."""
+        return recorded_sample_rate(self.recording)
 
     def signal(self, topic: str, column: str) -> Signal | None:
         """Return a column of a topic, None (and a note in `missing`) where it cannot be had."""

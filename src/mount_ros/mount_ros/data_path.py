@@ -6,9 +6,9 @@ its own node `<name>_io` and goes on receiving during a blocking activation.
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
@@ -16,6 +16,7 @@ from mount_ros.data_thread import DataThread, Work
 from mount_ros.messages.types import message_class
 from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Delivery, Topic
+from mount_ros.writers import WriterWatch
 
 
 def io_node(owner: Node) -> Node:
@@ -33,10 +34,19 @@ def io_node(owner: Node) -> Node:
 class DataPath:
     """Publishers and raw subscriptions of a node, served from `start` to `stop`."""
 
-    def __init__(self, owner: Node, *, lockstep: bool = False, thread: DataThread | None = None):
+    def __init__(
+        self,
+        owner: Node,
+        *,
+        lockstep: bool = False,
+        thread: DataThread | None = None,
+        on_writers: Callable[[], None] = lambda: None,
+    ):
         self.lockstep = lockstep
         self._thread = thread or DataThread(owner.context)
         self.node = io_node(owner)
+        self.writers = WriterWatch(self.node, on_writers)
+        """Who publishes what this path hears; `on_writers` is called when others begin or cease to."""
         self._serving = False
         self._publishers: list[Publisher] = []
         self._works: list[Work] = []
@@ -72,13 +82,30 @@ class DataPath:
         """
         kind, qos = message_class(topic.type), control_qos(topic, lockstep=self.lockstep)
         guarded = self._surviving(f'message of {topic.name} not used', callback)
-        self._change(lambda: self.node.create_subscription(kind, topic.name, guarded, qos, raw=True))
+        events = self._events(topic)
+
+        def create() -> None:
+            subscription = self.node.create_subscription(
+                kind, topic.name, guarded, qos, raw=True, event_callbacks=events
+            )
+            if topic.writers:
+                self.writers.hear(topic, subscription)
+
+        self._change(create)
 
     def unsubscribe(self, topic: Topic) -> None:
-        """End the subscriptions of `topic`, if there are any: no message is taken after the return."""
+        """End the subscriptions of `topic`, if there are any: no message is taken after the return.
+
+        The node is not served meanwhile: an EventsExecutor ends by an event of a destroyed subscription.
+        """
+        self.writers.forget(topic)
         name = self.node.resolve_topic_name(topic.name)
+        if self._serving:
+            self._thread.remove(self.node)
         for subscription in [s for s in self.node.subscriptions if s.topic_name == name]:
-            self._change(partial(self.node.destroy_subscription, subscription))
+            self.node.destroy_subscription(subscription)
+        if self._serving:
+            self._thread.add(self.node)
 
     def unmatched(self) -> list[str]:
         """Return the names of the topics whose other side has not been found yet.
@@ -116,7 +143,15 @@ class DataPath:
         self.leave_work()
         if self._serving:
             self._thread.remove(self.node)
+        self.writers.end()
         self.node.destroy_node()
+
+    def _events(self, topic: Topic) -> SubscriptionEventCallbacks | None:
+        """Return what is done when a publisher comes or goes; a thread that polls does not hear it."""
+        if not topic.writers:
+            return None
+        noticed = self._surviving(f'writers of {topic.name} not known', lambda _: self.writers.notice(topic))
+        return SubscriptionEventCallbacks(matched=noticed)
 
     def _change(self, make: Callable[[], Any]) -> None:
         """Change what the thread may be serving."""
@@ -129,7 +164,7 @@ class DataPath:
         # The border of the data thread: an exception would end it, and with it every node that it serves.
         logger = self.node.get_logger()
 
-        def guarded(*arguments: bytes) -> Any:
+        def guarded(*arguments: Any) -> Any:
             try:
                 return callback(*arguments)
             except Exception as error:

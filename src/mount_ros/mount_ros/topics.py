@@ -32,7 +32,7 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of the graph; `rate` is in Hz, 0 for topics without a rate of their own."""
+    """A topic of the graph; `rate` is in Hz at the default sample rate, 0 for topics without their own."""
 
     name: str
     type: str
@@ -41,6 +41,11 @@ class Topic:
     content: str
     scalars: tuple[Scalar, ...] = ()
     optional: tuple[Scalar, ...] = ()  # that some senders name between them
+    writers: tuple[str, ...] = ()  # the only nodes that may publish it, one at a time; empty: any
+
+    def rate_at(self, sample_rate: float) -> float:
+        """Return the rate (Hz) of a graph that samples at `sample_rate` (Hz)."""
+        return sample_rate if self.rate == SAMPLE_RATE else self.rate
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -64,6 +69,7 @@ DISPLACEMENT = Topic(
     SAMPLE_RATE,
     'displacement of the mount, engine minus chassis; NaN where the sensor says that it is invalid',
     (Scalar('mount', 'm'),),
+    writers=('mount_driver',),
 )
 
 COIL_RIPPLE = Topic(
@@ -73,6 +79,7 @@ COIL_RIPPLE = Topic(
     SAMPLE_RATE,
     'mean coil current, and the slopes of current and flux density 18 us after switching',
     (Scalar('coil_current', 'A', 'A/s'), Scalar('flux_density', 'T', 'T/s')),
+    writers=('mount_driver',),
 )
 
 COIL_TEMPERATURE = Topic(
@@ -81,6 +88,7 @@ COIL_TEMPERATURE = Topic(
     Delivery.STREAM,
     10.0,
     'temperature of the coil in degC as its type demands; silent while the electronics have no reading',
+    writers=('mount_driver',),
 )
 
 CURRENT_SETPOINT = Topic(
@@ -90,6 +98,7 @@ CURRENT_SETPOINT = Topic(
     SAMPLE_RATE,
     'wanted coil current; its stamp is that of the displacement sample that it answers',
     (Scalar('coil_current', 'A'),),
+    writers=('mount_control', 'mount_init'),
 )
 
 AIR_GAP = Topic(
@@ -106,6 +115,7 @@ AIR_GAP = Topic(
         Scalar('contact_force', 'N'),
         Scalar('offset_current', 'A'),
     ),
+    writers=('mount_init',),
 )
 
 CURRENT_FORCE_TABLE = Topic(
@@ -114,6 +124,7 @@ CURRENT_FORCE_TABLE = Topic(
     Delivery.LATCHED,
     0.0,
     '2 x N, rows `current` (A) and `normal_force` (N); the column label carries the stamp of its air_gap',
+    writers=('mount_init',),
 )
 
 CONTROL_TRACE = Topic(

@@ -234,7 +234,12 @@ def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(pro
     status = next(status for status in operator.said if status.message == 'at work')
     assert (status.name, status.hardware_id) == ('mount_right/probe', 'mount_right')
     figures = {entry.key: entry.value for entry in status.values}
-    assert figures == {'turns': '3', 'state': 'active', 'unmatched': '/mount_right/displacement'}
+    assert figures == {
+        'turns': '3',
+        'state': 'active',
+        'unmatched': '/mount_right/displacement',
+        'other_writer': '',
+    }
 
 
 def test_a_change_of_the_verdict_is_told_at_once_and_no_change_once_a_second(probe, operator):

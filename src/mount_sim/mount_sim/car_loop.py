@@ -4,21 +4,21 @@ import threading
 import time
 from collections.abc import Mapping
 
-from mount_models.sampling import SAMPLE_TIME
 from mount_sim.loop import LOCKSTEP_WAIT, ElectronicsLoop, NoAnswerError
 
 
 class CarLoop:
     """Takes each sample of all mounts, one after the other, before it takes the next of the first."""
 
-    def __init__(self, loops: Mapping[str, ElectronicsLoop], clock_drift: float):
+    def __init__(self, loops: Mapping[str, ElectronicsLoop], clock_drift: float, sample_rate: float):
+        self._sample_rate = sample_rate
         self._loops = list(loops.items())
         self._clock_drift = clock_drift
         self._turn = 0  # lock-step: whose sample comes next
 
     def run_in_real_time(self, ending: threading.Event) -> None:
-        """Sample all mounts at 1 kHz of the electronics' clock, as `ElectronicsLoop` does for one."""
-        period = SAMPLE_TIME / (1.0 + self._clock_drift)
+        """Sample all mounts by the electronics' clock, as `ElectronicsLoop` does for one."""
+        period = 1.0 / self._sample_rate / (1.0 + self._clock_drift)
         begin, taken = time.monotonic(), 0
         while not ending.is_set():
             for _, loop in self._loops:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 
-from mount_models.sampling import SAMPLE_TIME
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.simulated_mount import FARTHEST_DISPLACEMENT, Run
@@ -16,12 +15,12 @@ LATE_SHARE = 0.05  # chosen: of the samples; beyond it the machine is too busy f
 def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
     """Return level and sentence; the figures carry the progress of the run."""
     samples = figures.samples  # goes on while this is written
-    simulated = samples * SAMPLE_TIME
+    simulated = samples / run.sample_rate
     values = {
         'samples': samples,
         'samples_of_run': run.samples,
         'simulated_s': f'{simulated:.3f}',
-        'excitation_start_s': f'{run.excitation_start * SAMPLE_TIME:.3f}',
+        'excitation_start_s': f'{run.excitation_start / run.sample_rate:.3f}',
         'real_time_factor': f'{simulated / figures.wall_time:.4f}' if figures.wall_time > 0.0 else 'nan',
         'answered': figures.answered,
         'overruns': figures.overruns,
@@ -32,7 +31,7 @@ def verdict(figures: LoopFigures, run: Run, *, lockstep: bool) -> Verdict:
         'fatal': bool(figures.failure),
     }
     if figures.failure:
-        values['waiting_stamp'] = round((samples - 1) * SAMPLE_TIME * 1e9)
+        values['waiting_stamp'] = round((samples - 1) / run.sample_rate * 1e9)
         return Verdict(Level.ERROR, figures.failure, values)
     if samples >= run.samples:
         return Verdict(Level.OK, FINISHED, values)

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mount_driver.codec import Status
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
-from mount_sim.electronics.electronics import STATUS_EVERY, ElectronicsParameters
+from mount_sim.electronics.electronics import ElectronicsParameters, status_every
 from mount_sim.plant.simulated_car import CarMount
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
@@ -50,6 +49,7 @@ class ElectronicsLoop:
     ):
         self._mount = mount
         self._can_end = can_end
+        self._status_every = status_every(mount.sample_rate)
         self._electronics = electronics
         self._publish = publish
         self._sent_at = [math.nan] * _REMEMBERED
@@ -64,11 +64,11 @@ class ElectronicsLoop:
         self.last_latency = math.nan
 
     def run_in_real_time(self, ending: threading.Event) -> None:
-        """Sample at 1 kHz of the electronics' clock until `ending` is set, behind the end of the run too.
+        """Sample by the electronics' clock until `ending` is set, behind the end of the run too.
 
         Electronics do not fall silent when a drive is over; if they did, the control would rightly report it.
         """
-        period = SAMPLE_TIME / (1.0 + self._electronics.clock_drift)
+        period = 1.0 / self._mount.sample_rate / (1.0 + self._electronics.clock_drift)
         begin = time.monotonic()
         while not ending.is_set():
             self.step_in_real_time()
@@ -122,7 +122,7 @@ class ElectronicsLoop:
                 self._counted, microseconds, reading, enabled=mount.driver_on, unheard=not mount.enabled
             )
         ]
-        if number % STATUS_EVERY == 0:
+        if number % self._status_every == 0:
             frames.append(self._can_end.status_frame(mount.faults.status(self._status())))
         if mount.faults.present:
             frames = mount.faults.on_bus(frames)
@@ -135,7 +135,7 @@ class ElectronicsLoop:
 
     def _count(self, number: int) -> int:
         """Note sample `number` as the electronics count it; return their clock in us."""
-        faults, microseconds = self._mount.faults, number * SAMPLE_TIME_NS // _NS
+        faults, microseconds = self._mount.faults, number * self._mount.sample_time // _NS
         self._counted = number
         if faults.present:
             self._counted, microseconds = faults.counted(number, microseconds)
@@ -175,9 +175,8 @@ class ElectronicsLoop:
     def _check_patience(self, number: int, patience: float) -> None:
         first = math.isnan(self._answered_first)
         if not first and time.monotonic() - self._asked_at >= patience:
-            raise NoAnswerError(
-                f'sample {number} ({number * SAMPLE_TIME:.3f} s) was not answered within {patience:g} s'
-            )
+            at = number / self._mount.sample_rate
+            raise NoAnswerError(f'sample {number} ({at:.3f} s) was not answered within {patience:g} s')
 
     def _status(self) -> Status:
         failed, self._failed_told = self._failed_told, self._can_end.failed_setpoints

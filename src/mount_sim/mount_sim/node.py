@@ -14,7 +14,6 @@ from std_srvs.srv import SetBool
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
 from mount_models.quantity import ParameterError, flattened
-from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
@@ -83,7 +82,7 @@ class MountSim(SafeLifecycleNode):
             self._prepare_mounts()
         self._loops = {}
         for name, mount in self._mounts.items():
-            can_end = CanEnd(self._open_bus(interface, name))
+            can_end = CanEnd(self._open_bus(interface, name), self._settings.sample_rate)
             self._can_ends.append(can_end)
             self._loops[name] = ElectronicsLoop(
                 mount,
@@ -92,7 +91,7 @@ class MountSim(SafeLifecycleNode):
                 partial(self._publish, name),
             )
         drift = self._settings.electronics.clock_drift
-        self._loop = self._loops.get(_ALONE) or CarLoop(self._loops, drift)
+        self._loop = self._loops.get(_ALONE) or CarLoop(self._loops, drift, self._settings.sample_rate)
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
@@ -172,8 +171,11 @@ class MountSim(SafeLifecycleNode):
     def _simulated(self, faults: Sequence[str]) -> dict[str, SimulatedMount | CarMount]:
         if _ALONE in self._names:
             settings = self._settings
-            present = Faults(faults, settings.seed)
-            return {_ALONE: SimulatedMount(settings.plant, self._excitation, settings.seed, present)}
+            present = Faults(faults, settings.seed, settings.sample_rate)
+            mount = SimulatedMount(
+                settings.plant, self._excitation, settings.seed, present, settings.sample_rate
+            )
+            return {_ALONE: mount}
         return {**SimulatedCar({**self._values, 'faults': faults}, self._excitation).mounts}
 
     def _run(self) -> None:
@@ -208,7 +210,8 @@ class MountSim(SafeLifecycleNode):
         truth = mount.truth
         if not self.lockstep:
             truth['setpoint_latency'] = self._loops[name].last_latency
-        self._instruments[name].publish(self._time_zero + number * SAMPLE_TIME_NS, truth, mount.truth_bytes)
+        stamp = self._time_zero + number * mount.sample_time
+        self._instruments[name].publish(stamp, truth, mount.truth_bytes)
 
 
 def _declare_own(node: SafeLifecycleNode) -> list[str]:

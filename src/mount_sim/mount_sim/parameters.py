@@ -10,6 +10,7 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.hydromount import Hydromount
 from mount_models.quantity import Quantity
+from mount_models.sampling import SAMPLE_RATE, SampleRate
 from mount_models.vehicle import Engine, Vehicle
 from mount_sim.electronics.electronics import ElectronicsParameters
 from mount_sim.electronics.warm_coil import TemperatureCoefficients
@@ -32,6 +33,7 @@ class SimParameters(NamedTuple):
     scenario: str = 'motorway'
     mount: str = 'friction'
     mounts: str = ''
+    sample_rate: SampleRate = SAMPLE_RATE
     seed: Annotated[int, Quantity('1', 'seed of noise and road', 0, 2**31 - 1, 'chosen')] = 1
     timeline: Timeline = Timeline()
     bench: BenchScenario = BenchScenario()

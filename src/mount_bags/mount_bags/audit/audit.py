@@ -28,6 +28,8 @@ from mount_bags.messages.stamps import (
 )
 from mount_bags.messages.time_axis import TimeAxis
 from mount_bags.messages.topic_times import TopicTimes
+from mount_bags.run.session import recorded_sample_rate
+from mount_models.sampling import SAMPLE_RATE
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
@@ -83,9 +85,12 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     and is not there, whichever is more.
     """
     times, told = recording.times(), _told_by_recorder(recording)
-    plausible = {name: _redated(found) for name, found in times.items()}
+    rates = {name: _rate(recording, found) for name, found in times.items()}
+    plausible = {name: _redated(found, rates[name]) for name, found in times.items()}
     audits = {
-        name: _with_told(_audit_topic(plausible, times[name]), recording.missing.get(name, 0), told.get(name))
+        name: _with_told(
+            _audit_topic(plausible, times[name], rates[name]), recording.missing.get(name, 0), told.get(name)
+        )
         for name in recording
     }
     mounts = [name for name, found in times.items() if _own_topic(found) is DISPLACEMENT and len(found)]
@@ -93,7 +98,8 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
         reports, axis = node_reports(recording), recording.time_axis
         for namespace in (name.removesuffix(DISPLACEMENT.name) for name in mounts):
             answers = _answers(plausible, namespace, _inactive(reports, namespace, axis))
-            _add_samples(audits, namespace, _lost_samples(plausible, audits, namespace), answers)
+            lost = _lost_samples(plausible, audits, namespace, rates[namespace + DISPLACEMENT.name])
+            _add_samples(audits, namespace, lost, answers)
             _add_lost_steps(audits, namespace, _lost_steps(recording, plausible, namespace, answers))
     return audits
 
@@ -130,14 +136,21 @@ def _with_told(entry: TopicAudit, missing: int, told: int | None) -> TopicAudit:
     return replace(entry, expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
 
 
-def _redated(found: TopicTimes) -> TopicTimes:
+def _rate(recording: Recording, found: TopicTimes) -> float:
+    """Return the rate (Hz) that a topic should have by registry and session, 0 where they tell none."""
     topic = _own_topic(found)
-    if found.stamps is None or topic is None or not topic.rate:
+    if topic is None or topic.rate != SAMPLE_RATE:
+        return topic.rate if topic is not None else 0.0
+    return recorded_sample_rate(recording, found.topic.removesuffix(topic.name))
+
+
+def _redated(found: TopicTimes, rate: float) -> TopicTimes:
+    if found.stamps is None or not rate:
         return found
-    return replace(found, stamps=redated(found.stamps, misdated(found.stamps), topic.rate))
+    return replace(found, stamps=redated(found.stamps, misdated(found.stamps), rate))
 
 
-def _audit_topic(times: AllTimes, as_told: TopicTimes) -> TopicAudit:
+def _audit_topic(times: AllTimes, as_told: TopicTimes, own_rate: float) -> TopicAudit:
     name = as_told.topic
     found = times[name]
     present = len(found)
@@ -149,7 +162,7 @@ def _audit_topic(times: AllTimes, as_told: TopicTimes) -> TopicAudit:
         return TopicAudit(None, present, None, remark=f'{word}: only counted')
     if found.stamps is None:
         return TopicAudit(None, present, None, remark=f'{found.obstacle}: only counted')
-    rate = topic.rate if topic is not None else regular_rate(found.stamps)
+    rate = own_rate if topic is not None else regular_rate(found.stamps)
     if rate is None:
         return TopicAudit(None, present, None, remark='stamps without a regular rate: only counted')
     entry = _with_misdated(_from_stamps(found.stamps, topic, rate), as_told.stamps)
@@ -204,10 +217,12 @@ def _has_samples(times: AllTimes, namespace: str) -> bool:
     return bool(_stamps_of(times, namespace + DISPLACEMENT.name).size)
 
 
-def _lost_samples(times: AllTimes, audits: Mapping[str, TopicAudit], namespace: str) -> int:
+def _lost_samples(
+    times: AllTimes, audits: Mapping[str, TopicAudit], namespace: str, sample_rate: float
+) -> int:
     """Return how many samples of a mount lack displacement or ripple, or more if others say so."""
     measured = [namespace + topic.name for topic in (DISPLACEMENT, COIL_RIPPLE)]
-    found = missing_samples([_stamps_of(times, name) for name in measured], DISPLACEMENT.rate)
+    found = missing_samples([_stamps_of(times, name) for name in measured], sample_rate)
     return max(found, *(audits[name].lost or 0 for name in measured if name in audits))
 
 

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Series, SeriesError, Times, registered_topic
 from mount_bags.messages.time_axis import TimeAxis
+from mount_bags.run.session import recorded_sample_rate
+from mount_models.sampling import SAMPLE_RATE
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
 Places = NDArray[np.int64]
@@ -27,9 +29,11 @@ class Counter:
     Steps are rounded one by one, so that a clock that runs fast or slow does not add up.
     """
 
-    def __init__(self, anchor: Series):
+    def __init__(self, anchor: Series, sample_rate: float = SAMPLE_RATE):
+        """`sample_rate` (Hz) is that of the recording."""
         self.stamps = np.unique(anchor.stamps)
-        self.period = _period(anchor, self.stamps)
+        self.sample_rate = sample_rate
+        self.period = _period(anchor, self.stamps, sample_rate)
         self._numbers = _steps(self.stamps, self.period)
 
     @property
@@ -158,18 +162,20 @@ def _mounts(recording: Recording, paired: Collection[str]) -> dict[str, dict[str
 
 def align(a: Recording, b: Recording) -> Alignments:
     """Return how to match the samples of `a` and `b`; raises `ComparisonError`."""
-    axis = a.time_axis
-    return Alignments({mount: _aligned(*pair, axis) for mount, pair in _anchors(a, b).items()})
+    return Alignments({mount: _aligned(a, b, *pair) for mount, pair in _anchors(a, b).items()})
 
 
-def _aligned(first: Series, second: Series, axis: TimeAxis) -> Alignment:
-    of_a, of_b = Counter(first), Counter(second)
+def _aligned(a: Recording, b: Recording, first: Series, second: Series) -> Alignment:
+    of_a, of_b = (
+        Counter(series, recorded_sample_rate(recording, _namespace(series)))
+        for recording, series in ((a, first), (b, second))
+    )
     return Alignment(
         same_stamps=_share(of_a.stamps, of_b.stamps) >= _SAME_CLOCK,
         anchor=first.topic.lstrip('/'),
         a=of_a,
         b=of_b,
-        axis=axis,
+        axis=a.time_axis,
     )
 
 
@@ -177,7 +183,7 @@ def samples_of(series: Series, alignment: Alignment, counter: Counter) -> Sample
     """Return the samples of a stamped topic; `counter` is that of its recording."""
     order = np.argsort(series.stamps, kind='stable')
     stamps = series.stamps[order]
-    period = _period(series, stamps)
+    period = _period(series, stamps, counter.sample_rate)
     if alignment.same_stamps:
         return Samples(stamps, order, period, max(1, round(1e9 * period)))
     return Samples(counter.numbers(stamps, period), order, period, 1)
@@ -241,9 +247,13 @@ def _steps(stamps: Times, period: float) -> Times:
     return np.cumsum(np.rint(np.diff(stamps, prepend=stamps[0]) / (1e9 * period)).astype(np.int64))
 
 
-def _period(series: Series, stamps: Times) -> float:
+def _namespace(series: Series) -> str:
+    return f'/{mount_of(series.topic, series.registered)}'
+
+
+def _period(series: Series, stamps: Times, sample_rate: float) -> float:
     if series.registered is not None and series.registered.rate:
-        return 1.0 / series.registered.rate
+        return 1.0 / series.registered.rate_at(sample_rate)
     steps = np.diff(stamps)
     steps = steps[steps > 0]
     return float(np.median(steps)) / 1e9 if len(steps) else 1.0

@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable
 
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from mount_ros.data_path import io_node
@@ -33,7 +34,7 @@ class Collector:
 
     The thread is its own, or (`thread`) the one that also serves the publishers: two that take turns in one
     process cost more than the work. Only that one can `attend` to other work too. `on_failure` takes the
-    sentence on the exception that has ended a thread of its own.
+    sentence on the exception that has ended a thread of its own, which looks each `period` s.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class Collector:
         owner: Node,
         *,
         thread: DataThread | None = None,
+        period: float = _PERIOD,
         on_failure: Callable[[str], None] = lambda sentence: None,
     ):
         self.node = io_node(owner)
@@ -48,6 +50,7 @@ class Collector:
         """Messages whose receiver raised an exception; `refusal` says what the last one was."""
         self.refusal = ''
         self._shared_thread = thread
+        self._period = period
         self._on_failure = on_failure
         self._failure = ''
         self._taken_at = 0.0
@@ -62,10 +65,10 @@ class Collector:
         """Why the thread that takes the messages has ended by itself; empty while it serves."""
         return self._failure if self._shared_thread is None else self._shared_thread.failure
 
-    def collect(self, topic: Topic, receive: Receive) -> Subscription:
-        """Hand every message of `topic` to `receive`."""
+    def collect(self, topic: Topic, receive: Receive, qos: QoSProfile | None = None) -> Subscription:
+        """Hand every message of `topic` to `receive`; with another `qos`, those that it brings."""
         subscription = self.node.create_subscription(
-            message_class(topic.type), topic.name, _never_called, recording_qos(topic), raw=True
+            message_class(topic.type), topic.name, _never_called, qos or recording_qos(topic), raw=True
         )
         self._receivers.append((subscription, raw_taker(subscription), receive))
         return subscription
@@ -109,7 +112,7 @@ class Collector:
 
     def _serve(self) -> None:
         try:
-            while not self._ending.wait(_PERIOD):
+            while not self._ending.wait(self._period):
                 self._take_batch()
             self._take_batch()
         except BaseException as error:

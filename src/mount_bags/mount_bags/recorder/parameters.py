@@ -7,14 +7,16 @@ from mount_bags.events.automatic_marks import MarkKind
 from mount_bags.recorder.snapshot import AFTER, MEMORY
 from mount_bags.recorder.space import RESERVE
 from mount_models.quantity import Quantity
+from mount_models.sampling import SAMPLE_RATE, SampleRate
 
 _PETABYTE = 10**15
 _ALL_KINDS = ', '.join(kind.value for kind in MarkKind)
 
 
 class RecorderParameters(NamedTuple):
-    """How a recording is divided, what sets it off, and when it ends."""
+    """How often samples come, how a recording is divided, what sets it off, and when it ends."""
 
+    sample_rate: SampleRate = SAMPLE_RATE
     on_full: Annotated[
         str, Quantity('word', 'what a full disk means for the run: stop (an error) or continue')
     ] = 'stop'

@@ -14,6 +14,7 @@ from mount_bags.events.automatic_marks import (
     SwitchOnWatch,
 )
 from mount_bags.recorder.recorder import Observe, Recorder
+from mount_models.sampling import SAMPLE_RATE
 from mount_ros.messages.scalars import ScalarsReader, stamp_of
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DIAGNOSTICS, Delivery, Topic
 
@@ -22,15 +23,22 @@ PresentTime = Callable[[], int]
 
 
 def watch_topic(
-    recorder: Recorder, topic: Topic, name: str, marks: AutomaticMarks, namespace: str, now: PresentTime
+    recorder: Recorder,
+    topic: Topic,
+    name: str,
+    marks: AutomaticMarks,
+    namespace: str,
+    now: PresentTime,
+    sample_rate: float = SAMPLE_RATE,
 ) -> None:
-    """Let `recorder` look at what it receives on `topic`, whose full name is `name`."""
+    """Let `recorder` look at what it receives on `topic`, whose full name is `name`; the rate is in Hz."""
     if topic is DIAGNOSTICS:
         recorder.observe(name, _fault_observer(FaultWatch(marks, namespace), now))
     # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
     elif topic.delivery is Delivery.STREAM and topic is not CURRENT_SETPOINT:
         kind = MarkKind.UNANSWERED if topic is CONTROL_TRACE else MarkKind.LOST_SAMPLE
-        samples = LostSampleWatch(marks, name, recorder.watch(name, topic.rate, stamp_of), kind)
+        watch = recorder.watch(name, topic.rate_at(sample_rate), stamp_of)
+        samples = LostSampleWatch(marks, name, watch, kind)
         switching = SwitchOnWatch(marks) if topic is CONTROL_TRACE else None
         recorder.observe(name, _stream_observer(samples, switching))
 

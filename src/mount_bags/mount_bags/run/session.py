@@ -9,10 +9,11 @@ from typing import Any
 
 import yaml
 
-from mount_bags.bag.recording import Recording
-from mount_bags.messages.series import registered_topic
+from mount_bags.bag.recording import ReadingError, Recording
+from mount_bags.messages.series import SeriesError, registered_topic
 from mount_bags.run.versions import versions
 from mount_models.plain_yaml import YamlError, plain_yaml
+from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE, SAMPLE_RATE
 from mount_ros.topics import SESSION
 
 
@@ -64,6 +65,15 @@ def session_parameters(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     return {str(node): values for node, values in nodes if isinstance(values, dict)}
 
 
+def session_sample_rate(content: Mapping[str, Any]) -> float:
+    """Return the sample rate (Hz) that the nodes of a session had; where it tells none, the default."""
+    for values in session_parameters(content).values():
+        rate = values.get('sample_rate')
+        if isinstance(rate, (int, float)) and LOWEST_SAMPLE_RATE <= rate <= HIGHEST_SAMPLE_RATE:
+            return float(rate)
+    return SAMPLE_RATE
+
+
 def session_values(text: str) -> dict[str, Any]:
     """Return {name: value} of a session text; parameters are named as `--set` names them."""
     try:
@@ -86,6 +96,16 @@ def recorded_session(recording: Recording) -> str:
     found = recorded_sessions(recording)
     only = next(iter(found.values())) if len(found) == 1 else ''
     return found.get(f'/{SESSION.name}', only)
+
+
+def recorded_sample_rate(recording: Recording, namespace: str = '/') -> float:
+    """Return the sample rate (Hz) of the mount in `namespace`; where no session tells it, the default."""
+    try:
+        found = recorded_sessions(recording)
+        text = found.get(f'{namespace}{SESSION.name}') or recorded_session(recording)
+        return session_sample_rate(session_content(text))
+    except (SessionError, ReadingError, SeriesError):
+        return SAMPLE_RATE
 
 
 def _flat(content: Any, prefix: str = '') -> dict[str, Any]:

@@ -40,11 +40,13 @@ class Activation:
 
     def __init__(self, graph: Graph):
         self._graph = graph
+        self._noted: dict[str, tuple[int, int]] = {}  # node -> place in the notes, and how often
 
     def activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
         """Activate a node; one that refuses is asked as often as the graph declares.
 
-        If the machine was late, the refusal tells nothing of the mount: it is asked again for a minute.
+        If the machine was late, the refusal tells nothing of the mount: it is asked again for a minute. Nor
+        does it where the driver refuses all setpoints until it is activated anew: that is done first.
         """
         begin, asked = time.monotonic(), 0
         while True:
@@ -54,23 +56,48 @@ class Activation:
                 self._graph.verdicts.note_active(node)
                 return
             except GraphError as error:
-                asked += not self._was_late(node, before)
+                late = self._was_late(node, before)
+                asked += not (late or self._needs_initialisation(node))
                 if asked >= node.activations or time.monotonic() - begin > _LATE_PATIENCE:
                     raise
                 self._tell_again(node, error, before, say)
+                self._renew_driver(node, say)
 
     def _was_late(self, node: GraphNode, before: Pace) -> bool:
         """Return whether this machine has been too late since `before`, by fresh figures."""
         self._graph.serve_for(FRESH_DIAGNOSTICS)
         return self._pace(node.mount).was_late_since(before)
 
+    def _needs_initialisation(self, node: GraphNode) -> bool:
+        """Return whether the driver of this node is off until driver and initialisation begin anew."""
+        told = self._graph.figures(self._driver(node.mount)).get('needs_initialisation')
+        return not node.is_a(DRIVER) and told == 'True'
+
+    def _renew_driver(self, node: GraphNode, say: Callable[[str], None]) -> None:
+        if not self._needs_initialisation(node):
+            return
+        driver = self._driver(node.mount)
+        self._note_again(driver, self._graph.figures(driver).get('sentence', ''))
+        say(f'activating {driver.full_name} again')
+        self._graph.transition(driver, Transition.TRANSITION_DEACTIVATE)
+        self._graph.verdicts.forget(driver)  # what it has told was of the activation before
+        self._graph.transition(driver, Transition.TRANSITION_ACTIVATE)
+        self._graph.verdicts.note_active(driver)
+
     def _tell_again(
         self, node: GraphNode, error: GraphError, before: Pace, say: Callable[[str], None]
     ) -> None:
         was_late = self._pace(node.mount).was_late_since(before)
         reason = ' (this machine was too late for 1 kHz)' if was_late else ''
-        self._graph.notes.append(f'{error}{reason}; it was activated again')
+        self._note_again(node, f'{error}{reason}')
         say(f'activating {node.full_name} again{reason}')
+
+    def _note_again(self, node: GraphNode, why: str) -> None:
+        """Note why a node was activated again: one note for each node, of the last time, with a count."""
+        place, count = self._noted.get(node.full_name, (len(self._graph.notes), 0))
+        self._noted[node.full_name] = place, count + 1
+        times = f', the last of {count + 1} times' if count else ''
+        self._graph.notes[place : place + 1] = [f'{why}; it was activated again{times}']
 
     def activate_all(self, nodes: Sequence[GraphNode], say: Callable[[str], None]) -> None:
         """Activate one node, or those of all mounts at the same time; one that refuses is asked by itself."""
@@ -98,10 +125,12 @@ class Activation:
                 if not self._was_late(node, before[node]) and node.activations == 1:
                     raise error
                 self._tell_again(node, error, before[node], say)
+                self._renew_driver(node, say)
                 self.activate(node, say)
 
     def _pace(self, mount: str) -> Pace:
-        driver = next(
-            (node for node in self._graph.nodes if node.is_a(DRIVER) and node.mount == mount), DRIVER
-        )
-        return pace(self._graph.figures(driver), self._graph.figures(SIM))
+        return pace(self._graph.figures(self._driver(mount)), self._graph.figures(SIM))
+
+    def _driver(self, mount: str) -> GraphNode:
+        drivers = (node for node in self._graph.nodes if node.is_a(DRIVER) and node.mount == mount)
+        return next(drivers, DRIVER)

@@ -34,6 +34,7 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
+from mount_bringup.graph.shared_memory import remove_abandoned
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
 from mount_ros.nodes.diagnostics import Level
@@ -80,6 +81,7 @@ class Bringup:
         self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
     ) -> None:
         """Bring all nodes to life; `session` makes the session text of a mount from its nodes' parameters."""
+        remove_abandoned()
         rclpy.init(
             context=self._context,
             domain_id=self._settings.domain,
@@ -233,6 +235,7 @@ class Bringup:
         """End without a word to the nodes; return a sentence per unclean end."""
         if self._context.ok() and not leave_middleware(self._take_down):
             self.notes.append('the middleware of the supervisor did not come to an end and was left behind')
+        remove_abandoned()
         return []
 
     def _take_down(self) -> None:

@@ -15,6 +15,8 @@ from mount_bringup.graph.nodes import (
     RECORDER,
     RESTART_LIMIT,
     SIM,
+    SIMULATED,
+    VEHICLE,
     GraphNode,
     GraphSettings,
     Grouping,
@@ -23,6 +25,7 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.mounts import settings_of_mount
 from mount_bringup.parameter_file import settings_of_file
+from mount_bringup.sample_rate import NODES, check_sample_rate
 from mount_bringup.settings import OF_EACH, SettingError, checked_settings, defaults_of_nodes
 from mount_control.policy.registry import POLICIES
 from mount_driver.parameters import DriverParameters
@@ -115,10 +118,21 @@ _ANY = (
         choices=('debug', 'info', 'warn', 'error', 'fatal'),
     ),
 )
+
+
+def _sample_rate(nodes: Sequence[GraphNode]) -> LaunchArgument:
+    return LaunchArgument(
+        'sample_rate',
+        'Hz: how often the electronics measure and are answered',
+        tuple(f'{node.name}.sample_rate' for node in nodes),
+    )
+
+
 _PORT = 'UDP port of the simulated CAN bus; empty: one for each ROS domain and namespace'
 
 SIM_ARGUMENTS = (
     *_ANY,
+    _sample_rate(SIMULATED),
     LaunchArgument('scenario', 'what is driven: motorway, bench, sweep, recorded', ('mount_sim.scenario',)),
     LaunchArgument('mount', f'what is between engine and chassis: {", ".join(MOUNTS)}', ('mount_sim.mount',)),
     LaunchArgument(
@@ -131,6 +145,7 @@ SIM_ARGUMENTS = (
 
 VEHICLE_ARGUMENTS = (
     *_ANY,
+    _sample_rate(VEHICLE),
     LaunchArgument('interface', 'interface of python-can', ('mount_driver.interface',), default='socketcan'),
     LaunchArgument('channel', 'channel of the interface', ('mount_driver.channel',), default='can0'),
     LaunchArgument('channels', 'channel of each of several mounts, such as can0,can1'),
@@ -287,6 +302,7 @@ def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
     seated_mount(sim.mount)
     told_faults(sim.faults)
     build_excitation(sim)
+    check_sample_rate(settings, [name for name in NODES if name != SIM.name or name in settings])
     check_control_of_mount(settings)
     chosen_control(settings)
 

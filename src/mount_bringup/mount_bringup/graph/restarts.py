@@ -11,7 +11,7 @@ from enum import Enum
 
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, GraphNode
-from mount_models.sampling import SAMPLE_TIME_NS
+from mount_models.sampling import sample_time_ns
 
 _WINDOW = 60.0  # s, chosen: within which the losses of a node are counted
 
@@ -132,7 +132,8 @@ def table_holds(driver: Mapping[str, str], init: Mapping[str, str]) -> bool:
     """
     try:
         whole = int(driver['restarts']) == 0 == int(driver['gaps'])
-        taken = (int(driver['samples']) + int(driver['lost'])) * SAMPLE_TIME_NS
+        period = sample_time_ns(float(driver['sample_rate']))
+        taken = (int(driver['samples']) + int(driver['lost'])) * period
         since = int(driver['last_stamp']) - int(init['last_stamp'])
     except (KeyError, ValueError):
         return False

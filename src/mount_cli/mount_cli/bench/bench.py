@@ -1,131 +1,103 @@
 """Performance figures as ratios: ours and its alternative in turn, in one run, medians of several."""
 
-import statistics
-import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import cantools
-import numpy as np
-from rclpy.serialization import deserialize_message, serialize_message
 from rich.console import Console
 from rich.table import Table
-from sensor_msgs.msg import JointState
 
-from mount_bags.bag.writer import BagWriter
-from mount_bringup.chosen import chosen_control
-from mount_cli.bench.comparison import Comparison, in_turn
-from mount_cli.bench.storage import ROUNDS as STORAGE_ROUNDS
-from mount_cli.bench.storage import storage_figures
-from mount_control.controller import ControlLaw, Controller
-from mount_control.force_to_current import resample
-from mount_driver.codec import DATABASE_FILE, Measurement, MountCodec
-from mount_models.sampling import SAMPLE_TIME
-from mount_replay.loop.run import run_core
-from mount_replay.replay import ReplayOrder, replay_without_output
-from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.topics import CONTROL_TRACE, TOPICS
+from mount_cli.bench.comparison import Comparison
+from mount_report.json_file import write_json
 
-_ROUNDS = 7
-_REPEATS = 2000
-_DRIVEN = 20.0  # s
-_STAMP = 1_700_000_000_000_000_000
+Figures = Mapping[str, Comparison]
 
 
-def print_bench(console: Console) -> None:
-    """Measure and print all comparisons."""
-    table = Table(title=f'medians of {_ROUNDS} rounds (storage: {STORAGE_ROUNDS}), in turn')
+@dataclass(frozen=True)
+class BenchOrder:
+    """Which groups are measured (empty: all), and how; `seconds` is the length of a run in real time."""
+
+    only: Sequence[str] = ()
+    rounds: int = 5
+    seconds: float = 5.0
+    domain: int = 0
+    priority: int = 0
+    json_file: Path | None = None
+
+
+def print_bench(order: BenchOrder, console: Console) -> None:
+    """Measure and print the comparisons, and write them to a file; an unknown group raises a `ValueError`."""
+    for name in order.only:
+        if name not in GROUPS:
+            raise ValueError(f'{name!r} is no group of bench; known are {", ".join(GROUPS)}')
+    table = Table(title='medians, in turn; ratio: ours over the other')
     for title in ('what', 'ours', 'beside', 'other', 'ratio'):
-        table.add_column(title, justify='left' if title in ('what', 'beside') else 'right', no_wrap=True)
-    with console.status('measuring'):
-        storage = storage_figures()
-        for row in (_packing(), _unpacking(), _coding(), *storage, _control(), _replay(), _closed_loop()):
-            faster = f'{row.other / row.ours:.1f}'
-            table.add_row(row.what, _duration(row.ours), row.other_name, _duration(row.other), faster)
+        table.add_column(title, justify='left' if title in ('what', 'beside') else 'right')
+    found: dict[str, Comparison] = {}
+    with console.status('measuring') as status:
+        for name, measure in GROUPS.items():
+            if not order.only or name in order.only:
+                status.update(f'measuring: {name}')
+                found.update(measure(order, status.update))
+    for row in found.values():
+        values = _text(row.ours, row.unit), row.other_name, _text(row.other, row.unit), f'{row.ratio:.3g}'
+        table.add_row(row.what, *values)
     console.print(table)
-    for figure in storage:
-        console.print(f'{figure.what}: {figure.per_second:,.0f} messages/s', soft_wrap=True)
+    if order.json_file is not None:
+        write_json({name: row.figures for name, row in found.items()}, order.json_file)
 
 
-def _packing() -> Comparison:
-    layout, numbers = ScalarsLayout(CONTROL_TRACE), tuple(float(n) for n in range(len(CONTROL_TRACE.names)))
+def _calls(order: BenchOrder, say: Callable[[str], None]) -> Figures:
+    from mount_cli.bench import in_process
 
-    def general() -> bytes:
-        return serialize_message(JointState(name=list(CONTROL_TRACE.names), position=list(numbers)))
-
-    ours, other = in_turn(lambda: layout.pack(_STAMP, numbers), general, _ROUNDS, _REPEATS)
-    return Comparison('pack a control_trace', ours, 'rclpy message', other)
-
-
-def _unpacking() -> Comparison:
-    layout = ScalarsLayout(CONTROL_TRACE)
-    raw = layout.pack(_STAMP, tuple(float(n) for n in range(len(CONTROL_TRACE.names))))
-    ours, other = in_turn(
-        lambda: layout.unpack(raw), lambda: deserialize_message(raw, JointState), _ROUNDS, _REPEATS
-    )
-    return Comparison('unpack a control_trace', ours, 'rclpy message', other)
+    return {
+        'pack': in_process.packing(),
+        'unpack': in_process.unpacking(),
+        'decode': in_process.coding(),
+        'control': in_process.control(),
+        'core': in_process.closed_loop(),
+        'replay': in_process.replay(),
+    }
 
 
-def _coding() -> Comparison:
-    codec = MountCodec()
-    database = cantools.database.load_file(DATABASE_FILE)
-    assert isinstance(database, cantools.database.can.Database)
-    message = database.get_message_by_name('MountMeasurement')
-    frame = codec.encode_measurement(Measurement(7, 7000, 1e-4, 0.2, 300.0, 110.0), 7)
-    ours, other = in_turn(
-        lambda: codec.decode_measurement(frame), lambda: message.decode(frame), _ROUNDS, _REPEATS
-    )
-    return Comparison('decode one CAN frame with CRC', ours, 'cantools, no CRC', other)
+def _storage(order: BenchOrder, say: Callable[[str], None]) -> Figures:
+    from mount_cli.bench.storage import storage_figures
+
+    return dict(zip(('write', 'load'), storage_figures(), strict=False))  # one without `rosbags`
 
 
-def _control() -> Comparison:
-    table = resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
-    controller = Controller(ControlLaw(chosen_control({}), table))
-    displacement = 1e-3 * np.sin(2.0 * np.pi * 8.0 * np.arange(60_000) * SAMPLE_TIME)
-    ours = _median_time(lambda: controller.run(displacement)) / len(displacement)
-    return Comparison('one control step', ours, 'real time', SAMPLE_TIME)
+def _graph(order: BenchOrder, say: Callable[[str], None]) -> Figures:
+    from mount_cli.bench.chain_runs import Place
+    from mount_cli.bench.in_real_time import graph_figures
+
+    return graph_figures(Place(order.domain, order.priority), order.seconds, order.rounds, say)
 
 
-def _closed_loop() -> Comparison:
-    """A whole run: initialisation, excitation, every message packed but not stored."""
-    order = {'mount_sim': {'scenario': 'bench', 'timeline.duration': _DRIVEN}}
+def _fast(order: BenchOrder, say: Callable[[str], None]) -> Figures:
+    from mount_cli.bench.chain_runs import Place
+    from mount_cli.bench.in_real_time import fast_figures
 
-    def run() -> int:
-        return run_core(order, lambda *_: None, write_columns=lambda *_: None).samples
-
-    samples = run()
-    return Comparison('one sample, plant and control', _median_time(run) / samples, 'real time', SAMPLE_TIME)
+    return fast_figures(Place(order.domain, order.priority), order.seconds, order.rounds, say)
 
 
-def _replay() -> Comparison:
-    """A recorded drive: from the messages of displacement in memory to the last setpoint."""
-    order = {'mount_sim': {'scenario': 'bench', 'timeline.duration': _DRIVEN}}
-    with tempfile.TemporaryDirectory() as folder:
-        recording = Path(folder) / 'recording'
-        writer = BagWriter(recording)
-        names = {topic.name: f'/{topic.name.lstrip("/")}' for topic in TOPICS}
-        for topic in TOPICS:
-            writer.add_topic(names[topic.name], topic.type)
-        run_core(order, lambda topic, raw, stamp: writer.write(names[topic.name], raw, stamp))
-        writer.close()
-        times = []
-        for _ in range(_ROUNDS):
-            outcome = replay_without_output(ReplayOrder(recording))
-            assert outcome.agreement is not None
-            assert outcome.agreement.equal
-            times.append(outcome.computing_time / sum(len(run.stamps) for run in outcome.replayed.runs))
-    return Comparison('replay one sample', statistics.median(times), 'real time', SAMPLE_TIME)
+def _lockstep(order: BenchOrder, say: Callable[[str], None]) -> Figures:
+    from mount_cli.bench.chain_runs import Place
+    from mount_cli.bench.in_real_time import lockstep_figures
+
+    return lockstep_figures(Place(order.domain), order.seconds, order.rounds, say)
 
 
-def _median_time(call: Callable[[], object], rounds: int = _ROUNDS) -> float:
-    times = []
-    for _ in range(rounds):
-        begin = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - begin)
-    return statistics.median(times)
+GROUPS: dict[str, Callable[[BenchOrder, Callable[[str], None]], Figures]] = {
+    'calls': _calls,
+    'storage': _storage,
+    'lockstep': _lockstep,
+    'graph': _graph,
+    'rate': _fast,
+}
+"""What can be measured alone."""
 
 
-def _duration(seconds: float) -> str:
-    return f'{1e6 * seconds:.2f} µs'
+def _text(value: float, unit: str) -> str:
+    if unit == 's':
+        return f'{1e6 * value:.2f} µs' if value < 0.1 else f'{value:.2f} s'
+    return f'{value:.4g}' if unit == '1' else f'{value:.4g} {unit}'

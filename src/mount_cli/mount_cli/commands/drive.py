@@ -79,6 +79,10 @@ def drive(
     duration: Annotated[
         float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
     ] = None,
+    sample_rate: Annotated[
+        float | None,
+        typer.Option(help='Hz: how often the electronics measure; default: 1000'),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help='seed of noise and road')] = None,
     settings: Annotated[
         list[str] | None,
@@ -110,6 +114,7 @@ def drive(
     """Drive the simulated car through the whole graph, record it and print what happened."""
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.mount_choice import with_control_of_mount
+    from mount_bringup.sample_rate import with_sample_rate
     from mount_bringup.settings import SettingError, checked_settings, settings_of_options
     from mount_cli.screen import TerminalScreen
     from mount_replay.drive.drive import DriveOrder, record_drive, recorder_parameters
@@ -151,7 +156,7 @@ def drive(
         recorder['on_full'] = on_full
     if recorder:
         parameters.setdefault('mount_recorder', {}).update(recorder)
-    parameters = with_control_of_mount(checked_settings(parameters))
+    parameters = with_control_of_mount(with_sample_rate(checked_settings(parameters), sample_rate))
     if core and parameters.get('mount_recorder', {}).get('snapshot'):
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'

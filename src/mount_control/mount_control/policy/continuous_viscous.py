@@ -17,11 +17,13 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_control import band_pass, idle_line
+from mount_control.delay import LOOP_DELAY, delay_at
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.elementary import sine_and_cosine
+from mount_models.arithmetic.elementary import expm1, log, sine_and_cosine
 from mount_models.arithmetic.record import record_type
 from mount_models.quantity import ParameterError, Quantity
+from mount_models.sampling import SAMPLE_TIME
 
 _REVERSAL_SLOPE = 2.0
 """So many times as steeply as the damper the force may rise where the whole velocity reverses (chosen)."""
@@ -44,10 +46,17 @@ class Parameters(NamedTuple):
     ] = 0.5
     lead_time: Annotated[
         float,
-        Quantity('s', 'time from a sample to the middle of the effect of its setpoint', 0.0, 0.01, 'derived'),
-    ] = 0.0019
+        Quantity(
+            's',
+            'from a sample to the middle of the effect of its setpoint, at 1 kHz',
+            0.0,
+            0.01,
+            'derived',
+        ),
+    ] = LOOP_DELAY
     position_gain: Annotated[
-        float, Quantity('1', 'alpha of the tracker; large: less delay, more noise', 0.1, 0.95, 'chosen')
+        float,
+        Quantity('1', 'alpha of the tracker at 1 kHz; large: quick, noisy', 0.1, 0.95, 'chosen'),
     ] = 0.7
     damping_coefficient: Annotated[
         float, Quantity('N s/m', 'c: force over velocity, opened fully', 1.0, 1e4, 'chosen')
@@ -116,16 +125,17 @@ def design(parameters: Parameters, sample_time: float) -> Design:
     """Return the law; raises `ParameterError` for amplitudes in the wrong order or too long a lead."""
     _check(parameters)
     w0 = 2.0 * math.pi * parameters.eigenfrequency
-    alpha = parameters.position_gain
+    alpha = _alpha(parameters.position_gain, sample_time)
+    lead_time = delay_at(parameters.lead_time, sample_time)
     beta = 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
     return Design(
         Law(
             band=band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, sample_time),
-            line=idle_line.design(parameters.lead_time, sample_time),
+            line=idle_line.design(lead_time, sample_time),
             sample_time=sample_time,
             alpha=alpha,
             beta_rate=beta / sample_time,
-            band_share=_band_share(parameters, alpha, beta, sample_time),
+            band_share=_band_share(parameters.eigenfrequency, lead_time, alpha, beta, sample_time),
             w0=w0,
             damping=parameters.damping_coefficient,
             rounding=parameters.rounding_velocity,
@@ -158,7 +168,19 @@ def _check(parameters: Parameters) -> None:
         )
 
 
-def _band_share(parameters: Parameters, alpha: float, beta: float, sample_time: float) -> float:
+def _alpha(position_gain: float, sample_time: float) -> float:
+    """Return the tracker's alpha that keeps its two equal poles, given at 1 kHz, where they are in time.
+
+    They lie at z = sqrt(1 - alpha), so the powers of 1 - alpha count the samples.
+    """
+    if sample_time == SAMPLE_TIME:
+        return position_gain
+    return -expm1(log(1.0 - position_gain) * (sample_time / SAMPLE_TIME))
+
+
+def _band_share(
+    eigenfrequency: float, lead_time: float, alpha: float, beta: float, sample_time: float
+) -> float:
     """Return T w0^2 (1/s).
 
     The tracker's velocity is V = (beta/Ts) z (z - 1) / (z^2 + (alpha + beta - 2) z + 1 - alpha) of the
@@ -166,7 +188,7 @@ def _band_share(parameters: Parameters, alpha: float, beta: float, sample_time: 
     so T w0^2 = Re V + Im V tan(lead).
     """
     # in real numbers: how products of complex ones are rounded differs between processors
-    sine, cosine = sine_and_cosine(parameters.eigenfrequency * sample_time)
+    sine, cosine = sine_and_cosine(eigenfrequency * sample_time)
     square_real, square_imaginary = cosine * cosine - sine * sine, 2.0 * cosine * sine
     rate = beta / sample_time
     above_real, above_imaginary = rate * (square_real - cosine), rate * (square_imaginary - sine)
@@ -176,7 +198,7 @@ def _band_share(parameters: Parameters, alpha: float, beta: float, sample_time: 
     scale = 1.0 / (below_real * below_real + below_imaginary * below_imaginary)
     real = (above_real * below_real + above_imaginary * below_imaginary) * scale
     imaginary = (above_imaginary * below_real - above_real * below_imaginary) * scale
-    lead_sine, lead_cosine = sine_and_cosine(parameters.eigenfrequency * parameters.lead_time)
+    lead_sine, lead_cosine = sine_and_cosine(eigenfrequency * lead_time)
     return real + imaginary * lead_sine / lead_cosine
 
 

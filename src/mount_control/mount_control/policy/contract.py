@@ -19,7 +19,8 @@ The names that each policy's module has:
     that `step` returns. Those in m or m/s are 0 at the first sample after `start` at its displacement:
     so a replay finds where the controller began.
 `design(parameters, sample_time) -> Design`
-    Plain Python; raises a `ValueError` with value, limit and remedy for what cannot work together.
+    Plain Python; what it makes has the same time constants at every `sample_time` (s). Raises a
+    `ValueError` with value, limit and remedy for what cannot work together.
 
 and compiled, with the records of `Law` and `STATE`:
 
@@ -35,9 +36,10 @@ What a report says about a policy beyond that, each may be left out:
 
 `levels(parameters) -> {label: m}`
     Displacements at which something changes, drawn as lines in pictures.
-`wanted_force(parameters, velocity) -> force`
-    The friction force (N, (n,)) that would be ideal at the true velocity of the mount (m/s, (n,) at 1 kHz),
-    without any delay. Without it a report takes `desired_force` of the trace, when it acts.
+`wanted_force(parameters, velocity, sample_time) -> force`
+    The friction force (N, (n,)) that would be ideal at the true velocity of the mount (m/s, (n,), samples
+    `sample_time` s apart), without any delay. Without it a report takes `desired_force` of the trace,
+    when it acts.
 """
 
 from collections.abc import Callable, Mapping

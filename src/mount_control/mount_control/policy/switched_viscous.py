@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control import band_pass, switching
+from mount_control.delay import LOOP_DELAY, delay_at
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
@@ -39,13 +40,13 @@ class Parameters(NamedTuple):
         float,
         Quantity(
             's',
-            'time from a sample to the middle of the effect of its setpoint: 1 ms until the electronics '
-            'take it over, 0.5 ms half its hold, 0.4 ms current loop of 400 Hz',
+            'time from a sample to the middle of the effect of its setpoint at 1 kHz: 1 ms until the '
+            'electronics take it over, 0.5 ms half its hold, 0.4 ms current loop of 400 Hz',
             0.0,
             0.015,
             'derived',
         ),
-    ] = 0.0019
+    ] = LOOP_DELAY
     switch_on_level: Annotated[
         float, Quantity('m', 'magnitude above which damping is switched on', 1e-5, 0.01, 'paper, section 6')
     ] = 0.0008
@@ -54,10 +55,9 @@ class Parameters(NamedTuple):
     ] = 0.00035
     damper: str = DEFAULT_DAMPER
 
-    @property
-    def period_samples(self) -> int:
-        """Samples in one period of the eigenfrequency."""
-        return max(1, round(1.0 / (self.eigenfrequency * SAMPLE_TIME)))
+    def period_samples(self, sample_time: float) -> int:
+        """Return the samples in one period of the eigenfrequency, `sample_time` s apart."""
+        return max(1, round(1.0 / (self.eigenfrequency * sample_time)))
 
 
 def levels(parameters: Parameters) -> dict[str, float]:
@@ -68,9 +68,11 @@ def levels(parameters: Parameters) -> dict[str, float]:
     }
 
 
-def wanted_force(parameters: Parameters, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+def wanted_force(
+    parameters: Parameters, velocity: NDArray[np.float64], sample_time: float = SAMPLE_TIME
+) -> NDArray[np.float64]:
     """Return the force (N) of the characteristic at the true velocity (m/s, (n,)) in the band, undelayed."""
-    band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, SAMPLE_TIME)
+    band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, sample_time)
     return damper_curve(parameters.damper).force(band_pass.filtered(band, velocity))
 
 
@@ -106,8 +108,9 @@ def design(parameters: Parameters, sample_time: float) -> Design:
     Raises `ParameterError`, or `DamperError` for the characteristic.
     """
     _check(parameters)
-    band = band_pass.design(parameters.eigenfrequency, parameters.quality, parameters.lead_time, sample_time)
-    period = parameters.period_samples
+    lead_time = delay_at(parameters.lead_time, sample_time)
+    band = band_pass.design(parameters.eigenfrequency, parameters.quality, lead_time, sample_time)
+    period = parameters.period_samples(sample_time)
     if parameters.switching == 'always':
         levels = switching.Switching(_ANY_MAGNITUDE, _ANY_MAGNITUDE, period)
     else:

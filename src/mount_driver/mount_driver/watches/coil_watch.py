@@ -1,24 +1,25 @@
 """Whether the measured coil current follows the setpoints that were sent: bounds from a model of the loop.
 
-No bus and no clock here: times are ns by the clock that judges ages (`Clock.now`).
+No bus and no clock here: time is counted in samples of the electronics, so neither a late frame nor a driver
+that stood still and then takes many samples at once looks like a coil at fault.
 
-The electronics take a setpoint over at their next sample and their current loop, a first-order lag within
-what the supply allows, follows. Which setpoint they follow at a sample is known only within a window: from
-the longest way of a frame before the sample was taken to now. So two bounds are kept. The upper one rises
-at once to the highest setpoint of the window and falls as the slowest working loop falls; the lower one the
-other way round. A working coil stays between them at any load of the machine, which only widens the window.
+Which setpoint the electronics follow at a sample is known only by their contract (`mount.dbc`): one that
+answers a sample of the last 20 ms, or none. So two bounds are kept. The upper one rises at once to the
+highest of these setpoints and falls as the slowest working loop falls; the lower one mirrors it. 0 A that the
+electronics went to by themselves, or that was sent with `Enable` 0, can stand between any two of them: the
+lower bound is 0 A for a while behind either, and begins anew behind a lost sample. It only guards the
+damping; a current that is too high stays in sight at any load of the machine.
 """
 
 import math
 from typing import Annotated, NamedTuple
 
+from mount_driver.codec import Measurement, Setpoint
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
-_WAY = SAMPLE_TIME_NS + 3_000_000  # ns, chosen: to the electronics' next sample, and 3 ms on the bus
-_LATEST = 50_000_000  # ns, chosen: no sample is believed to have waited longer than this
-_REMEMBERED = 64  # chosen: setpoints; more than are sent in `_LATEST` and `_WAY`
-_HOLD = round(1e9 * SETPOINT_TIMEOUT)  # ns: after a longer pause the electronics may have gone to 0 A
+_UNSURE = 0.5  # s, chosen: so long 0 A may be followed late, or once more
+_COUNTER_MASK = 0xFFFF
 
 
 class CoilWatchParameters(NamedTuple):
@@ -44,73 +45,94 @@ class CoilWatchParameters(NamedTuple):
 class CoilWatch:
     """Takes what was sent and what was measured, sample by sample."""
 
-    def __init__(self, parameters: CoilWatchParameters):
+    def __init__(self, parameters: CoilWatchParameters, sample_time: int = SAMPLE_TIME_NS):
+        """`sample_time` in ns."""
+        period = 1e-9 * sample_time
+        # A setpoint in force answers a sample of the hold; one more to take it over, and one to see it.
+        self._followed = round(SETPOINT_TIMEOUT / period) + 2
+        self._unsure = round(_UNSURE / period)  # samples
         self._limit = parameters.limit
-        self._duration = round(1e9 * parameters.duration)
-        self._bandwidth = 2e-9 * math.pi * parameters.bandwidth  # 1/ns
-        self._rise, self._fall = 1e-9 * parameters.rise_rate, 1e-9 * parameters.fall_rate  # A/ns
-        self._sent: list[tuple[float, float]] = [(-math.inf, 0.0)] * _REMEMBERED  # time, current
-        self._newest = 0
-        self._low, self._high = 0.0, HIGHEST_CURRENT  # what ran before is not known
-        self._judged: int | None = None
-        self._deviates_since: int | None = None
+        self._duration = round(parameters.duration / period)  # samples
+        self._period = period
+        closed = 2.0 * math.pi * parameters.bandwidth * period
+        self._share = closed / (1.0 + closed)  # less than the exact 1 - exp(-closed): the bounds are wider
+        self._rise, self._fall = parameters.rise_rate * period, parameters.fall_rate * period  # A
+        # What the setpoints lie between that answer each of the last samples; what ran before is not known.
+        self._lows, self._highs = [0.0] * self._followed, [HIGHEST_CURRENT] * self._followed
+        self._low, self._high = 0.0, HIGHEST_CURRENT
+        self._number = -1  # of the last sample: its counter, unwrapped
+        self._off_sent = False
+        self._sure_from = 0
+        self._deviating = 0  # samples, one behind the other
 
-    def note_sent(self, current: float, now: int) -> None:
-        """Take a setpoint (A; 0 with `Enable` 0) that leaves at `now`; one thread at a time."""
-        newest = (self._newest + 1) % _REMEMBERED
-        self._sent[newest] = now, current
-        self._newest = newest
+    def note_sent(self, setpoint: Setpoint) -> None:
+        """Take a setpoint that leaves; one thread at a time, which need not be that of `judge`."""
+        if not setpoint.enable:
+            self._off_sent = True
+            return
+        newest = self._number  # once: the other thread counts on
+        age = (newest - setpoint.answered_counter) & _COUNTER_MASK
+        if age >= self._followed:
+            return  # nor do the electronics use it
+        place = (newest - age) % self._followed
+        current = setpoint.current
+        if current < self._lows[place]:
+            self._lows[place] = current
+        if current > self._highs[place]:
+            self._highs[place] = current
 
-    def judge(self, current: float, enabled: bool, taken: int, now: int) -> str:
+    def judge(self, sample: Measurement) -> str:
         """Return why the coil is not under control, empty while it is or while that is not certain.
 
-        `current` (A) was measured at `taken` and arrived at `now`; `enabled`: the electronics say that their
-        power stage is on. One that they say to be off must carry no current. A current that is not valid
-        (NaN) is a deviation as soon as one is wanted.
+        Each sample comes once, in order. Electronics that say to be off must carry no current. A current that
+        is not valid (NaN) is a deviation as soon as one is wanted.
         """
-        begin = max(taken, now - _LATEST) - _WAY
-        low, high = self._window(begin) if enabled else (0.0, 0.0)
-        self._follow(low, high, now)
+        lost = self._count(sample.sample_counter)
+        off = sample.setpoint_timeout or not sample.enabled
+        if off or self._off_sent:
+            self._off_sent = False
+            self._sure_from = self._number + self._unsure
+        wanted = max(self._highs)
+        self._follow(0.0 if off else wanted, lost)
+        current = sample.coil_current
         within = self._low - self._limit <= current <= self._high + self._limit  # not so for NaN
-        unwanted = current != current and self._window(begin)[1] == 0.0
-        if within or unwanted:
-            self._deviates_since = None
+        if within or (current != current and wanted == 0.0):
+            self._deviating = 0
             return ''
-        if self._deviates_since is None:
-            self._deviates_since = now
-        if now - self._deviates_since < self._duration:
-            return ''
-        return self._sentence(current, now - self._deviates_since)
+        self._deviating += 1
+        return self._sentence(current) if self._deviating > self._duration else ''
 
-    def _window(self, begin: int) -> tuple[float, float]:
-        """Return the least and the highest setpoint that the electronics can have followed since `begin`."""
-        sent, place = self._sent, self._newest
-        time, low = sent[place]
-        high = low
-        for _ in range(_REMEMBERED - 1):
-            if time <= begin:
-                break
-            place -= 1
-            time, current = sent[place]
-            if current < low:
-                low = current
-            elif current > high:
-                high = current
-        return low, high
+    def _count(self, counter: int) -> int:
+        """Return how many samples were lost; forget what answered the oldest, nothing answers the new yet."""
+        last = self._number
+        self._number = number = last + ((counter - last) & _COUNTER_MASK) if last >= 0 else counter
+        lost = number - last - 1 if last >= 0 else 0
+        for each in range(number - min(lost, self._followed), number + 1):
+            place = each % self._followed
+            self._lows[place], self._highs[place] = math.inf, 0.0
+        return lost
 
-    def _follow(self, low: float, high: float, now: int) -> None:
-        elapsed = 0 if self._judged is None else now - self._judged
-        self._judged = now
-        step = self._bandwidth * elapsed
-        share = step / (1.0 + step)  # less than the exact 1 - exp(-step), which makes the bounds wider
-        risen = self._low + min(share * (low - self._low), self._rise * elapsed)
-        self._low = min(low, risen) if elapsed <= _HOLD else 0.0
-        self._high = max(high, self._high - min(share * (self._high - high), self._fall * elapsed))
+    def _follow(self, high: float, lost: int) -> None:
+        """Move the bounds on by a sample, the lower one from 0 A where samples were `lost`."""
+        gap = self._high - high
+        if gap > 0.0:
+            fall = self._share * gap
+            self._high -= fall if fall < self._fall else self._fall
+        else:
+            self._high = high
+        low = min(self._lows)
+        if low > high or self._number < self._sure_from:
+            self._low = 0.0
+            return
+        before = 0.0 if lost else self._low
+        rise = self._share * (low - before)  # negative where the bound lies above: then it goes there at once
+        self._low = low if rise <= 0.0 else before + (rise if rise < self._rise else self._rise)
 
-    def _sentence(self, current: float, lasted: int) -> str:
+    def _sentence(self, current: float) -> str:
         measured = f'{current:.3f} A' if current == current else 'not valid'
         low, high = max(0.0, self._low - self._limit), self._high + self._limit
+        lasted = 1e3 * self._period * (self._deviating - 1)
         return (
             f'coil current ({measured}) must lie within {low:.3f} .. {high:.3f} A, {self._limit:g} A about '
-            f'its setpoint; it has not for {1e-6 * lasted:.0f} ms: check coil, cable and power stage'
+            f'its setpoint; it has not for {lasted:.0f} ms: check coil, cable and power stage'
         )

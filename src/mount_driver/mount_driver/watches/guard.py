@@ -12,8 +12,10 @@ from mount_driver.link import Link, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.watches.coil_watch import CoilWatch
 from mount_driver.watches.heat_watch import HeatWatch
+from mount_driver.watches.rate_watch import RateWatch
 from mount_driver.watches.sender_watch import SenderWatch
 from mount_driver.watches.status_watch import StatusWatch
+from mount_models.sampling import sample_time_ns
 
 _ALONE = 'take every node but the electronics that sends it off the bus'
 
@@ -34,9 +36,12 @@ class Guard:
     ):
         self.foreign_setpoints = 0
         """Sound setpoint frames of another sender."""
+        self.writer_doubt = ''
+        """Why another node may publish setpoints, so that answers are 0 A; empty where none may."""
         self.heat = heat
         self._link, self._clock = link, clock
-        self._coil = CoilWatch(parameters.coil)
+        self._coil = CoilWatch(parameters.coil, sample_time_ns(parameters.sample_rate))
+        self._rate = RateWatch(parameters.sample_rate)
         self._health = StatusWatch(parameters.status)
         self._samples = SenderWatch(parameters.senders, codec.measurement.name, _ALONE)
         self._statuses = SenderWatch(parameters.senders, codec.status.name, _ALONE)
@@ -58,22 +63,22 @@ class Guard:
         times = (self._foreign_at, self._samples.last, self._statuses.last)
         return max((time for time in times if time is not None), default=None)
 
-    def note_sent(self, setpoint: Setpoint, now: int) -> None:
-        """Take a setpoint that leaves at `now`; one thread at a time."""
+    def note_sent(self, setpoint: Setpoint) -> None:
+        """Take a setpoint that leaves; one thread at a time."""
         self._sent = setpoint.current
-        self._coil.note_sent(setpoint.current, now)
+        self._coil.note_sent(setpoint)
 
     def judge_sample(self, stamped: Stamped, received: int) -> Fault | None:
         """Take a new sample and lower the link's limits as the watches say."""
         (stamp, sample), link, heat = stamped, self._link, self.heat
         now = self._clock.now(received)
-        link.held = self._health.hold(now)
+        link.held = self._health.hold(now) or self.writer_doubt
         heat.take(stamp, sample.coil_current, self._sent)
         link.current_limit = heat.current_limit
         if link.jumps + self._clock.restarts != self._breaks:
             self._breaks = link.jumps + self._clock.restarts
             return Fault(self._restarted(), needs_initialisation=True)
-        sentence = self._coil.judge(sample.coil_current, sample.enabled, self._clock.taken(received), now)
+        sentence = self._rate.judge(sample) or self._coil.judge(sample)
         return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:

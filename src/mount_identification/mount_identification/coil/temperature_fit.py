@@ -15,6 +15,7 @@ import numpy.typing as npt
 from mount_identification.coil.gap_calibration import GapPoint
 from mount_models.actuator.law import ForceLaw, checked_force
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, ScaledPolynomial, evaluate
+from mount_models.coil.resistance import COPPER_COEFFICIENT
 from mount_models.coil.ripple import RippleCoil, duty, skin_factor
 from mount_models.coil.temperature import (
     CONDUCTIVITY_COEFFICIENT,
@@ -26,9 +27,6 @@ FloatArray = npt.NDArray[np.float64]
 
 LOWEST_CELSIUS, HIGHEST_CELSIUS = -40.0, 120.0
 """Range of coil temperatures that is compensated, degC (chosen)."""
-
-COPPER_COEFFICIENT = 0.0039
-"""Relative rise of the resistivity of copper per kelvin at 20 degC, 1/K (a constant of the material)."""
 
 
 def measured_compensation(

@@ -29,6 +29,7 @@ from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_control.diagnosis import fault_sentence
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_RATE
 from mount_replay.drive.preflight import preflight
 from mount_replay.loop.recording import record_car, record_core
 from mount_sim.diagnosis import FINISHED, beyond_range_sentence
@@ -221,5 +222,6 @@ def _grouping(order: DriveOrder) -> Grouping:
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
     told = {node: dict(values) for node, values in parameters.items()}
-    told['mount_control'] = {'policy': DEFAULT, **told.get('mount_control', {})}  # none named: an older one
+    # where these are not named, a recording is an older one
+    told['mount_control'] = {'policy': DEFAULT, 'sample_rate': SAMPLE_RATE, **told.get('mount_control', {})}
     return session_text(new_session({'scenario': order.scenario, 'mode': order.mode, 'parameters': told}))

@@ -4,6 +4,7 @@ from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import Parameters
 from mount_bringup.mount_choice import check_control_of_mount
 from mount_bringup.mounts import mounts_of, settings_of_mounts
+from mount_bringup.sample_rate import check_sample_rate
 from mount_control.settings import check_effect
 from mount_driver.parameters import DriverParameters
 from mount_models.actuator.closing import checked_closing
@@ -13,6 +14,7 @@ from mount_replay.loop.chain import CoreChain
 from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.shaking import steps_of_sample
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
@@ -36,6 +38,8 @@ def _check_mount(parameters: Parameters, excitation: Excitation, *, core: bool) 
     told_faults(sim.faults)
     if core:
         check_without_bus(sim.faults)
+    check_sample_rate(parameters)
+    steps_of_sample(sim.sample_rate, excitation.step_time)
     check_control_of_mount(parameters)
     check_effect(parameters.get('mount_control', {}))
     checked_closing(sim.mechanics, sim.actuator)

@@ -14,7 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from mount_bringup.graph.domain import DomainError, can_port, domain_lock
-from mount_bringup.graph.nodes import CONTROL, DRIVER, SIMULATED
+from mount_bringup.graph.nodes import CONTROL, DRIVER, SIM, SIMULATED
 from mount_replay.faults.observers import Observers, since
 from mount_replay.faults.processes import (
     SHARED_MEMORY,
@@ -114,9 +114,10 @@ class GraphUnderTest:
         return self._log.read_text(errors='replace')
 
     def outputs(self) -> dict[str, str]:
-        """Return {who: what it has printed so far} of the supervisor and the nodes."""
-        logs = {file.stem: file.read_text(errors='replace') for file in self.folder.glob('log/*.log')}
-        return {'supervisor': self.output, **logs}
+        """Return {who: what it has printed}; not of the simulator, which tells what it was asked for."""
+        logs = {file.stem: file for file in self.folder.glob('log/*.log') if file.stem != SIM.name}
+        said = {name: file.read_text(errors='replace') for name, file in logs.items()}
+        return {'supervisor': self.output, **said}
 
     def nodes(self) -> dict[str, Process]:
         """Return {node: process} of those that the command has started and that still run."""

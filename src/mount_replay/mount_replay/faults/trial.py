@@ -4,7 +4,7 @@ import math
 import time
 
 from mount_replay.faults.fault import FaultCase, Reaction
-from mount_replay.faults.graph import GraphUnderTest
+from mount_replay.faults.graph import START_PATIENCE, GraphUnderTest
 from mount_replay.faults.injections import take_through
 from mount_replay.faults.matrix import ACTIVATE, DEACTIVATE
 from mount_replay.faults.observers import Told, since
@@ -43,7 +43,8 @@ def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
 
 def _observe(case: FaultCase, graph: GraphUnderTest, course: Course, output: '_Output') -> None:
     """Wait while the fault lasts, or until the graph has ended where it must."""
-    lasts = _END_PATIENCE if case.ends_drive else case.lasts
+    starts = case.reaction is Reaction.NOT_STARTED
+    lasts = START_PATIENCE if starts else _END_PATIENCE if case.ends_drive else case.lasts
     end = course.begun + lasts
     while time.monotonic() < end and not course.ended:
         time.sleep(_LOOK_PERIOD)

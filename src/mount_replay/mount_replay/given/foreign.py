@@ -1,4 +1,4 @@
-"""A displacement recorded by somebody else: chosen by topic and field, checked, scaled, at 1 kHz."""
+"""A displacement recorded by somebody else: chosen by topic and field, checked, scaled, resampled."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from mount_models.actuator.closing import ClosingMechanics
 from mount_models.arithmetic.averages import mean
 from mount_models.force_table import contact_force, current_force_table, offset_current
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
+from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
 from mount_replay.given.input import (
     Column,
     ControlRun,
@@ -87,7 +87,8 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     """
     notes: list[str] = []
     signals = {name: _signal(path, place, LONGEST_GAP, notes) for name, place in order.fields.items()}
-    stamps, values = _on_one_grid(signals, notes)
+    control = control_parameters(parameters)
+    stamps, values = _on_one_grid(signals, control.sample_rate, notes)
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
         stamps = stamps - stamps[0] + SECOND
     values = order.scale * values
@@ -99,9 +100,10 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     if order.offset == 'mean':
         notes.append('without its mean the rest position is taken as 0; --offset keeps another one')
     displacement = values - offset
-    largest = control_parameters(parameters).displacement_range
+    largest = control.displacement_range
     check_size(
-        'displacement at 1 kHz', displacement, SAMPLE_TIME, largest, 'm',
+        f'displacement at {_rate_text(control.sample_rate)}', displacement,
+        1.0 / control.sample_rate, largest, 'm',
         f'with factor {order.scale:g} to m: is its unit another one (--scale) or its zero (--offset), or is '
         'this sample a fault to cut or repair?',
     )  # fmt: skip
@@ -168,30 +170,36 @@ def _signal(path: Path, place: str, longest_gap: float, notes: list[str]) -> Eve
     return even
 
 
-def _on_one_grid(signals: dict[str, EvenSignal], notes: list[str]) -> tuple[Times, Column]:
-    """Return stamps of 1 kHz and the displacement on them, not scaled."""
+def _on_one_grid(
+    signals: dict[str, EvenSignal], sample_rate: float, notes: list[str]
+) -> tuple[Times, Column]:
+    """Return stamps of `sample_rate` (Hz) and the displacement on them, not scaled."""
+    step, step_ns = 1.0 / sample_rate, sample_time_ns(sample_rate)
     begin = max(even.begin for even in signals.values())
     end = min(even.begin + round(even.length * SECOND) for even in signals.values())
-    count = round((end - begin) / SAMPLE_TIME_NS) + 1
-    if count * SAMPLE_TIME < _SHORTEST:
+    count = round((end - begin) / step_ns) + 1
+    if count * step < _SHORTEST:
         spans = '; '.join(
             f'{even.name}: {even.begin / 1e9:.3f} .. {even.begin / 1e9 + even.length:.3f} s'
             for even in signals.values()
         )
         raise ReplayError(f'no overlap of {_SHORTEST:g} s or more: {spans}')
     columns = {
-        name: resampled(even, SAMPLE_TIME, (begin - even.begin) / SECOND, count)[:]
-        for name, even in signals.items()
+        name: resampled(even, step, (begin - even.begin) / SECOND, count)[:] for name, even in signals.items()
     }
     notes += [
-        f'{even.name}: resampled from {even.rate:.4g} Hz to 1 kHz, band-limited'
+        f'{even.name}: resampled from {even.rate:.4g} Hz to {_rate_text(sample_rate)}, band-limited'
         for even in signals.values()
-        if not has_step(even, SAMPLE_TIME)
+        if not has_step(even, step)
     ]
-    stamps = begin + SAMPLE_TIME_NS * np.arange(count, dtype=np.int64)
+    stamps = begin + step_ns * np.arange(count, dtype=np.int64)
     if _DISPLACEMENT in columns:
         return stamps, columns[_DISPLACEMENT]
     return stamps, columns[_ENGINE] - columns[_CHASSIS]
+
+
+def _rate_text(sample_rate: float) -> str:
+    return f'{sample_rate / 1000.0:g} kHz'
 
 
 def _is_number(text: str) -> bool:

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from mount_bags.bag.recording import Recording
 from mount_bags.messages.series import Payloads
 from mount_bags.run.session import SessionError, recorded_session, session_content, session_parameters
-from mount_bringup.chosen import with_recorded_policy
+from mount_bringup.chosen import control_parameters, with_recorded_policy
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.parameters import ControlParameters
 from mount_control.settings import policy_parameters
-from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
+from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
 from mount_replay.given.parameter_changes import recorded_changes
 from mount_replay.given.ramps import MeasuredGap, Ramp, measured_gaps, ramps_of
 from mount_ros import topics
@@ -42,6 +41,7 @@ _READ = (
 )
 _QUIET_AT_FIRST = ('velocity', 'friction_deflection', 'bridged_samples')  # 0 in the first step of all
 _LENGTHS = ('m', 'm/s')  # units of a policy's own fields that are 0 in its first step
+_TAKEN_AS_BEFORE = ('policy', 'sample_rate')  # what sessions without them were made with is known
 _BREAK = SECOND  # ns: after it the controller takes no table from before
 
 
@@ -121,9 +121,14 @@ class ReplayInput:
         return [part for part in self.parts if isinstance(part, ControlRun)]
 
     @property
+    def sample_time(self) -> float:
+        """Time between two samples in s."""
+        return 1.0 / control_parameters(self.parameters).sample_rate
+
+    @property
     def duration(self) -> float:
         """Length of what is replayed in s: the samples of ramps and runs."""
-        return sum(len(part.stamps) for part in self.parts) * SAMPLE_TIME
+        return sum(len(part.stamps) for part in self.parts) * self.sample_time
 
 
 def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> ReplayInput:
@@ -146,9 +151,10 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
         )
     answers = recorded_answers(recording, parameters['mount_control'], notes)
     ramps = ramps_of(recording, parameters, gaps, notes)
-    samples = _samples_taken(displacement, answers, ramps, gaps, notes)
-    longest_bridge = with_flattened(ControlParameters(), parameters['mount_control']).longest_bridge
-    runs = _split_into_runs(*samples, displacement[0], answers, gaps, longest_bridge, notes)
+    control = control_parameters(parameters)
+    period = sample_time_ns(control.sample_rate)
+    samples = _samples_taken(displacement, answers, ramps, gaps, period, notes)
+    runs = _split_into_runs(*samples, displacement[0], answers, gaps, control, notes)
     if not runs:
         raise ReplayError(
             f'{recording.path}: no overlap of displacement ({_span(displacement[0], notes)}) and the time '
@@ -224,9 +230,13 @@ def _samples_taken(
     answers: RecordedAnswers | None,
     ramps: list[Ramp],
     gaps: list[MeasuredGap],
+    period: int,
     notes: Notes,
 ) -> tuple[Times, Column]:
-    """Return the samples (stamps ns, displacement m) that the controller has taken, in all its runs."""
+    """Return the samples (stamps ns, displacement m) that the controller has taken, in all its runs.
+
+    `period` is the time between two of them, ns.
+    """
     stamps, values = displacement
     after = stamps > gaps[0].stamp
     if answers is None or not _answered_by_control(answers, ramps, gaps).size:
@@ -234,8 +244,8 @@ def _samples_taken(
             notes.append('the controller was not active in this recording: it starts after the air_gap here')
         return stamps[after], values[after]
     answered = _answered_by_control(answers, ramps, gaps)
-    answered = _without_foreign(answered, answers, notes)
-    taken = np.union1d(answered, _taken_without_answer(stamps, answered, answers, notes))
+    answered = _without_foreign(answered, answers, period, notes)
+    taken = np.union1d(answered, _taken_without_answer(stamps, answered, answers, period, notes))
     _note_lost(stamps, taken, notes)
     return _with_values(taken, displacement, answers, notes)
 
@@ -251,7 +261,7 @@ def _answered_by_control(answers: RecordedAnswers, ramps: list[Ramp], gaps: list
     return answered[answered > beginning]
 
 
-def _without_foreign(answered: Times, answers: RecordedAnswers, notes: Notes) -> Times:
+def _without_foreign(answered: Times, answers: RecordedAnswers, period: int, notes: Notes) -> Times:
     """Leave out setpoints that no step of the controller explains: those of a ramp that was given up.
 
     Without a trace the controller only answers 0 A, and a few answers whose trace was not recorded.
@@ -266,7 +276,7 @@ def _without_foreign(answered: Times, answers: RecordedAnswers, notes: Notes) ->
     places = np.searchsorted(answers.trace_stamps, answered[odd])
     bounds = np.concatenate([[-(1 << 62)], answers.trace_stamps, [1 << 62]])
     # nearer is a hole in the traces, not another speaker
-    near = bounds[places + 1] - bounds[places] <= 20 * SAMPLE_TIME_NS
+    near = bounds[places + 1] - bounds[places] <= 20 * period
     foreign = answered[odd][~near]
     if foreign.size:
         span = f'{notes.at(int(foreign[0]))} to {notes.at(int(foreign[-1]))}'
@@ -277,17 +287,19 @@ def _without_foreign(answered: Times, answers: RecordedAnswers, notes: Notes) ->
     return np.setdiff1d(answered, foreign, assume_unique=True)
 
 
-def _taken_without_answer(stamps: Times, answered: Times, answers: RecordedAnswers, notes: Notes) -> Times:
+def _taken_without_answer(
+    stamps: Times, answered: Times, answers: RecordedAnswers, period: int, notes: Notes
+) -> Times:
     """Return the samples whose answers were not recorded although the next step did not bridge them."""
     found: list[Times] = []
     bridged = answers.traces.get('bridged_samples', np.empty(0))
-    for place in np.flatnonzero(np.diff(answered) > 1.5 * SAMPLE_TIME_NS):
+    for place in np.flatnonzero(np.diff(answered) > 1.5 * period):
         before, after = int(answered[place]), int(answered[place + 1])
         step = int(np.searchsorted(answers.trace_stamps, after))
         traced = step < len(answers.trace_stamps) and answers.trace_stamps[step] == after
         if not traced or _starts_afresh(answers, step):
             continue
-        last_taken = after - (bridged[step] + 0.5) * SAMPLE_TIME_NS
+        last_taken = after - (bridged[step] + 0.5) * period
         found.append(stamps[(stamps > before) & (stamps < last_taken)])
     silent = np.concatenate(found) if found else np.empty(0, np.int64)
     if silent.size:
@@ -358,18 +370,19 @@ def _split_into_runs(
     all_stamps: Times,
     answers: RecordedAnswers | None,
     gaps: list[MeasuredGap],
-    longest_bridge: float,
+    control: ControlParameters,
     notes: Notes,
 ) -> list[ControlRun]:
     if not len(stamps):
         return []
-    steps = set((np.flatnonzero(np.diff(stamps) > 1.5 * SAMPLE_TIME_NS) + 1).tolist())
+    period = sample_time_ns(control.sample_rate)
+    steps = set((np.flatnonzero(np.diff(stamps) > 1.5 * period) + 1).tolist())
     if answers is not None:  # in lock-step an activation takes no time
         steps |= set(np.searchsorted(stamps, answers.trace_stamps[_moved_then_afresh(answers)]).tolist())
     begins = [0]
     for place in sorted(steps - {0, len(stamps)}):
         before, after = int(stamps[place - 1]), int(stamps[place])
-        if _was_activated_between(before, after, all_stamps, answers, gaps, longest_bridge):
+        if _was_activated_between(before, after, all_stamps, answers, gaps, control.longest_bridge):
             begins.append(place)
     runs = []
     for begin, end in zip(begins, [*begins[1:], len(stamps)], strict=True):
@@ -437,7 +450,7 @@ def _parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str,
     for node in ('mount_control', 'mount_init'):
         values = recorded.get(node, {})
         found[node] = {name: value for name, value in values.items() if name in known[node]}
-        new = [name for name in known[node] if name not in found[node] and name != 'policy']
+        new = [name for name in known[node] if name not in found[node] and name not in _TAKEN_AS_BEFORE]
         if new and found[node] and len(new) < len(known[node]) // 2:
             notes.append(f'{node}: {", ".join(new)} is not in the session; the default is taken')
     return checked_settings(with_recorded_policy(found) if session else found)

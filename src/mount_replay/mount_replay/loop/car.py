@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from mount_bringup.chosen import Parameters
 from mount_bringup.mounts import settings_of_mounts
 from mount_init.initialisation import OFF
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import Samples
 from mount_replay.loop.run import BLOCK, CoreOutcome, Sink, coil_temperature, stamp_of, take_one
-from mount_sim.electronics.electronics import STATUS_EVERY
+from mount_sim.electronics.electronics import status_every
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.plant.simulated_car import CarMount, SimulatedCar, mount_parameters
@@ -33,7 +32,7 @@ class _Line:
     def take(self) -> None:
         """Take the next sample."""
         mount, chain, stamp = self.mount, self.chain, stamp_of(self.mount)
-        if mount.sample % STATUS_EVERY == 0:
+        if mount.sample % status_every(mount.sample_rate) == 0:
             chain.take_temperature(stamp, self.celsius)
         self.pending = take_one(mount, chain, self.samples, self.pending)
         found = chain.result is not None and not chain.controlled
@@ -47,7 +46,7 @@ class _Line:
         last = self.samples.setpoints[self.samples.count - 1]
         self.sink.write_samples(self.samples)
         if self.chain.controlled and last != OFF:
-            self.sink.write_off(stamp_of(self.mount) - SAMPLE_TIME_NS)
+            self.sink.write_off(stamp_of(self.mount) - self.mount.sample_time)
 
 
 def run_car_into(
@@ -75,7 +74,7 @@ def run_car_into(
     beyond = [line.mount.beyond_range for line in lines if line.mount.beyond_range.samples]
     return CoreOutcome(
         samples=last.sample,
-        excitation_start=last.run.excitation_start * SAMPLE_TIME,
+        excitation_start=last.run.excitation_start * (1.0 / last.sample_rate),
         simulated=last.time,
         wall_time=time.monotonic() - begin,
         result=lines[0].chain.result,

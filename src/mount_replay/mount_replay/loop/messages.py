@@ -9,18 +9,16 @@ from numpy.typing import NDArray
 
 from mount_control.policy.contract import Policy, trace_dtype, trace_fields
 from mount_init.initialisation import OFF, InitialisationResult
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_ros import topics
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import Topic
-from mount_sim.electronics.electronics import STATUS_EVERY
+from mount_sim.electronics.electronics import status_every
 from mount_sim.node import level_imu
 from mount_sim.plant.plant import TRUTH
-
-_STATUS_PERIOD = round(STATUS_EVERY * SAMPLE_TIME * 1e9)  # ns
 
 Write = Callable[[Topic, bytes, int], None]
 """Takes (topic, serialised message, stamp ns)."""
@@ -52,9 +50,16 @@ class Samples:
 class CoreMessages:
     """Packs samples and results and hands them on in the order of the stamps."""
 
-    def __init__(self, write: Write, coil_celsius: float, write_columns: WriteColumns | None = None):
+    def __init__(
+        self,
+        write: Write,
+        coil_celsius: float,
+        write_columns: WriteColumns | None = None,
+        sample_rate: float = SAMPLE_RATE,
+    ):
         """Without `write_columns` every message goes to `write`; `coil_celsius` is what each status says."""
         self._coil_celsius = coil_celsius
+        self._status_period = status_every(sample_rate) * sample_time_ns(sample_rate)
         self._write = write
         self._write_columns = write_columns or self._one_by_one
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
@@ -88,7 +93,7 @@ class CoreMessages:
     def _write_with_temperatures(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
         """Write the columns up to each sample with a status, then the temperature of that, and go on."""
         begin = 0
-        for end in (np.flatnonzero(stamps % _STATUS_PERIOD == 0) + 1).tolist():
+        for end in (np.flatnonzero(stamps % self._status_period == 0) + 1).tolist():
             self._write_columns([(topic, rows[begin:end]) for topic, rows in columns], stamps[begin:end])
             stamp = int(stamps[end - 1])
             self._write(topics.COIL_TEMPERATURE, self._temperature.pack(stamp, self._coil_celsius), stamp)

@@ -8,14 +8,14 @@ from typing import Protocol
 import numpy as np
 
 from mount_bringup.chosen import Parameters
+from mount_bringup.sample_rate import check_sample_rate
 from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
-from mount_sim.electronics.electronics import STATUS_EVERY, Reading
+from mount_sim.electronics.electronics import Reading, status_every
 from mount_sim.electronics.faults.schedule import Faults, check_without_bus
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import build_excitation
@@ -62,7 +62,8 @@ def run_core(
     With `write_columns` those of the samples go there, many at a time. `excitation` is that of the scenario
     where it is built already.
     """
-    messages = CoreMessages(write, coil_temperature(_sim_parameters(parameters)), write_columns)
+    sim = _sim_parameters(parameters)
+    messages = CoreMessages(write, coil_temperature(sim), write_columns, sim.sample_rate)
     return run_core_into(messages, parameters, progress, excitation)
 
 
@@ -73,12 +74,13 @@ def run_core_into(
     excitation: Excitation | None = None,
 ) -> CoreOutcome:
     """Run the scenario in `parameters` to its end and hand samples and result to `messages`."""
+    check_sample_rate(parameters)
     sim = _sim_parameters(parameters)
     check_without_bus(sim.faults)
-    faults = Faults(sim.faults, sim.seed)
-    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, faults)
+    faults = Faults(sim.faults, sim.seed, sim.sample_rate)
+    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, faults, sim.sample_rate)
     chain = CoreChain(parameters)
-    celsius = coil_temperature(sim)
+    celsius, with_status = coil_temperature(sim), status_every(sim.sample_rate)
     samples = Samples(BLOCK, chain.policy)
     pending: float | None = None
     begin = time.monotonic()
@@ -90,19 +92,19 @@ def run_core_into(
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
-        if mount.sample % STATUS_EVERY == 0:
+        if mount.sample % with_status == 0:
             chain.take_temperature(stamp_of(mount), celsius)
         pending = take_one(mount, chain, samples, pending)
         if chain.result is not None and not chain.controlled:
             messages.write_samples(samples)
-            messages.write_result(stamp_of(mount) - SAMPLE_TIME_NS, chain.result)
+            messages.write_result(stamp_of(mount) - mount.sample_time, chain.result)
     setpoint = samples.setpoints[samples.count - 1]
     messages.write_samples(samples)
     if chain.controlled and setpoint != OFF:
-        messages.write_off(stamp_of(mount) - SAMPLE_TIME_NS)  # as mount_control when it is deactivated
+        messages.write_off(stamp_of(mount) - mount.sample_time)  # as mount_control when it is deactivated
     return CoreOutcome(
         samples=mount.sample,
-        excitation_start=mount.run.excitation_start * SAMPLE_TIME,
+        excitation_start=mount.run.excitation_start * (1.0 / sim.sample_rate),
         simulated=mount.time,
         wall_time=time.monotonic() - begin,
         result=chain.result,
@@ -122,7 +124,7 @@ def coil_temperature(sim: SimParameters) -> float:
 
 def stamp_of(mount: SimulatedMount | CarMount) -> int:
     """Return the stamp (ns) of the next sample."""
-    return mount.sample * SAMPLE_TIME_NS
+    return mount.sample * mount.sample_time
 
 
 def take_one(
@@ -165,7 +167,7 @@ def _take_many(
         samples.traces[part],
     )
     if taken:
-        stamps = stamp_of(mount) + SAMPLE_TIME_NS * np.arange(taken)
+        stamps = stamp_of(mount) + mount.sample_time * np.arange(taken)
         part = slice(samples.count, samples.count + taken)
         samples.stamps[part] = stamps
         samples.traced[part] = True

@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from mount_bags.audit.audit import TopicAudit
 from mount_bags.bag.recording import Recording
 from mount_bags.events.switching_changes import Switching, switching_times
+from mount_control.delay import LOOP_DELAY, delay_at
 from mount_control.policy.contract import Policy
-from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.signals import DriveSignals, Seen
 
-ACTS_AFTER = 0.0019
-"""Seconds from a sample to the middle of the effect of its setpoint, see `lead_time` in mount_control."""
 _MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')
+
+
+def acts_after(sample_time: float) -> float:
+    """Return the time (s) from a sample to the middle of the effect of its setpoint."""
+    return delay_at(LOOP_DELAY, sample_time)
 
 
 def samples_at_the_ends(recording: Recording, topics: Mapping[str, TopicAudit], taken: int) -> list[str]:
@@ -70,10 +73,12 @@ def wanted_force(
     force that it asked for, at the time at which its setpoint acts, so an error holds no error of prediction.
     """
     if ideal := getattr(policy, 'wanted_force', None):
-        wanted = ideal(parameters, drive.truth.velocity)
+        wanted = ideal(parameters, drive.truth.velocity, drive.sample_time)
     else:
-        wanted = np.interp(drive.truth.time, drive.seen.time + ACTS_AFTER, drive.seen.desired_force)
+        wanted = np.interp(
+            drive.truth.time, drive.seen.time + acts_after(drive.sample_time), drive.seen.desired_force
+        )
     places = np.clip(
-        np.searchsorted(drive.truth.time, drive.seen.time - 0.5 * SAMPLE_TIME), 0, len(wanted) - 1
+        np.searchsorted(drive.truth.time, drive.seen.time - 0.5 * drive.sample_time), 0, len(wanted) - 1
     )
     return wanted, places

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
+from mount_bags.run.session import recorded_sample_rate
+from mount_models.sampling import SAMPLE_TIME
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
 
 FloatArray = NDArray[np.float64]
@@ -60,6 +62,7 @@ class DriveSignals:
     zero: int
     seen: Seen
     truth: Truth
+    sample_time: float = SAMPLE_TIME  # s
 
 
 def load_drive(recording: Recording, excitation_start: float | None = None) -> DriveSignals:
@@ -86,6 +89,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
         zero=zero,
         seen=_seen(recording, zero),
         truth=Truth((truth.stamps[order] - zero) * 1e-9, *(truth[name][order] for name in scalars)),
+        sample_time=1.0 / recorded_sample_rate(recording),
     )
 
 

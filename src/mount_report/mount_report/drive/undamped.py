@@ -18,7 +18,7 @@ from mount_bags.messages.series import SeriesError
 from mount_bringup.chosen import Parameters
 from mount_bringup.mounts import mounts_of
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME, SAMPLE_TIME_NS
+from mount_models.sampling import sample_time_ns
 from mount_ros.topics import SIM_TRUTH
 from mount_sim.excitation.excitation import Seat
 from mount_sim.excitation.scenario import build_excitation
@@ -62,6 +62,7 @@ class _Simulated(NamedTuple):
     road_height: Array
     chassis_acceleration: Array
     start: int
+    sample_time: int  # ns
 
 
 def undamped_of(recording: Recording, parameters: Parameters) -> Undamped:
@@ -86,12 +87,12 @@ def undamped_of(recording: Recording, parameters: Parameters) -> Undamped:
     except (ValueError, TypeError, OSError) as error:
         raise UndampedError(f'the run cannot be computed again: {error}') from None
     first = _first_sample(stamps, excited, simulated)
-    places = first + _samples(stamps)
+    places = first + _samples(stamps, simulated.sample_time)
     return Undamped(
         stamps,
         simulated.displacement[places],
         simulated.chassis_acceleration[places],
-        int(stamps[0]) + (simulated.start - first) * SAMPLE_TIME_NS,
+        int(stamps[0]) + (simulated.start - first) * simulated.sample_time,
     )
 
 
@@ -119,8 +120,8 @@ def _simulated(values: str) -> _Simulated:
     excitation = build_excitation(sim)
     if excitation.seat is Seat.BENCH:
         raise UndampedError('a rack imposes the displacement, so nothing is isolated')
-    shaking = Shaking(excitation)
-    if shaking.samples * SAMPLE_TIME > LONGEST:
+    shaking = Shaking(excitation, sim.sample_rate)
+    if shaking.samples > LONGEST * sim.sample_rate:
         raise UndampedError(f'it is computed for runs of up to {LONGEST:g} s')
     plant = sim.plant._replace(mount=seated_mount('friction'))
     simulation = PlantSimulation(plant, excitation.seat, excitation.step_time)
@@ -134,12 +135,12 @@ def _simulated(values: str) -> _Simulated:
             simulation.advance(values_ahead[place], forces[place], 0.0)
     if not np.isfinite(found).all():
         raise UndampedError('the simulated plant has diverged')
-    return _Simulated(found[0], found[1], found[2], shaking.start)
+    return _Simulated(found[0], found[1], found[2], shaking.start, sample_time_ns(sim.sample_rate))
 
 
-def _samples(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+def _samples(stamps: NDArray[np.int64], sample_time: int) -> NDArray[np.int64]:
     """Return the number of each sample, from the first recorded one on."""
-    return np.asarray(np.round((stamps - stamps[0]) / SAMPLE_TIME_NS), np.int64)
+    return np.asarray(np.round((stamps - stamps[0]) / sample_time), np.int64)
 
 
 def _first_sample(stamps: NDArray[np.int64], excited: Mapping[str, Array], simulated: _Simulated) -> int:
@@ -147,7 +148,7 @@ def _first_sample(stamps: NDArray[np.int64], excited: Mapping[str, Array], simul
     name = next((name for name in EXCITED if excited[name].any()), None)
     if name is None:
         raise UndampedError('the recording holds no excitation')
-    recorded, ours, places = excited[name], getattr(simulated, name), _samples(stamps)
+    recorded, ours, places = excited[name], getattr(simulated, name), _samples(stamps, simulated.sample_time)
     clearest = int(np.argmax(np.abs(recorded)))
     for candidate in (np.flatnonzero(ours == recorded[clearest]) - places[clearest]).tolist():
         inside = candidate >= 0 and candidate + places[-1] < len(ours)

@@ -17,7 +17,6 @@ from mount_report.sections.subject import Subject
 from mount_report.sections.sweep import peak_per_band, rms_per_band
 from mount_report.sections.wording import Sentences
 from mount_report.signals import Signal
-from mount_ros.topics import SAMPLE_RATE
 
 OfSubject = Callable[[Subject], Signal | None]
 
@@ -358,10 +357,11 @@ def _together_timed(moved: Signal, force: Signal, stretch: tuple[float, float]) 
 def _density(subject: Subject, signal: Signal) -> tuple[Array, Array, float] | None:
     """Return frequencies, densities and the share of samples that were made up."""
     inside = signal.time >= subject.active_from()
-    _, values, made_up = evenly(signal.time[inside], signal.values[inside], SAMPLE_RATE)
+    rate = subject.signals.sample_rate
+    _, values, made_up = evenly(signal.time[inside], signal.values[inside], rate)
     if len(values) < _LEAST_SAMPLES or np.ptp(values) == 0.0:  # too short, or nothing moves
         return None
-    return *amplitude_density(values, SAMPLE_RATE), made_up / len(values)
+    return *amplitude_density(values, rate), made_up / len(values)
 
 
 def _band_cell(series: Named, edge: float) -> str:

@@ -14,6 +14,7 @@ from mount_ros.nodes.parameter_gate import Change, ParameterGate
 from mount_ros.nodes.parameters import refuse_unknown
 from mount_ros.nodes.real_time import Beats, RealTime, Urgent
 from mount_ros.private_rclpy import OpenLifecycleNode, integer_as_float
+from mount_ros.writers import WriterWatch
 
 
 class ServedPath(Protocol):
@@ -54,6 +55,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
         self._lockstep = bool(self.declare_parameter('lockstep', False).value)
         self.data_path: ServedPath | None = None
+        self._writers: WriterWatch | None = None  # of what the data path hears
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
         self.real_time = RealTime(0)  # that of the process, if it has one
         self.after_configure: Callable[[], None] = _nothing  # what a process wants done then
@@ -61,7 +63,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
-        self._diagnostics = Diagnostics(self, self._present_verdict)
+        self._diagnostics = Diagnostics(self, self._look_and_judge)
         self._diagnostics.start()
 
     def declare_parameter(self, name: str, value: Any = None, *arguments, **options) -> Parameter:
@@ -89,6 +91,12 @@ class SafeLifecycleNode(OpenLifecycleNode):
 
     def take_changes(self, changes: Mapping[str, Change]) -> None:
         """Go on with the parameters as they are now; `changes` were set while the node was configured."""
+
+    def heed_writers(self, foreign: str, doubt: str) -> None:
+        """Stay at 0 A: for good if `foreign` says that another node publishes, while `doubt` says it may.
+
+        Both are sentences, empty where there is nothing to say. Called when they change, in any thread.
+        """
 
     def judge(self) -> Verdict:
         """Return the verdict on the active node; must be quick and must not block."""
@@ -118,9 +126,20 @@ class SafeLifecycleNode(OpenLifecycleNode):
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
         thread = self.data_thread or DataThread(self.context, self.tell_failure)
-        path = DataPath(self, lockstep=self.lockstep, thread=thread)
-        self.data_path = path
+        path = DataPath(self, lockstep=self.lockstep, thread=thread, on_writers=self.tell_writers)
+        self.data_path, self._writers = path, path.writers
         return path
+
+    def tell_writers(self) -> None:
+        """Call `heed_writers` with what holds now: at each change, and when the node has begun to heed it."""
+        writers = self._writers
+        if writers is not None:
+            self.heed_writers(writers.foreign, writers.doubt)
+
+    def wait_for_own_writers(self) -> None:
+        """Return when only their own writers publish what this node hears; raises `ForeignWriterError`."""
+        if self._writers is not None:
+            self._writers.wait_for_own(self.ending)
 
     def tell_failure(self, sentence: str) -> None:
         """Say that a thread of the node has ended by itself; the process ends the node then."""
@@ -209,7 +228,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
     def _release(self) -> None:
         self._gate.open()
         self._make_safe(self.cleanup)
-        path, self.data_path = self.data_path, None
+        path, self.data_path, self._writers = self.data_path, None, None
         if path is not None:
             self._make_safe(path.stop)
 
@@ -219,9 +238,18 @@ class SafeLifecycleNode(OpenLifecycleNode):
         except Exception as error:
             self.get_logger().error(f'{step.__name__} failed: {type(error).__name__}: {error}')
 
+    def _look_and_judge(self) -> Verdict:
+        writers = self._writers
+        if writers is not None:
+            writers.look()
+        return self._present_verdict()
+
     def _present_verdict(self) -> Verdict:
-        path = self.data_path
+        path, writers = self.data_path, self._writers
         verdict = self._verdict_without_path()
+        other = (writers.foreign or writers.doubt) if writers is not None else ''
+        if other and verdict.level is Level.OK:
+            verdict = Verdict(Level.WARN, other, verdict.figures)
         if path is not None and path.failure:
             verdict = Verdict(Level.ERROR, path.failure, {**verdict.figures, 'fatal': True})
         elif path is not None and path.refused and verdict.level is Level.OK:
@@ -234,7 +262,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
             sentence = f'{verdict.sentence}; {sentence}' if worse else sentence
             verdict = Verdict(max(verdict.level, Level.WARN), sentence, verdict.figures)
         state = 'active' if self._active else 'inactive'
-        figures = {**verdict.figures, 'state': state, 'unmatched': unmatched}
+        figures = {**verdict.figures, 'state': state, 'unmatched': unmatched, 'other_writer': other}
         return Verdict(verdict.level, verdict.sentence, figures)
 
     def _verdict_without_path(self) -> Verdict:

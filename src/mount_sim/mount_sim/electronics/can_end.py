@@ -11,7 +11,7 @@ from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
 from mount_driver.frame import Frame
 from mount_driver.watches.sender_watch import SenderLimits, SenderWatch
-from mount_models.sampling import SAMPLE_TIME_NS
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Reading
 
 _COUNTER_MASK = 0xFFFF
@@ -45,7 +45,8 @@ class ReceivedSetpoint:
 class CanEnd:
     """Electronics' side of `mount.dbc` on an open bus."""
 
-    def __init__(self, bus: can.BusABC):
+    def __init__(self, bus: can.BusABC, sample_rate: float = SAMPLE_RATE):
+        self._sample_time = sample_time_ns(sample_rate)
         self._bus = bus
         self._reception = Reception()
         self._codec = MountCodec()
@@ -79,7 +80,7 @@ class CanEnd:
         What lies beyond the limits of its signal, and so of its sensor, is sent as not valid.
         """
         codec = self._codec
-        self._now = number * SAMPLE_TIME_NS
+        self._now = number * self._sample_time
         measurement = Measurement(
             number & _COUNTER_MASK,
             microseconds & _MICROSECOND_MASK,

@@ -13,8 +13,8 @@ from mount_models.coil.ripple import current_rate, flux_rate
 from mount_models.quantity import Quantity
 from mount_models.sampling import SETPOINT_TIMEOUT
 
-STATUS_EVERY = 100
-"""Samples from one status to the next: 10 Hz; the first sample has one."""
+STATUS_PERIOD = 0.1
+"""s from one status to the next; the first sample has one."""
 
 
 class ElectronicsParameters(NamedTuple):
@@ -45,6 +45,11 @@ class ElectronicsParameters(NamedTuple):
     coil_temperature: Annotated[
         float, Quantity('degC', 'temperature of coil and core, and as reported', -60.0, 250.0, 'chosen')
     ] = 20.0
+
+
+def status_every(sample_rate: float) -> int:
+    """Return the samples from one status to the next at `sample_rate` (Hz)."""
+    return round(STATUS_PERIOD * sample_rate)
 
 
 class Reading(NamedTuple):

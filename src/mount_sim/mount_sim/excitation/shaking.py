@@ -4,13 +4,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_models.arithmetic.series import StreamedSeries
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.quantity import ParameterError
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.excitation.excitation import Excitation, Seat
 
 SHORT_BLOCK, LONG_BLOCK = 50, 500
 """Samples, chosen: where a block must be made within a part of a sample (real time); for a compiled loop."""
 
 Rows = NDArray[np.float64]
+
+_WHOLE = 1e-9  # relative, derived: a quotient so near to a whole number is one
+
+
+def steps_of_sample(sample_rate: float, step_time: float) -> int:
+    """Return how many steps of the plant (s) lie between two samples; raises `ParameterError`."""
+    between = 1e-9 * sample_time_ns(sample_rate) / step_time
+    if abs(between - round(between)) > _WHOLE * between:
+        raise ParameterError(
+            f'sample_rate ({sample_rate:g} Hz) must leave a whole number of the {1e6 * step_time:g} us steps '
+            f'of the simulated plant between two samples; instead there are {between:g}: choose 500, 625, '
+            '800, 1000, 1250 or 2000 Hz'
+        )
+    return round(between)
 
 
 class Shaking:
@@ -19,10 +34,10 @@ class Shaking:
     Behind the end rack and road stay where they are, and no acceleration or force is left.
     """
 
-    def __init__(self, excitation: Excitation):
+    def __init__(self, excitation: Excitation, sample_rate: float = SAMPLE_RATE):
         self._excitation = excitation
-        self._steps = round(SAMPLE_TIME / excitation.step_time)
-        self.start = round(excitation.start / SAMPLE_TIME)
+        self._steps = steps_of_sample(sample_rate, excitation.step_time)
+        self.start = round(excitation.start * sample_rate)
         """Sample at which the excitation begins."""
         self.samples = self.start + len(excitation.values) // self._steps
         """Samples up to the end of the excitation."""

@@ -71,13 +71,14 @@ class SimulatedCar:
         law = CarLaw(checked(general.engine), general.vehicle)
         self._car = CarSimulation(law, list(simulations.values()), list(supports.values()), seat, step_time)
         check_car(self._car.memory, seat, step_time)
-        self._shaking = Shaking(excitation)
+        self._shaking = Shaking(excitation, general.sample_rate)
         self._sample = 0
-        run = Run(self._shaking.samples, self._shaking.start)
+        run = Run(self._shaking.samples, self._shaking.start, general.sample_rate)
         self.mounts: dict[str, CarMount] = {}
         for name in names:
             noise = Noise(general.seed, PLACES.index(name))
-            faults = Faults(chosen[name].faults, general.seed ^ zlib.crc32(name.encode()))
+            seed = general.seed ^ zlib.crc32(name.encode())
+            faults = Faults(chosen[name].faults, seed, general.sample_rate)
             self.mounts[name] = CarMount(self._move, plants[name], simulations[name], noise, run, faults)
         self._currents = np.zeros(len(names))
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
-from mount_models.sampling import SAMPLE_TIME
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
 from mount_sim.electronics.faults.schedule import Faults
 from mount_sim.excitation.excitation import Excitation
@@ -40,10 +40,11 @@ class BeyondRange:
 
 @dataclass(frozen=True)
 class Run:
-    """Length of a simulated run in samples and where the excitation begins in it."""
+    """Length of a simulated run in samples, where the excitation begins in it, and their rate in Hz."""
 
     samples: int
     excitation_start: int
+    sample_rate: float = SAMPLE_RATE
 
 
 class Ahead(NamedTuple):
@@ -75,7 +76,11 @@ class MountElectronics:
         self._sound_plant = plant
         self._plant = simulation
         self._noise = noise
-        self.patience = round(plant.electronics.setpoint_timeout / SAMPLE_TIME)
+        self.sample_rate = run.sample_rate
+        """Hz"""
+        self.sample_time = sample_time_ns(run.sample_rate)
+        """ns"""
+        self.patience = round(plant.electronics.setpoint_timeout * run.sample_rate)
         """Samples without a setpoint after which the current goes to 0 A."""
         self._driver_opens = plant.mount.driver_opens
         self.run = run
@@ -87,7 +92,7 @@ class MountElectronics:
     @property
     def time(self) -> float:
         """Simulated time in s."""
-        return self.sample * SAMPLE_TIME
+        return self.sample * (1.0 / self.sample_rate)
 
     @property
     def finished(self) -> bool:
@@ -154,11 +159,18 @@ class MountElectronics:
 class SimulatedMount(MountElectronics):
     """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again."""
 
-    def __init__(self, plant: Plant, excitation: Excitation, seed: int, faults: Faults | None = None):
+    def __init__(
+        self,
+        plant: Plant,
+        excitation: Excitation,
+        seed: int,
+        faults: Faults | None = None,
+        sample_rate: float = SAMPLE_RATE,
+    ):
         simulation = PlantSimulation(plant, excitation.seat, excitation.step_time)
         checked_plant(plant, excitation.seat, excitation.step_time)
-        self._shaking = Shaking(excitation)
-        run = Run(self._shaking.samples, self._shaking.start)
+        self._shaking = Shaking(excitation, sample_rate)
+        run = Run(self._shaking.samples, self._shaking.start, sample_rate)
         super().__init__(plant, simulation, Noise(seed), run, faults)
 
     def advance(self, setpoint: float | None, late: int = 0) -> None:

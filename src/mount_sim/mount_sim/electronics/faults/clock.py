@@ -2,7 +2,6 @@
 
 import can
 
-from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics.faults.contract import Fault, Occasion
 
 _JUMP = 10_000_000  # us, chosen: farther than any pause of the frames
@@ -11,8 +10,8 @@ _WIDTH_SAMPLE, _WIDTH_MICROSECOND = 1 << 16, 1 << 32
 _US = 1e6  # us per s
 
 
-def _samples(time: float) -> int:
-    return round(time / SAMPLE_TIME)
+def _samples(time: float, sample_rate: float) -> int:
+    return round(time * sample_rate)
 
 
 class ClockJump(Fault):
@@ -34,10 +33,10 @@ class CounterWrap(Fault):
     """Both counters start so that they go through their highest value to 0 at the told time."""
 
     def counted(self, sample: int, microseconds: int) -> tuple[int, int]:
-        wrap = _samples(self.occasion.begin)
+        wrap = _samples(self.occasion.begin, self.occasion.sample_rate)
         return (
             sample + _WIDTH_SAMPLE - wrap % _WIDTH_SAMPLE,
-            microseconds + _WIDTH_MICROSECOND - round(wrap * SAMPLE_TIME * _US),
+            microseconds + _WIDTH_MICROSECOND - round(wrap / self.occasion.sample_rate * _US),
         )
 
 
@@ -49,14 +48,16 @@ class ElectronicsReset(Fault):
 
     def __init__(self, occasion: Occasion):
         super().__init__(occasion)
-        self._back = _samples(occasion.end)
+        self._back = _samples(occasion.end, occasion.sample_rate)
         self.deaf = True
 
     def counted(self, sample: int, microseconds: int) -> tuple[int, int]:
         self.restarts = sample == self._back
         self.deaf = sample < self._back
         passed = sample - self._back
-        return (sample, microseconds) if self.deaf else (passed, round(passed * SAMPLE_TIME * _US))
+        return (
+            (sample, microseconds) if self.deaf else (passed, round(passed / self.occasion.sample_rate * _US))
+        )
 
     def on_bus(self, frames: list[can.Message]) -> list[can.Message]:
         return [] if self.deaf else frames

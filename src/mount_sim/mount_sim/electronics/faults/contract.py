@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import can
 
 from mount_driver.codec import Status
+from mount_models.sampling import SAMPLE_RATE
 from mount_sim.electronics.electronics import Reading
 
 if TYPE_CHECKING:
@@ -12,11 +13,12 @@ if TYPE_CHECKING:
 
 
 class Occasion(NamedTuple):
-    """When a fault is there, in s of simulated time, and what its random numbers begin with."""
+    """When a fault is there, in s of simulated time, and what its random numbers begin with; Hz."""
 
     begin: float
     end: float
     seed: tuple[int, ...] = (0,)
+    sample_rate: float = SAMPLE_RATE
 
 
 class Fault:

@@ -11,6 +11,7 @@ import can
 
 from mount_driver.codec import Status
 from mount_models.quantity import ParameterError
+from mount_models.sampling import SAMPLE_RATE
 from mount_sim.electronics.electronics import Reading
 from mount_sim.electronics.faults.contract import Fault, Occasion
 from mount_sim.electronics.faults.kinds import FAULTS
@@ -83,7 +84,8 @@ class Faults:
     `inject` and `end_injected` may be called from any thread.
     """
 
-    def __init__(self, texts: Iterable[str] = (), seed: int = 0):
+    def __init__(self, texts: Iterable[str] = (), seed: int = 0, sample_rate: float = SAMPLE_RATE):
+        self._sample_rate = sample_rate
         self.present: tuple[Fault, ...] = ()
         """The faults that are there since the last `look`."""
         self._told = told_faults(texts)
@@ -193,7 +195,7 @@ class Faults:
 
     def _begun(self, told: ToldFault) -> Fault:
         seed = (self._seed, zlib.crc32(told.name.encode()))
-        return FAULTS[told.name].fault(Occasion(told.begin, told.end, seed))
+        return FAULTS[told.name].fault(Occasion(told.begin, told.end, seed, self._sample_rate))
 
     @staticmethod
     def _begin(told: ToldFault) -> float:

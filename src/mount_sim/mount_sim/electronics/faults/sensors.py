@@ -3,7 +3,6 @@
 import math
 
 from mount_models.arithmetic.random_numbers import RandomNumbers
-from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics.electronics import Reading
 from mount_sim.electronics.faults.contract import Fault, Occasion
 
@@ -77,7 +76,7 @@ class DisplacementDrifting(Fault):
         self._drift = 0.0
 
     def reading(self, reading: Reading) -> Reading:
-        self._drift += _DRIFT * SAMPLE_TIME
+        self._drift += _DRIFT / self.occasion.sample_rate
         return reading._replace(displacement=reading.displacement + self._drift)
 
 

@@ -1,0 +1,165 @@
+"""One process of a chain of empty nodes: CAN frame -> topic -> topic -> CAN frame, and nothing computed.
+
+What one would write with rclpy and python-can alone, with the same executor, delivery and sizes as the
+graph: what this chain costs is the price of middleware and bus. `ends` stands where the driver stands,
+`middle` where the controller stands, `peer` where the electronics stand; parts may share a process.
+"""
+
+import argparse
+import contextlib
+import json
+import statistics
+import threading
+import time
+from collections.abc import Iterator
+
+import can
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+GROUP = '239.74.163.3'  # chosen: a multicast group beside that of the graph
+_SAMPLE, _ANSWER = 0x100, 0x101  # chosen: identifiers of the two frames
+_SAMPLE_LENGTH, _ANSWER_LENGTH = 24, 12  # bytes: of MountMeasurement and MountSetpoint
+_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+_NUMBER = 4  # bytes of a frame that count the samples
+_FIRST_WAIT = 30.0  # s, chosen: until the first answer must have come
+_LOOK = 0.2  # s: how often a loop looks whether it shall end
+
+
+def main() -> None:
+    """Run the parts that are named until SIGINT, or the peer for a time; the peer prints what it measured."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('parts', nargs='+', choices=('ends', 'middle', 'peer'))
+    parser.add_argument('--port', type=int, required=True)
+    parser.add_argument('--seconds', type=float, default=5.0)
+    parser.add_argument('--rate', type=float, default=1000.0, help='Hz; 0: the peer waits for each answer')
+    chosen = parser.parse_args()
+    if chosen.parts == ['peer']:
+        _measure(chosen.port, chosen.seconds, chosen.rate)
+        return
+    rclpy.init()
+    executor = EventsExecutor()
+    with contextlib.ExitStack() as ending:
+        ending.callback(rclpy.try_shutdown)
+        for part in chosen.parts:
+            node = Node(f'relay_{part}', namespace='bench_relay', enable_rosout=False)
+            if part == 'middle':
+                _relay(node)
+            else:
+                ending.enter_context(_bridge(node, _bus(chosen.port, _SAMPLE)))
+            executor.add_node(node)
+        with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+            while rclpy.ok():
+                executor.spin_once(_LOOK)
+        executor.shutdown()
+
+
+def _bus(port: int, received: int) -> can.BusABC:
+    filters = [{'can_id': received, 'can_mask': 0x7FF, 'extended': False}]
+    return can.Bus(
+        interface='udp_multicast', channel=GROUP, port=port, hop_limit=0, fd=True, can_filters=filters
+    )
+
+
+def _frame(identifier: int, number: int, length: int) -> can.Message:
+    data = number.to_bytes(_NUMBER, 'little').ljust(length, b'\0')
+    return can.Message(arbitration_id=identifier, data=data, is_fd=True, is_extended_id=False)
+
+
+def _number(message: can.Message) -> int:
+    return int.from_bytes(message.data[:_NUMBER], 'little')
+
+
+def _relay(node: Node) -> None:
+    """Hand on each message of one topic on another."""
+    publisher = node.create_publisher(JointState, 'answer', 100)
+    node.create_subscription(JointState, 'sample', publisher.publish, _QOS)
+
+
+@contextlib.contextmanager
+def _bridge(node: Node, bus: can.BusABC) -> Iterator[None]:
+    """Make a message of each frame and a frame of each message, until the end of the context."""
+    publisher = node.create_publisher(JointState, 'sample', 100)
+    ending = threading.Event()
+
+    def receive() -> None:
+        while not ending.is_set():
+            frame = bus.recv(_LOOK)
+            if frame is not None:
+                message = JointState(name=['mount'], position=[float(_number(frame))])
+                message.header.stamp = node.get_clock().now().to_msg()
+                publisher.publish(message)
+
+    def answer(message: JointState) -> None:
+        bus.send(_frame(_ANSWER, int(message.position[0]), _ANSWER_LENGTH))
+
+    node.create_subscription(JointState, 'answer', answer, _QOS)
+    thread = threading.Thread(target=receive, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ending.set()
+        thread.join()
+        bus.shutdown()
+
+
+def _measure(port: int, seconds: float, rate: float) -> None:
+    """Print the steady time (s) of the first answer, send for `seconds`, print what came of it, SI."""
+    bus = _bus(port, _ANSWER)
+    try:
+        print(_first_answer(bus), flush=True)
+        sent, late = _sent(bus, seconds, rate) if rate else _sent_in_turn(bus, seconds)
+    finally:
+        bus.shutdown()
+    median = statistics.median(late)
+    print(json.dumps({'samples': sent, 'answered': len(late), 'latency_median_s': median}), flush=True)
+
+
+def _first_answer(bus: can.BusABC) -> float:
+    """Return the steady time (s) of the first answer; all that is under way has come by then."""
+    limit = time.monotonic() + _FIRST_WAIT
+    while time.monotonic() < limit:
+        bus.send(_frame(_SAMPLE, 0, _SAMPLE_LENGTH))
+        if bus.recv(0.002) is not None:
+            first = time.monotonic()
+            while bus.recv(_LOOK) is not None:
+                pass
+            return first
+    raise TimeoutError(f'no answer of the relay chain within {_FIRST_WAIT:g} s')
+
+
+def _sent(bus: can.BusABC, seconds: float, rate: float) -> tuple[int, list[float]]:
+    """Send at `rate` (Hz); return how many samples were sent and the latencies (s) of their answers."""
+    count = round(seconds * rate)
+    left, late = [0.0] * (count + 1), []
+    begin = time.monotonic()
+    for number in range(1, count + 1):
+        while (frame := bus.recv(0.0)) is not None:
+            late.append(frame.timestamp - left[_number(frame)])
+        left[number] = time.time()
+        bus.send(_frame(_SAMPLE, number, _SAMPLE_LENGTH))
+        time.sleep(max(0.0, begin + number / rate - time.monotonic()))
+    while (frame := bus.recv(_LOOK)) is not None:
+        late.append(frame.timestamp - left[_number(frame)])
+    return count, late
+
+
+def _sent_in_turn(bus: can.BusABC, seconds: float) -> tuple[int, list[float]]:
+    """Send each sample when the one before is answered; return the same."""
+    end, number, late = time.monotonic() + seconds, 0, []
+    while time.monotonic() < end:
+        number += 1
+        begin = time.monotonic()
+        bus.send(_frame(_SAMPLE, number, _SAMPLE_LENGTH))
+        if bus.recv(1.0) is not None:
+            late.append(time.monotonic() - begin)
+    return number, late
+
+
+if __name__ == '__main__':
+    main()

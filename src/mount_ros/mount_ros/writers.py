@@ -1,0 +1,139 @@
+"""Who publishes a topic whose writers the registry names, and who else does.
+
+The answer comes from discovery, not from what is sent: a stranger is known with or before its first message.
+A killed writer stays in discovery until its lease is over, and looks like a second one of its name.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+from mount_ros.topics import Topic
+
+LONGEST_DOUBT = 6.0
+"""How long two writers may bear one name, s: the lease of a killed one (5 s, `dds/`), and 1 s (chosen)."""
+
+_LOOK_PERIOD = 0.05  # s, chosen: while an activation waits
+_NAMELESS = '_NODE_NAME_UNKNOWN_'  # rmw_fastrtps, until the name has come
+
+
+class ForeignWriterError(ValueError):
+    """A topic that decides on the coil's current has a publisher that is not its own."""
+
+
+@dataclass
+class _Heard:
+    """What is known of the publishers of one topic."""
+
+    subscription: Subscription
+    count: int = -1  # of publishers at the last look
+    foreign: str = ''
+    doubt: str = ''
+    since: float = 0.0  # of the doubt, s, steady clock
+
+
+class WriterWatch:
+    """Holds the publishers of the heard topics against those that the registry names; any thread may ask.
+
+    A topic's own writers are the nodes `<writer>_io` in the namespace of `node`, each once. Where none of
+    them is there, one other node may stand in for them: a replay or a test bench. `on_change` is called, in
+    the thread that finds it, when `foreign` or `doubt` have changed.
+    """
+
+    def __init__(self, node: Node, on_change: Callable[[], None]):
+        self.foreign = ''
+        """Which other node publishes on which topic, and the remedy; empty where none does."""
+        self.doubt = ''
+        """The same where it may be a killed writer, or one whose name has not come yet."""
+        self._node = node
+        self._on_change = on_change
+        self._heard: dict[Topic, _Heard] = {}
+        self._guard = threading.Lock()
+
+    def hear(self, topic: Topic, subscription: Subscription) -> None:
+        """Watch the writers of `topic`."""
+        with self._guard:
+            self._heard[topic] = _Heard(subscription)
+
+    def forget(self, topic: Topic) -> None:
+        """Watch the writers of `topic` no more."""
+        with self._guard:
+            self._heard.pop(topic, None)
+
+    def end(self) -> None:
+        """Watch nothing any more."""
+        with self._guard:
+            self._heard.clear()
+
+    def notice(self, topic: Topic) -> None:
+        """Look who has come to `topic`, or gone."""
+        with self._guard:
+            if topic in self._heard:
+                self._heard[topic].count = -1
+        self.look()
+
+    def look(self) -> None:
+        """Look at each topic whose publishers have changed in number, or are in doubt."""
+        with self._guard:
+            before = self.foreign, self.doubt
+            for topic, heard in self._heard.items():
+                count = heard.subscription.get_publisher_count()
+                if count != heard.count or heard.doubt:
+                    heard.count = count
+                    self._judge(topic, heard)
+            self.foreign = next((heard.foreign for heard in self._heard.values() if heard.foreign), '')
+            self.doubt = next((heard.doubt for heard in self._heard.values() if heard.doubt), '')
+            changed = before != (self.foreign, self.doubt)
+        if changed:
+            self._on_change()
+
+    def wait_for_own(self, ending: threading.Event) -> None:
+        """Return when no other writer is there, or raise `ForeignWriterError`; a doubt is waited for."""
+        while True:
+            self.look()
+            if not (self.foreign or self.doubt):
+                return
+            if self.foreign or ending.wait(_LOOK_PERIOD):
+                raise ForeignWriterError(self.foreign or self.doubt)
+
+    def _judge(self, topic: Topic, heard: _Heard) -> None:
+        now = time.monotonic()
+        since = heard.since if heard.doubt else now
+        foreign, doubtful = self._others(topic)
+        if doubtful and now - since > LONGEST_DOUBT:
+            foreign, doubtful = foreign or doubtful, []
+        heard.since = since
+        heard.foreign = _sentence(topic, foreign, 'end it') if foreign else ''
+        heard.doubt = _sentence(topic, doubtful, _IF_KILLED) if doubtful else ''
+
+    def _others(self, topic: Topic) -> tuple[list[str], list[str]]:
+        """Return the publishers of `topic` that are certainly not its own, and those that may not be."""
+        space = self._node.get_namespace().rstrip('/')
+        infos = self._node.get_publishers_info_by_topic(topic.name)
+        names = [
+            _NAMELESS
+            if info.node_name == _NAMELESS
+            else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+            for info in infos
+            if info.topic_type == topic.type
+        ]
+        own = {f'{space}/{writer}_io' for writer in topic.writers}
+        twice = sorted({name for name in names if names.count(name) > 1})
+        others = {name for name in names if name not in own}
+        nameless = others & {_NAMELESS}
+        if len(set(names)) > 1:  # one name alone stands in for the writers, or is one of them
+            return sorted(others - nameless), twice or sorted(nameless)
+        return [], twice
+
+
+_IF_KILLED = f'a killed one is gone after {LONGEST_DOUBT:g} s, else end it'
+
+
+def _sentence(topic: Topic, names: list[str], remedy: str) -> str:
+    who = ' and '.join(name.replace(_NAMELESS, 'a node without a name') for name in names)
+    own = ' and '.join(topic.writers)
+    return f'{who} must not publish {topic.name} too (limit: one writer, {own}): {remedy}'

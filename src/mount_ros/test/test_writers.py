@@ -1,0 +1,159 @@
+"""A topic with one writer: who else publishes it is named by discovery, whoever serves the subscription."""
+
+import threading
+import types
+
+import pytest
+from rclpy.node import Node
+
+import mount_ros.writers
+from mount_ros.data_path import DataPath
+from mount_ros.messages.types import message_class
+from mount_ros.qos import publisher_qos
+from mount_ros.testing import wait_until
+from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, TOPICS
+from mount_ros.writers import ForeignWriterError
+
+
+@pytest.fixture
+def publish_from(context):
+    """Return a function that lets a node of this name publish a topic, and returns the node."""
+    made = []
+
+    def publish(name, topic=DISPLACEMENT, namespace='/car'):
+        node = Node(name, namespace=namespace, context=context)
+        node.create_publisher(message_class(topic.type), f'/car/{topic.name}', publisher_qos(topic))
+        made.append(node)
+        return node
+
+    yield publish
+    for node in made:
+        node.destroy_node()
+
+
+@pytest.fixture
+def heard(context):
+    """A data path in a namespace that hears the displacement, and what it was told of writers."""
+    owner = Node('listener', namespace='/car', context=context)
+    changes = []
+    path = DataPath(owner, on_writers=lambda: changes.append(threading.current_thread().name))
+    path.changes = changes
+    path.subscribe(DISPLACEMENT, lambda raw: None)
+    path.start()
+    yield path
+    path.stop()
+    owner.destroy_node()
+
+
+def _settled(path):
+    """Return what the watch finds; the names of nodes come a little after their publishers."""
+    wait_until(lambda: path.writers.look() or '_NAME_UNKNOWN' not in path.writers.doubt, 'the names')
+    return path.writers.foreign, path.writers.doubt
+
+
+def test_topics_that_decide_on_the_current_have_writers_and_others_have_none():
+    assert {topic.name: topic.writers for topic in TOPICS if topic.writers} == {
+        'displacement': ('mount_driver',),
+        'coil_ripple': ('mount_driver',),
+        'coil_temperature': ('mount_driver',),
+        'current_setpoint': ('mount_control', 'mount_init'),
+        'air_gap': ('mount_init',),
+        'current_force_table': ('mount_init',),
+    }
+
+
+def test_a_second_publisher_is_told_in_the_data_thread_as_soon_as_it_is_found(heard, publish_from):
+    publish_from('mount_driver_io')
+    wait_until(lambda: heard.unmatched() == [], 'the driver')
+    assert _settled(heard) == ('', '')
+    stranger = publish_from('stranger', namespace='/elsewhere')
+    wait_until(lambda: 'data' in heard.changes, 'the data thread to tell')
+    sentence = (
+        '/elsewhere/stranger must not publish displacement too (limit: one writer, mount_driver): end it'
+    )
+    wait_until(lambda: _settled(heard) == (sentence, ''), 'the name of the stranger')
+    with pytest.raises(ForeignWriterError, match='/elsewhere/stranger must not publish'):
+        heard.writers.wait_for_own(threading.Event())
+    stranger.destroy_node()
+    wait_until(lambda: _settled(heard) == ('', ''), 'the end of the stranger')
+    heard.writers.wait_for_own(threading.Event())
+
+
+def test_one_node_alone_may_stand_in_for_the_writer(heard, publish_from):
+    publish_from('player')
+    wait_until(lambda: heard.unmatched() == [], 'the player')
+    assert _settled(heard) == ('', '')
+    publish_from('mount_driver_io')
+    wait_until(
+        lambda: _settled(heard)[0].startswith('/car/player must not publish'), 'the player to be named'
+    )
+
+
+def test_a_node_of_the_right_name_in_another_namespace_is_a_stranger(heard, publish_from):
+    publish_from('mount_driver_io')
+    publish_from('mount_driver_io', namespace='/other_car')
+    named = '/other_car/mount_driver_io must not publish'
+    wait_until(lambda: _settled(heard)[0].startswith(named), 'the other car to be named')
+
+
+@pytest.mark.parametrize('name', ['mount_driver_io', 'player'])
+def test_two_of_one_name_are_a_doubt_until_no_killed_one_can_be_left(heard, publish_from, monkeypatch, name):
+    twins = [publish_from(name) for _ in range(2)]
+    sentence = (
+        f'/car/{name} must not publish displacement too (limit: one writer, mount_driver): a killed one is '
+        'gone after 6 s, else end it'
+    )
+    wait_until(lambda: _settled(heard) == ('', sentence), 'the doubt')
+    monkeypatch.setattr(mount_ros.writers, 'LONGEST_DOUBT', 0.0)
+    wait_until(lambda: _settled(heard)[0].startswith(f'/car/{name} must not publish'), 'the certainty')
+    twins[0].destroy_node()
+    wait_until(lambda: _settled(heard) == ('', ''), 'the end of one of them')
+
+
+def test_an_activation_waits_for_the_end_of_a_doubt_and_no_longer_than_the_process_lives(heard, publish_from):
+    twins = [publish_from('mount_driver_io') for _ in range(2)]
+    wait_until(lambda: _settled(heard)[1], 'the doubt')
+    ending = threading.Event()
+    waiting = threading.Thread(target=heard.writers.wait_for_own, args=(ending,))
+    waiting.start()
+    twins[0].destroy_node()
+    waiting.join()
+    twins.append(publish_from('mount_driver_io'))
+    wait_until(lambda: _settled(heard)[1], 'the doubt')
+    ending.set()
+    with pytest.raises(ForeignWriterError, match='a killed one is gone after 6 s'):
+        heard.writers.wait_for_own(ending)
+
+
+def test_each_of_several_writers_may_be_there_once(heard, publish_from):
+    heard.subscribe(CURRENT_SETPOINT, lambda raw: None)
+    publish_from('mount_control_io', CURRENT_SETPOINT)
+    publish_from('mount_init_io', CURRENT_SETPOINT)
+    count = heard.node.count_publishers
+    wait_until(lambda: count('current_setpoint') == 2 and _settled(heard) == ('', ''), 'both of them')
+    publish_from('stranger', CURRENT_SETPOINT)
+    named = (
+        '/car/stranger must not publish current_setpoint too '
+        '(limit: one writer, mount_control and mount_init): end it'
+    )
+    wait_until(lambda: _settled(heard)[0] == named, 'the stranger')
+    heard.unsubscribe(CURRENT_SETPOINT)
+    assert _settled(heard) == ('', '')
+
+
+def _info(name, kind=DISPLACEMENT.type, namespace='/car'):
+    return types.SimpleNamespace(node_name=name, node_namespace=namespace, topic_type=kind)
+
+
+def test_a_node_without_a_name_is_a_doubt_and_one_of_another_type_is_not_heard(heard, monkeypatch):
+    infos = [_info('mount_driver_io'), _info('stranger', 'std_msgs/msg/String')]
+    monkeypatch.setattr(heard.node, 'get_publishers_info_by_topic', lambda topic: infos)
+    heard.writers.notice(DISPLACEMENT)
+    assert (heard.writers.foreign, heard.writers.doubt) == ('', '')
+    infos.append(_info('_NODE_NAME_UNKNOWN_', namespace='_NODE_NAMESPACE_UNKNOWN_'))
+    heard.writers.notice(DISPLACEMENT)
+    assert heard.writers.foreign == ''
+    assert heard.writers.doubt.startswith('a node without a name must not publish displacement too')
+    infos[-1] = _info('evil')
+    heard.writers.look()
+    assert heard.writers.foreign.startswith('/car/evil must not publish displacement too')

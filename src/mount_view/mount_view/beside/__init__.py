@@ -1,0 +1,1 @@
+"""What other mounts and policies would do now, on the same acceleration of the chassis."""

@@ -1,0 +1,1 @@
+"""Where messages come from: a running graph, or a recording by the clock."""

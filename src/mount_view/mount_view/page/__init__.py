@@ -1,0 +1,1 @@
+"""The page: what serves it, and its three files."""

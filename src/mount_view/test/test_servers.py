@@ -1,0 +1,158 @@
+"""The page and the Foxglove server, held against clients that are not ours."""
+
+import asyncio
+import json
+import struct
+
+import aiohttp
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from mount_view.feed.feed import FeedError
+from mount_view.feed.recorded import Recorded
+from mount_view.foxglove_server import FoxgloveServer
+from mount_view.page.web import Web
+from mount_view.window.model import Model
+
+LIMIT = 30.0  # s
+
+
+def run(coroutine):
+    return asyncio.run(asyncio.wait_for(coroutine, LIMIT))
+
+
+@pytest.fixture
+def page(drive, free_port):
+    """Return the page about a recording that is played fast."""
+    feed = Recorded(drive, rate=5.0)
+    model = Model(feed)
+    web = Web(model, feed.title, lambda: 'marked', '127.0.0.1', free_port)
+    web.start()
+    model.start()
+    feed.start(model.take)
+    yield web
+    feed.stop()
+    model.stop()
+    web.stop()
+
+
+async def told(address, count):
+    async with aiohttp.ClientSession() as session, session.ws_connect(f'{address}stream') as stream:
+        return [json.loads((await stream.receive()).data) for _ in range(count)]
+
+
+def test_the_stream_tells_the_whole_and_then_each_interval(page):
+    first, *others = run(told(page.address, 60))
+    assert [panel['title'] for panel in first['panels']][:2] == ['displacement', 'damping']
+    numbers = [interval[0] for told_one in others for interval in told_one['intervals']]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert any('displacement' in interval[2] for one in others for interval in one['intervals'])
+
+
+def test_a_viewer_that_does_not_read_holds_up_nobody(page):
+    async def both():
+        async with aiohttp.ClientSession() as session, session.ws_connect(f'{page.address}stream'):
+            return await told(page.address, 200)
+
+    assert len(run(both())) == 200
+
+
+def test_the_page_loads_nothing_from_elsewhere(page):
+    async def texts():
+        async with aiohttp.ClientSession() as session:
+            for name in ('', 'view.js', 'view.css'):
+                async with session.get(page.address + name) as answer:
+                    assert answer.status == 200
+                    yield await answer.text(), answer.headers['Content-Security-Policy']
+
+    async def check():
+        async for text, policy in texts():
+            assert '://' not in text.replace('${scheme}://', '')
+            assert "default-src 'self'" in policy
+
+    run(check())
+
+
+def test_a_mark_is_handed_on(page):
+    async def answer(headers):
+        async with (
+            aiohttp.ClientSession() as session,
+            session.post(f'{page.address}mark', headers=headers) as got,
+        ):
+            return got.status, await got.text()
+
+    assert run(answer({})) == (200, '{"answer": "marked"}')
+    assert run(answer({'Origin': 'http://elsewhere'}))[0] == 403
+
+
+def test_others_need_the_token(drive, free_port):
+    feed = Recorded(drive)
+    web = Web(Model(feed, beside=False), feed.title, feed.mark, '0.0.0.0', free_port)
+    web.start()
+
+    async def status(query):
+        address = f'http://127.0.0.1:{free_port}/{query}'
+        async with aiohttp.ClientSession() as session, session.get(address) as answer:
+            return answer.status
+
+    try:
+        assert run(status('')) == 403
+        assert run(status('?token=guess')) == 403
+        assert run(status('?' + web.address.split('?')[1])) == 200
+    finally:
+        web.stop()
+
+
+def test_a_port_that_is_taken_is_named(page, drive):
+    feed = Recorded(drive)
+    other = Web(Model(feed, beside=False), feed.title, feed.mark, page._host, page._port)
+    with pytest.raises(FeedError, match='choose another --port'):
+        other.start()
+
+
+async def channels_of(client, count):
+    """Return {topic: channel} as soon as the server has told of `count`."""
+    channels = {}
+    while len(channels) < count:
+        message = await client.receive()
+        content = json.loads(message.data) if message.type == aiohttp.WSMsgType.TEXT else {}
+        channels |= {channel['topic']: channel for channel in content.get('channels', ())}
+    return channels
+
+
+async def messages_on(client, count):
+    """Return the payloads of `count` messages of the first subscription."""
+    found = []
+    while len(found) < count:
+        message = await client.receive()
+        if message.type == aiohttp.WSMsgType.BINARY and message.data[0] == 1:
+            assert struct.unpack_from('<I', message.data, 1)[0] == 1
+            found.append(message.data[13:])
+    return found
+
+
+def test_foxglove_gets_channels_with_definitions_and_the_very_messages(drive, free_port):
+    feed = Recorded(drive, rate=5.0)
+    server = FoxgloveServer(feed.topics, '127.0.0.1', free_port)
+
+    async def first_displacements():
+        options = {'protocols': ['foxglove.sdk.v1'], 'max_msg_size': 0}
+        async with aiohttp.ClientSession() as http, http.ws_connect(server.address, **options) as client:
+            wanted = (await channels_of(client, len(feed.topics)))['/displacement']
+            assert (wanted['encoding'], wanted['schemaEncoding']) == ('cdr', 'ros2msg')
+            assert 'MSG: std_msgs/Header' in wanted['schema']
+            subscription = {'id': 1, 'channelId': wanted['id']}
+            await client.send_json({'op': 'subscribe', 'subscriptions': [subscription]})
+            feed.start(server.take)
+            return await messages_on(client, 500)
+
+    try:
+        found = [deserialize_message(raw, JointState) for raw in run(first_displacements())]
+    finally:
+        feed.stop()
+        server.stop()
+    stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in found]
+    assert (np.diff(stamps) > 0).all()
+    assert all(message.name == ['mount'] for message in found)
