@@ -8,6 +8,7 @@ setup(
     description='Figures of a drive, pages and pictures about recordings.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test']),
+    package_data={name: ['drawing/browser/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/mount_report']),
         ('share/mount_report', ['package.xml', 'README.md']),

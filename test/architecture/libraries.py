@@ -29,7 +29,6 @@ LIBRARIES = {
     'msgpack': Library('msgpack', 'python3-msgpack'),
     'numba': Library('numba'),  # python3-numba is a key, but of a package that Ubuntu 24.04 does not have
     'numpy': Library('numpy', 'python3-numpy'),
-    'plotly': Library('plotly'),
     'pytest': Library('pytest', 'python3-pytest'),
     'rich': Library('rich', 'python3-rich'),
     'rosbags': Library('rosbags', 'python3-rosbags-pip'),

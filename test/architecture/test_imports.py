@@ -93,7 +93,7 @@ def test_models_know_no_ros():
 def test_the_command_loads_what_it_needs_once_it_knows_what_is_wanted():
     tell = 'import sys, mount_cli.command; print(*sys.modules)'
     loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
-    assert not {'numpy', 'scipy', 'numba', 'matplotlib', 'plotly', 'rclpy', 'mcap'} & set(loaded.split())
+    assert not {'numpy', 'scipy', 'numba', 'matplotlib', 'rclpy', 'mcap'} & set(loaded.split())
 
 
 def test_the_controller_never_sees_the_truth():

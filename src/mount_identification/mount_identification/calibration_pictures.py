@@ -31,7 +31,7 @@ def draw_force_law(points: ForcePoints, law: ForceLaw, file: Path) -> None:
         gap = float(points.gap[group].mean())
         current = np.linspace(0.0, law.current_high, 200)
         upper.plot(points.current[group], points.force[group], '.', color=color, markersize=4)
-        upper.plot(current, checked_force(law, current, gap), color=color, label=f'{gap * 1e6:.0f} um')
+        upper.plot(current, checked_force(law, current, gap), color=color, label=f'{gap * 1e6:.0f} µm')
     error = checked_force(law, points.current, points.gap) - points.force
     lower.plot(points.current, error, '.', color=_GREY, markersize=2)
     lower.axhline(0.0, color=_RED, linewidth=0.8)
@@ -65,8 +65,8 @@ def draw_gap_curves(result: InductanceResult, order: GapOrder, file: Path) -> No
         factor = 1e3 if place is axes[1, 0] else 1.0
         place.plot(dense * 1e6, evaluate(fit.polynomial, dense) * factor, color=_BLUE, label='curve')
         place.plot(gap, values, '.', color=_RED, label='measured')
-        place.set_title(f'degree {fit.degree}, rms {fit.gap_rms * 1e6:.2f} um', fontsize='medium')
-        place.set_xlabel('air gap (um)')
+        place.set_title(f'degree {fit.degree}, rms {fit.gap_rms * 1e6:.2f} µm', fontsize='medium')
+        place.set_xlabel('air gap (µm)')
         place.set_ylabel(label)
         place.legend(fontsize='small')
     _finish(*axes.flat)
@@ -79,7 +79,7 @@ def _draw_map(place: Axes, result: InductanceResult, order: GapOrder) -> None:
     chosen = range(0, region.gaps.size, max(1, region.gaps.size // _DRAWN_GAPS))
     for number, row in enumerate(chosen):
         color = matplotlib.colormaps['viridis'](0.9 * number / max(1, len(chosen) - 1))
-        label = f'{region.gaps[row] * 1e6:.0f} um'
+        label = f'{region.gaps[row] * 1e6:.0f} µm'
         place.plot(region.currents, region.inductance[row] * 1e3, color=color, linewidth=1.0, label=label)
     for low, high in region.falling + region.rising:
         place.axvspan(low, high, color=_GREY, alpha=0.15, linewidth=0)
@@ -109,7 +109,7 @@ def _draw_temperatures(place: Axes, result: InductanceResult) -> None:
         )
     place.set_title('lines: coefficient off by 20 %; dots: measured', fontsize='medium')
     place.set_xlabel('coil temperature (degC)')
-    place.set_ylabel('largest gap error (um)')
+    place.set_ylabel('largest gap error (µm)')
     place.legend(fontsize='small')
 
 

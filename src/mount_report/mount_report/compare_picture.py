@@ -14,12 +14,12 @@ from mount_bags.bag.recording import Recording
 from mount_bags.compare.compare import Comparison, matched_topics
 from mount_bags.compare.signal_difference import Column, SignalDifference
 from mount_bags.compare.words import by_importance
+from mount_report.drawing.style import COLOURS, DIFFERENCE_COLOUR
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 _SIGNALS = 3  # drawn
 _LEAST_SAMPLES = 10  # chosen: less is no curve
 _AROUND = 0.2  # s, chosen: shown before and behind the largest difference
-_BLUE, _RED, _GREY = '#1f5fa8', '#b03030', '#666666'
 _HANDY = {'m': (1e3, 'mm')}
 _ALWAYS = (f'{CURRENT_SETPOINT.name}.coil_current', f'{DISPLACEMENT.name}.mount')
 
@@ -27,7 +27,7 @@ _ALWAYS = (f'{CURRENT_SETPOINT.name}.coil_current', f'{DISPLACEMENT.name}.mount'
 def draw_comparison(comparison: Comparison, a: Recording, b: Recording, file: Path) -> None:
     """Write the picture of `comparison` of `a` and `b` to `file` (PNG).
 
-    Left the whole time, right around the largest difference; below each signal B minus A. Of equal recordings
+    Left the whole time, right around the largest difference; below each signal B - A. Of equal recordings
     current and displacement are shown.
     """
     signals = _chosen(comparison)
@@ -88,10 +88,14 @@ def _draw(axes: NDArray[Any], signal: SignalDifference, column: Column) -> None:
             shown = abs(column.time - centre.time) <= _AROUND
             upper.set_title(f'around {centre.time:.3f} s', fontsize='small')
         time = column.time[shown]
-        upper.plot(time, factor * column.a[shown], color=_BLUE, linewidth=1.0, label='A')
-        upper.plot(time, factor * column.b[shown], color=_RED, linewidth=1.0, linestyle='--', label='B')
+        upper.plot(time, factor * column.a[shown], color=COLOURS[0], linewidth=1.0, label='A')
+        upper.plot(time, factor * column.b[shown], color=COLOURS[1], linewidth=1.0, linestyle='--', label='B')
         lower.plot(
-            time, factor * (column.b[shown] - column.a[shown]), color=_GREY, linewidth=0.8, label='B minus A'
+            time,
+            factor * (column.b[shown] - column.a[shown]),
+            color=DIFFERENCE_COLOUR,
+            linewidth=0.8,
+            label='B - A',
         )
         lower.sharex(upper)
         upper.tick_params(labelbottom=False)

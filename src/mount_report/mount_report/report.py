@@ -6,9 +6,8 @@ from pathlib import Path
 
 from mount_bags.bag.recording import Recording
 from mount_bags.compare.alignment import ComparisonError, align
-from mount_report.drawing.interactive import POINTS
 from mount_report.drawing.page import page
-from mount_report.sections import run_sections, signal_sections
+from mount_report.sections import overview, run_sections, signal_sections
 from mount_report.sections.section import Section
 from mount_report.sections.subject import RunFacts, Subject
 from mount_report.signals import Signals
@@ -47,12 +46,11 @@ class Report:
 
     title: str
     sections: Sequence[Section]
-    points: int
     failures: Sequence[str] = ()  # a sentence for each section that could not be made
 
     def write_page(self, file: Path) -> None:
         """Write the HTML page; raises `OSError`."""
-        file.write_text(page(self.title, self.sections, self.points), encoding='utf-8')
+        file.write_text(page(self.title, self.sections), encoding='utf-8')
 
     def write_pictures(self, folder: Path, on_picture: OnStep = lambda what, share: None) -> list[Path]:
         """Write each chart as a PNG of its name into `folder`, and return their paths; raises `OSError`."""
@@ -96,9 +94,9 @@ def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda what, shar
         on_step(make.__name__, place / len(SECTIONS))
         made += _section_or_reason(make, subjects, failures)
     # Last, because it also says what the others did not find.
-    overview = _section_or_reason(run_sections.overview, subjects, failures)
+    first = _section_or_reason(overview.overview, subjects, failures)
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
-    return Report(title, [*overview, *made], POINTS // len(subjects), failures)
+    return Report(title, [*first, *made], failures)
 
 
 def _section_or_reason(make: MakeSection, subjects: Sequence[Subject], failures: list[str]) -> list[Section]:

@@ -10,10 +10,12 @@ from mount_bringup.mount_choice import seat_of
 from mount_control.policy.contract import Policy
 from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
+from mount_report.drawing.style import COLOUR_OF
 from mount_report.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from mount_report.drive.signals import load_drive
+from mount_report.drive.undamped import UndampedError, undamped_of
 from mount_report.sections.charts import Levels
-from mount_report.sections.subject import RunFacts, Tracking
+from mount_report.sections.subject import RunFacts, Tracking, WithoutDamping
 from mount_report.signals import Signals
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
 from mount_sim.plant.mounts import without_friction
@@ -32,6 +34,7 @@ def run_facts(signals: Signals) -> RunFacts:
             resistance=coil.resistance,
             resistance_remark=f'no session tells the coil: default R = {coil.resistance:g} ohm assumed',
             tracking_remark='the recording has no session that tells which force was wanted',
+            undamped_remark='the recording has no session that tells the excitation',
         )
     try:
         levels = levels_of(*policy_of(parameters))
@@ -42,7 +45,9 @@ def run_facts(signals: Signals) -> RunFacts:
         return RunFacts(
             levels_remark=f'the parameters of the session cannot be used: {error}',
             tracking_remark=f'the parameters of the session cannot be used: {error}',
+            undamped_remark=f'the parameters of the session cannot be used: {error}',
         )
+    undamped, undamped_remark = _undamped(signals, parameters)
     tracking, remark = (None, f'not applicable: {no_friction}')
     if not no_friction:
         tracking, remark = _tracking(signals, parameters)
@@ -52,7 +57,10 @@ def run_facts(signals: Signals) -> RunFacts:
         resistance_remark=f'R = {coil.resistance:g} ohm, limit {control.highest_current:g} A',
         tracking=tracking,
         tracking_remark=remark,
+        undamped=undamped,
+        undamped_remark=undamped_remark,
         without_friction=no_friction,
+        colour=_colour(seat_of(parameters)),
     )
 
 
@@ -63,6 +71,21 @@ def _parameters(session: str) -> Parameters | None:
         return with_recorded_policy(found) if found else None
     except SessionError:
         return None
+
+
+def _colour(mount: str) -> str:
+    """Return the colour of a mount; recordings of the friction mount are told apart by their own, so none."""
+    return '' if mount.startswith('friction') and mount != 'friction_off' else COLOUR_OF.get(mount, '')
+
+
+def _undamped(signals: Signals, parameters: Parameters) -> tuple[WithoutDamping | None, str]:
+    try:
+        found = undamped_of(signals.recording, parameters)
+    except UndampedError as reason:
+        return None, str(reason)
+    time = (found.stamps - signals.zero) / 1e9
+    begin = (found.begin - signals.zero) / 1e9
+    return WithoutDamping(time, found.displacement, found.chassis_acceleration, begin), ''
 
 
 def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None, str]:

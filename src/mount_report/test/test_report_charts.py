@@ -4,14 +4,13 @@ import base64
 import json
 
 import numpy as np
-import plotly.graph_objects as graph_objects
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_report.drawing.chart import Chart, ChartError, Curve, Level, Panel, Span
+from mount_report.drawing.detail import browser_chart, budget_of, even_numbers
 from mount_report.drawing.envelope import envelope
-from mount_report.drawing.interactive import plotly_figure
 from mount_report.drawing.page import page
 from mount_report.drawing.picture import draw_chart
 from mount_report.sections import charts
@@ -162,6 +161,7 @@ def test_a_long_gap_stays_a_gap_in_the_envelope():
     assert np.isnan(inside).all()
 
 
+HARMONICS = np.arange(1.0, 9.0)
 LEVELS = {'switch-on level': 8e-4, 'switch-off level': 3.5e-4}
 
 
@@ -171,7 +171,7 @@ def all_charts() -> list[Chart]:
     return [
         charts.time_traces(two, two, levels, [(0.5, 1.0)]),
         charts.hysteresis_loops(two, two[:1]),
-        charts.harmonics_bars([('A', np.array([200.0, 1.0])), ('B', np.array([100.0, 2.0]))]),
+        charts.harmonics_dots([Named('', HARMONICS, np.ones(8)), Named('B', HARMONICS, np.ones(8))]),
         charts.spectra([('displacement (mm/√Hz)', two)]),
         charts.sweep_bands([Named('', np.arange(3.0), np.ones(3))], [Named('', np.arange(3.0), np.ones(3))]),
         charts.tracking(two[:1], two[1:], [(0.5, 1.0)], (0.4, 1.1)),
@@ -180,28 +180,54 @@ def all_charts() -> list[Chart]:
 
 
 @pytest.mark.parametrize('chart', all_charts(), ids=lambda chart: chart.name)
-def test_every_axis_has_a_label_with_its_unit_and_plotly_knows_every_property(chart):
-    figure = plotly_figure(chart)
-    graph_objects.Figure(json.loads(json.dumps(figure, allow_nan=False)))  # refuses unknown properties
-    labels = [axis['title']['text'] for name, axis in figure['layout'].items() if 'axis' in name]
+def test_every_axis_has_a_label_with_its_unit(chart):
+    told = json.loads(json.dumps(browser_chart(chart), allow_nan=False))
+    labels = [told['x_label'], *(panel['label'] for panel in told['panels'])]
     assert len(labels) == 1 + len(chart.panels)
     assert all(label.endswith(')') or label in ('harmonic', 'x') for label in labels)
 
 
-def test_names_reach_the_drawing_as_text():
-    names = [trace['name'] for trace in plotly_figure(all_charts()[1])['data']]
-    assert 'mount force, B &lt;b&gt;' in names
+def read_back(even: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest values as the page's script decodes them."""
+    raw = np.frombuffer(base64.b64decode(even['values']), '<i2').astype(float)
+    values = np.where(raw == -32768, np.nan, even['low'] + even['size'] * (raw + 32767))
+    pairs = values.reshape(-1, 2) if even['pairs'] else np.stack([values, values], 1)
+    return pairs[:, 0], pairs[:, 1]
 
 
-def test_long_curves_are_thinned_and_keep_their_numbers():
-    x = np.arange(50_000) * 1e-3
-    y = np.sin(x)
-    y[12_345] = 7.0
-    chart = Chart('c', 'c', 'x (s)', [Panel('y (N)', [Curve('y', x, y)])])
-    (trace,) = plotly_figure(chart, 1000)['data']
-    shown = np.frombuffer(base64.b64decode(trace['y']['bdata']), trace['y']['dtype'])
-    assert len(shown) <= 1000
-    assert shown.max() == 7.0
+@settings(deadline=None, max_examples=60)
+@given(st.integers(3001, 20_000), st.integers(3000, 30_000), st.booleans(), st.integers(0, 2**31))
+def test_a_long_curve_is_told_briefly_and_hides_no_extreme(count, budget, jitter, seed):
+    rng = np.random.default_rng(seed)
+    kept = np.flatnonzero(rng.random(count) > 0.01)
+    x, y = kept * 1e-3, rng.normal(size=len(kept))
+    if jitter:
+        x = x + rng.uniform(-3e-4, 3e-4, len(kept))
+    y[rng.random(len(kept)) < 0.02] = np.nan
+    even = even_numbers(x, y, budget)
+    low, high = read_back(even)
+    assert len(low) * (2 if even['pairs'] else 1) <= budget + 2
+    assert even['begin'] + even['step'] * len(low) >= x[-1] - 1e-9
+    assert np.nanmax(high) == pytest.approx(np.nanmax(y), abs=2 * even['size'])
+    assert np.nanmin(low) == pytest.approx(np.nanmin(y), abs=2 * even['size'])
+    if not even['pairs']:
+        places = np.round((x - x[0]) / even['step']).astype(int)
+        np.testing.assert_allclose(low[places], y, atol=even['size'])
+        assert np.isnan(np.delete(low, places)).all()
+    known = np.isfinite(y)
+    group = ((x - x[0]) / even['step'] + (1e-9 if even['pairs'] else 0.5)).astype(int)
+    assert (low[group[known]] <= y[known] + even['size']).all()
+    assert (high[group[known]] >= y[known] - even['size']).all()
+
+
+def test_what_short_curves_leave_goes_to_the_long_ones():
+    def chart(length: int) -> Chart:
+        x = np.arange(float(length))
+        return Chart('c', 'c', 'x (s)', [Panel('y (N)', [Curve('y', x, x)])])
+
+    assert budget_of([chart(10)], 100_000) == 100_000
+    assert budget_of([chart(10_000), chart(200_000), chart(300_000)], 100_000) == 45_000
+    assert budget_of([chart(30_000), chart(30_000)], 100_000) >= 30_000
 
 
 def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy():
@@ -212,6 +238,21 @@ def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy():
         (pytest.approx(0.8), True),
         (pytest.approx(0.35), True),
     ]
+
+
+def test_harmonics_are_dots_in_decibels_and_none_is_no_dot():
+    (panel,) = charts.harmonics_dots([Named('', HARMONICS[:3], np.array([100.0, 1.0, 0.0]))]).panels
+    assert panel.dots[0].y[:2].tolist() == [40.0, 0.0]
+    assert np.isnan(panel.dots[0].y[2])
+
+
+def test_what_differs_between_two_recordings_stands_below_them():
+    two = [Named('A', TIME, np.zeros(len(TIME))), Named('B', TIME + 5e-4, np.full(len(TIME), 1e-3))]
+    chart = charts.time_traces(two, two, Levels(), differ=True)
+    assert [panel.label for panel in chart.panels][1::2] == ['displacement, B - A (mm)', 'current, B - A (A)']
+    (curve,) = chart.panels[1].curves
+    assert curve.y[:-1] == pytest.approx(1.0)
+    assert np.isnan(curve.y[-1])  # behind the end of A
 
 
 @pytest.mark.parametrize('chart', all_charts()[:3], ids=lambda chart: chart.name)
@@ -234,4 +275,4 @@ def test_no_text_in_a_chart_ends_the_script_that_holds_it():
     chart = Chart('c', 'c', '</script>', [Panel('y (N)', [Curve('y', TIME, TIME)])])
     text = page('t', [Section('c', 'C', chart=chart)])
     block = text.split('<script type="application/json">')[1].split('</script>')[0]
-    assert json.loads(block)['layout']['xaxis']['title']['text'] == '</script>'
+    assert json.loads(block)['x_label'] == '</script>'

@@ -10,7 +10,7 @@ from mount_bags.audit.losses import Losses
 from mount_bags.run.screen import Table
 
 _TROUBLES = {'duplicated': 'twice', 'out_of_order': 'late', 'misdated': 'misdated'}
-_HEADS = ('topic', 'expected', 'present', 'lost', 'gap ms', 'jitter us')
+_HEADS = ('topic', 'expected', 'present', 'lost', 'gap ms', 'jitter µs')
 _BAR = 40  # characters
 
 

@@ -1,10 +1,10 @@
-"""Numbers with units as people read them: 0.031 A, 12.5 um, 3.2 ms."""
+"""Numbers with units as people read them: 0.031 A, 12.5 µm, 3.2 ms."""
 
 import math
 
 _SMALLER = {
-    'm': (('m', 1.0), ('mm', 1e-3), ('um', 1e-6), ('nm', 1e-9)),
-    's': (('s', 1.0), ('ms', 1e-3), ('us', 1e-6)),
+    'm': (('m', 1.0), ('mm', 1e-3), ('µm', 1e-6), ('nm', 1e-9)),
+    's': (('s', 1.0), ('ms', 1e-3), ('µs', 1e-6)),
 }
 _ROUNDED_UP = 0.9995
 

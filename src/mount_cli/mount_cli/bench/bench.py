@@ -99,5 +99,5 @@ GROUPS: dict[str, Callable[[BenchOrder, Callable[[str], None]], Figures]] = {
 
 def _text(value: float, unit: str) -> str:
     if unit == 's':
-        return f'{1e6 * value:.2f} us' if value < 0.1 else f'{value:.2f} s'
+        return f'{1e6 * value:.2f} µs' if value < 0.1 else f'{value:.2f} s'
     return f'{value:.4g}' if unit == '1' else f'{value:.4g} {unit}'

@@ -7,16 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from mount_experiments.bench.evaluation import COULOMB, HYDRO, OFF, ORDERS, Loop
-from mount_experiments.harness.drawing import BLUE, GREY, RED, family, finish, new_figure
+from mount_experiments.harness.drawing import BLUE, family, finish, new_figure
+from mount_report.drawing.style import COLOURS, HYDROMOUNT_COLOUR, UNDAMPED_COLOUR
+from mount_report.sections.charts import decibels
 
 
 def draw_hysteresis(loops: dict[str, Loop], dampers: list[str], title: str, file: Path) -> Path:
     """Draw mount force over displacement for the family of characteristics, Fig. 13 left."""
     figure = new_figure(f'Loss hysteresis of the mount at {title} (Fig. 13 left)', 6.0)
     axes = figure.subplots()
-    lines = [(OFF, 'black', '-', 1.4)]
+    lines = [(OFF, UNDAMPED_COLOUR, '-', 1.4)]
     lines += [(name, colour, '-', 1.4) for name, colour in zip(dampers, family(len(dampers)), strict=True)]
-    lines += [(HYDRO, RED, '--', 2.0)]
+    lines += [(HYDRO, HYDROMOUNT_COLOUR, '--', 2.0)]
     for name, colour, dash, width in lines:
         loop = loops[name]
         loss = 1e3 * loop.figures['loss_energy_j']
@@ -35,29 +37,31 @@ def draw_hysteresis(loops: dict[str, Loop], dampers: list[str], title: str, file
 
 
 def draw_harmonics(loops: dict[str, Loop], damper: str, title: str, file: Path) -> Path:
-    """Draw harmonics 1 to 8 of the mount force as bars, Fig. 13 right."""
+    """Draw harmonics 1 to 8 of the mount force as dots in dB, Fig. 13 right."""
     figure = new_figure(f'Harmonics of the mount force at {title} (Fig. 13 right)')
     axes = figure.subplots()
     places = np.arange(1, ORDERS + 1)
     shown = (
         (damper, f'friction mount, {damper}', BLUE),
-        (HYDRO, HYDRO, RED),
-        (COULOMB, 'plain Coulomb', GREY),
+        (HYDRO, HYDRO, HYDROMOUNT_COLOUR),
+        (COULOMB, 'plain Coulomb', COLOURS[1]),
     )
-    least = 0.01  # N: below it a bar tells nothing
+    least = -40.0  # dB above 1 N: below it a dot tells nothing
     for number, (name, label, colour) in enumerate(shown):
         found = loops[name].figures
-        axes.bar(
-            places + 0.27 * (number - 1),
-            np.maximum(found['harmonics_n'], least),
-            0.25,
+        level = np.maximum(decibels(np.asarray(found['harmonics_n'])), least)
+        beside = places + 0.12 * (number - 1)  # so that dots of one height do not hide each other
+        axes.vlines(beside, least, level, color=colour, linewidth=0.8, alpha=0.5)
+        axes.plot(
+            beside,
+            level,
+            'o',
             color=colour,
             label=f'{label}: THD {100 * found["thd"]:.1f} %',
         )
-    axes.set_yscale('log')
     axes.set_ylim(bottom=least)
     axes.set_xticks(places)
     axes.set_xlabel('order of the harmonic (1)')
-    axes.set_ylabel('amplitude (N), logarithmic')
+    axes.set_ylabel('amplitude above 1 N (dB)')
     axes.legend(fontsize='small')
     return finish(figure, file)

@@ -132,7 +132,7 @@ def _draw_section(cases: list[AtCurrent], file: Path) -> Path:
     left.plot([], [], '.', color='black', label='finite elements')
     left.plot([], [], color='black', label='diffusion, one dimension')
     for axes in (left, middle):
-        axes.set_xlabel('depth from the surface (um)')
+        axes.set_xlabel('depth from the surface (µm)')
     left.set_ylabel('change over its value at the surface (1)')
     middle.set_ylabel('change of flux density (mT)')
     left.set_title('half a plate', fontsize='medium')
@@ -152,7 +152,7 @@ def _draw_section(cases: list[AtCurrent], file: Path) -> Path:
     right.yaxis.set_major_formatter('{x:g}')
     right.yaxis.set_minor_formatter('{x:g}')
     right.set_xlabel('mean current (A)')
-    right.set_ylabel('equivalent depth (um)')
+    right.set_ylabel('equivalent depth (µm)')
     right.legend(fontsize='small')
     figure.legend(*left.get_legend_handles_labels(), loc='outside lower center', ncols=6, fontsize='small')
     return finish(figure, file)

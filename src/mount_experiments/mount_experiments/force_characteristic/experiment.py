@@ -100,7 +100,7 @@ def _draw(measured: RigMeasurements, specimen: Specimen, file: Path) -> Path:
         axes.plot(measured.currents, force, '.', color=colour, markersize=5)
         axes.plot(
             fine, checked_force(specimen.force_law, fine, gap), color=colour, linewidth=1.2,
-            label=f'{gap * 1e6:.0f} um',
+            label=f'{gap * 1e6:.0f} µm',
         )  # fmt: skip
         if _within_table_1(gap):
             axes.plot(fine, checked_force(TABLE_1, fine, gap), color=colour, linewidth=0.8, linestyle='--')

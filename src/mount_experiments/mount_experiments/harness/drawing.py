@@ -14,7 +14,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-BLUE, RED, GREY, GREEN = '#1f5fa8', '#b03030', '#666666', '#3a8a4d'
+from mount_report.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
+
+BLUE, RED, GREY = COLOURS[0], LEVEL_COLOUR, SPAN_COLOUR
+"""Of the friction mount and other lines; of levels and what stands out; of shades."""
 _WIDTH = 10.0  # inches
 _DPI = 100
 _LAYOUT: Literal['constrained'] | None = 'constrained'

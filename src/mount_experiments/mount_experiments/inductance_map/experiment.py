@@ -182,7 +182,7 @@ def _draw(held: RigMeasurements, ramp: Ramp, specimen: Specimen, results: dict[s
     panels = figure.subplot_mosaic([['map', 'crossing'], ['map', 'rest']], width_ratios=(3, 2))
     axes = panels['map']
     for gap, row, colour in zip(held.gaps, held.inductance, family(held.gaps.size), strict=True):
-        axes.plot(held.currents, 1e3 * row, color=colour, linewidth=0.9, label=f'{gap * 1e6:.0f} um held')
+        axes.plot(held.currents, 1e3 * row, color=colour, linewidth=0.9, label=f'{gap * 1e6:.0f} µm held')
     current, inductance = _averaged(ramp)
     axes.plot(current, 1e3 * inductance, color=RED, linewidth=3.0, alpha=0.8, label='assembled, current ramp')
     axes.axhline(1e3 * specimen.crossing_inductance, color='black', linestyle='--', linewidth=0.8)
@@ -208,8 +208,8 @@ def _draw(held: RigMeasurements, ramp: Ramp, specimen: Specimen, results: dict[s
         panel = panels[name]
         panel.plot(1e6 * fine, line, color=BLUE, linewidth=1.0, label='polynomial')
         panel.plot(1e6 * held.gaps, measured, 'o', color=BLUE, markerfacecolor='none', label='held gaps')
-        panel.plot(1e6 * of_ramp[0], of_ramp[1], 's', color=RED, label=f'ramp: {1e6 * of_ramp[0]:.1f} um')
-        panel.set_xlabel('gap between the core halves (um)')
+        panel.plot(1e6 * of_ramp[0], of_ramp[1], 's', color=RED, label=f'ramp: {1e6 * of_ramp[0]:.1f} µm')
+        panel.set_xlabel('gap between the core halves (µm)')
         panel.set_ylabel(label)
         panel.legend(fontsize='small')
     return finish(figure, file)

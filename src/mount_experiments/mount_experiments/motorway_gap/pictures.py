@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mount_experiments.harness.drawing import BLUE, GREEN, GREY, RED, finish, new_figure
+from mount_experiments.harness.drawing import BLUE, GREY, RED, finish, new_figure
 from mount_experiments.motorway_gap.evaluation import FRICTION, HYDRO, OFF, Crossing
+from mount_report.drawing.style import HYDROMOUNT_COLOUR, UNDAMPED_COLOUR
 
 if TYPE_CHECKING:
     from mount_control.policy import switched_viscous
@@ -23,12 +24,12 @@ def draw_gap(crossing: Crossing, depth: float, control: switched_viscous.Paramet
     seen, truth = crossing.drives[FRICTION].seen, crossing.drives[FRICTION].truth
     middle = float(truth.time[-1]) / 2.0 if crossing.exceeded is None else crossing.exceeded
     begin, end = middle - _BEFORE, middle + _AFTER
-    for name, colour, dash, width in ((OFF, GREY, ':', 1.0), (HYDRO, GREEN, '--', 1.0)):
+    for name, colour, dash in ((OFF, UNDAMPED_COLOUR, ':'), (HYDRO, HYDROMOUNT_COLOUR, '--')):
         other = crossing.drives[name].truth
         shown = (other.time >= begin) & (other.time <= end)
         upper.plot(
             other.time[shown], 1e3 * other.displacement[shown], color=colour, linestyle=dash,
-            linewidth=width, label=name,
+            linewidth=1.0, label=name,
         )  # fmt: skip
     shown = (seen.time >= begin) & (seen.time <= end)
     upper.plot(seen.time[shown], 1e3 * seen.displacement[shown], color=BLUE, linewidth=1.8, label=FRICTION)
@@ -45,7 +46,7 @@ def draw_gap(crossing: Crossing, depth: float, control: switched_viscous.Paramet
     lower.plot(truth.time[current], truth.coil_current[current], color=BLUE)
     for axes in (upper, lower):
         axes.fill_between(
-            seen.time[shown], 0.0, 1.0, where=seen.damping_active[shown], color=BLUE, alpha=0.10,
+            seen.time[shown], 0.0, 1.0, where=seen.damping_active[shown], color=GREY, alpha=0.15,
             transform=axes.get_xaxis_transform(), label='damping on', step='post', linewidth=0.0,
         )  # fmt: skip
     upper.set_ylabel('displacement (mm)')

@@ -10,16 +10,22 @@ import numpy as np
 
 from mount_control import band_pass
 from mount_control.policy import continuous_viscous, switched_viscous
-from mount_experiments.harness.drawing import BLUE, GREEN, GREY, RED, finish, new_figure
+from mount_experiments.harness.drawing import BLUE, GREY, finish, new_figure
 from mount_experiments.policy.cases import COMPARED, CONTINUOUS, HYDRO, OFF, PAPER
 from mount_experiments.sweep.evaluation import FIRST_FREQUENCY, RATE
 from mount_models.sampling import SAMPLE_TIME
+from mount_report.drawing.style import COLOUR_OF
 
 if TYPE_CHECKING:
     from mount_experiments.policy.cases import Axes
     from mount_report.drive.signals import FloatArray
 
-_COLOURS = {CONTINUOUS: BLUE, PAPER: GREEN, HYDRO: RED, OFF: GREY}
+_COLOURS = {
+    CONTINUOUS: COLOUR_OF['continuous_viscous'],
+    PAPER: COLOUR_OF['switched_viscous'],
+    HYDRO: COLOUR_OF['hydro'],
+    OFF: COLOUR_OF['undamped'],
+}
 _GAP_TIME, _BEFORE, _AFTER = 2.0, 0.05, 0.8  # s
 
 

@@ -178,7 +178,7 @@ def _draw(
     stiffness = results['joint_stiffness_n_per_m']
     label = f'c_xi = {1e-6 * stiffness:.2f} N/um'
     left.plot(reach, 1e-6 * stiffness * reach, color=RED, linestyle='--', linewidth=1.0, label=label)
-    left.set_xlabel('displacement x (um)')
+    left.set_xlabel('displacement x (µm)')
     yielding = 1e6 * _wanted(time, parameters) - x
     middle.plot(yielding, force, color=BLUE, linewidth=0.8, label='recorded')
     p = results['motor_stiffness_n_per_m']
@@ -186,7 +186,7 @@ def _draw(
     middle.plot(
         reach, 1e-6 * p * reach, color=RED, linestyle='--', linewidth=1.0, label=f'p = {1e-6 * p:.2f} N/um'
     )
-    middle.set_xlabel('wanted minus measured (um)')
+    middle.set_xlabel('wanted minus measured (µm)')
     right.plot(time, x, color=BLUE, linewidth=0.8, label='recorded')
     after = time > 0.0
     right.plot(
@@ -195,7 +195,7 @@ def _draw(
     )  # fmt: skip
     right.axvline(parameters.fit_from, color=GREY, linestyle=':', linewidth=1.0, label='fitted from here')
     right.set_xlabel('time from the start of the ramp (s)')
-    right.set_ylabel('displacement x (um)')
+    right.set_ylabel('displacement x (µm)')
     for axes in (left, middle):
         axes.set_ylabel('friction force (N)')
     for axes in (left, middle, right):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mount_experiments.harness.drawing import BLUE, GREEN, GREY, RED, finish, new_figure
+from mount_experiments.harness.drawing import BLUE, GREY, RED, finish, new_figure
 from mount_experiments.recorded_drive.evaluation import (
     BANDS,
     ELASTOMER,
@@ -15,6 +15,7 @@ from mount_experiments.recorded_drive.evaluation import (
     HYDRO,
     Spectra,
 )
+from mount_report.drawing.style import HYDROMOUNT_COLOUR, UNDAMPED_COLOUR
 
 if TYPE_CHECKING:
     from mount_control.policy import switched_viscous
@@ -29,7 +30,7 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
     figure = new_figure('A recorded drive: displacement of the mount and its force on the chassis', 7.5)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, name, scale, label in (
-        (panels[0], 'displacement', 1e6, 'displacement (um/$\\sqrt{\\mathrm{Hz}}$)'),
+        (panels[0], 'displacement', 1e6, 'displacement (µm/$\\sqrt{\\mathrm{Hz}}$)'),
         (panels[1], 'force', 1.0, 'force on the chassis (N/$\\sqrt{\\mathrm{Hz}}$)'),
     ):
         for (mount, colour, dash), width in zip(_styles(), (1.6, 1.4, 1.4), strict=True):
@@ -40,7 +41,7 @@ def draw_spectra(spectra: dict[str, Spectra], file: Path) -> Path:
                 each.frequency[shown], values, color=colour, linestyle=dash, linewidth=width, label=mount
             )
         for edge in sorted({edge for band in BANDS for edge in band}):
-            axes.axvline(edge, color=GREEN, linewidth=0.8, linestyle='-.')
+            axes.axvline(edge, color=GREY, linewidth=0.8, linestyle='-.')
         axes.set_ylabel(label)
     ticks = [1, 2, 5, 8, 12, 20, 30]
     panels[1].set_xticks(ticks, [f'{tick:g}' for tick in ticks])
@@ -69,12 +70,12 @@ def draw_traces(drives: dict[str, DriveSignals], control: switched_viscous.Param
     for axes, whole in ((upper, True), (lower, False)):
         within = (seen.time >= 0.0) if whole else (seen.time >= begin) & (seen.time <= end)
         axes.fill_between(
-            seen.time[within], 0.0, 1.0, where=seen.damping_active[within], color=BLUE, alpha=0.18,
+            seen.time[within], 0.0, 1.0, where=seen.damping_active[within], color=GREY, alpha=0.18,
             transform=axes.get_xaxis_transform(), label='damping on', step='post', linewidth=0.0,
         )  # fmt: skip
         for sign in (1.0, -1.0):
             axes.axhline(
-                1e3 * sign * control.switch_on_level, color=GREEN, linestyle='--', linewidth=0.9,
+                1e3 * sign * control.switch_on_level, color=RED, linestyle='--', linewidth=0.9,
                 label='switch-on level' if sign > 0.0 else None,
             )  # fmt: skip
         axes.set_ylabel('displacement (mm)')
@@ -89,4 +90,4 @@ def draw_traces(drives: dict[str, DriveSignals], control: switched_viscous.Param
 
 def _styles() -> list[tuple[str, str, str]]:
     """Return mount, colour and dash, the one that lies on top last."""
-    return [(ELASTOMER, GREY, ':'), (HYDRO, RED, '--'), (FRICTION, BLUE, '-')]
+    return [(ELASTOMER, UNDAMPED_COLOUR, ':'), (HYDRO, HYDROMOUNT_COLOUR, '--'), (FRICTION, BLUE, '-')]

@@ -19,7 +19,7 @@ def draw_time(run: Run, file: Path) -> Path:
     upper.plot(run.recording.time, force, color=BLUE, linewidth=0.6)
     upper.set_ylabel('friction force (N)')
     lower.plot(run.recording.time, 1e6 * np.sign(force) * run.deflection, color=RED, linewidth=0.8)
-    lower.set_ylabel('deflection u (um)')
+    lower.set_ylabel('deflection u (µm)')
     lower.set_xlabel('time (s)')
     return finish(figure, file)
 
@@ -37,7 +37,7 @@ def draw_lines(run: Run, file: Path) -> Path:
             label = f'{1e3 * _speed(stroke):.3g} mm/s'
             axes.plot(1e6 * ends, stroke.a + stroke.b * ends, color=colour, linewidth=1.5, label=label)
         axes.set_title('positive direction' if direction > 0.0 else 'negative direction', fontsize='medium')
-        axes.set_xlabel('deflection u (um)')
+        axes.set_xlabel('deflection u (µm)')
         axes.set_ylabel('coefficient of both pads, mu_dyn (1)')
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc='outside lower center', ncols=5, fontsize='small')

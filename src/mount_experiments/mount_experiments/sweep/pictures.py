@@ -7,30 +7,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mount_experiments.harness.drawing import BLUE, GREEN, GREY, RED, finish, new_figure
+from mount_experiments.harness.drawing import BLUE, finish, new_figure
 from mount_experiments.sweep.evaluation import ALWAYS, FRICTION, HYDRO, OFF, SweepRun
+from mount_report.drawing.style import COLOURS, HYDROMOUNT_COLOUR, UNDAMPED_COLOUR
 
 if TYPE_CHECKING:
     from mount_report.drive.signals import FloatArray
 
-_OUTLINE_STEP = 0.25  # Hz
+_ENVELOPE_STEP = 0.25  # Hz
 
 
 def draw_sweep(friction: SweepRun, hydro: SweepRun, title: str, file: Path) -> Path:
-    """Draw displacement and chassis acceleration over frequency, the hydromount as outline, Fig. 14."""
+    """Draw displacement and chassis acceleration over frequency, as envelopes, logarithmic, Fig. 14."""
     figure = new_figure(f'Front wheels on a sweep of 1 Hz per second: {title}', 6.5)
     panels = figure.subplots(2, 1, sharex=True)
     quantities = (
-        ('displacement (mm)', 1e3, 'displacement'),
-        ('chassis acceleration (m/s$^2$)', 1.0, 'chassis_acceleration'),
+        ('displacement, envelope (mm)', 1e3, 'displacement'),
+        ('chassis acceleration,\nenvelope (m/s$^2$)', 1.0, 'chassis_acceleration'),
     )
     for axes, (label, scale, name) in zip(panels, quantities, strict=True):
-        # samples in pairs of lowest and highest: a picture of this width shows no more
-        x, low, high = _envelope(friction.frequency, scale * getattr(friction.drive.truth, name), 0.02)
-        axes.fill_between(x, low, high, color=BLUE, linewidth=0.4, label='friction mount')
-        x, low, high = _envelope(hydro.frequency, scale * getattr(hydro.drive.truth, name), _OUTLINE_STEP)
-        axes.plot(x, high, color=RED, linewidth=1.4, label='hydromount (outline)')
-        axes.plot(x, low, color=RED, linewidth=1.4)
+        for run, colour, mount in ((hydro, HYDROMOUNT_COLOUR, HYDRO), (friction, BLUE, FRICTION)):
+            x, low, high = _envelope(run.frequency, scale * getattr(run.drive.truth, name), _ENVELOPE_STEP)
+            axes.semilogy(x, np.maximum(high, -low), color=colour, linewidth=1.2, label=mount)
         axes.set_ylabel(label)
     panels[1].set_xlabel('frequency of the road (Hz)')
     panels[0].legend(loc='upper right')
@@ -43,14 +41,14 @@ def draw_peaks(runs: dict[str, SweepRun], file: Path) -> Path:
     axes = figure.subplots()
     for name, colour, dash in (
         (FRICTION, BLUE, '-'),
-        (ALWAYS, GREEN, '-'),
-        (OFF, GREY, ':'),
-        (HYDRO, RED, '--'),
+        (ALWAYS, COLOURS[1], '-'),
+        (OFF, UNDAMPED_COLOUR, ':'),
+        (HYDRO, HYDROMOUNT_COLOUR, '--'),
     ):
         passed = runs[name]
         x, low, high = _envelope(passed.frequency, 1e3 * passed.drive.truth.displacement, 0.5)
         shown = x <= 20.0
-        axes.plot(x[shown], np.maximum(high, -low)[shown], color=colour, linestyle=dash, label=name)
+        axes.semilogy(x[shown], np.maximum(high, -low)[shown], color=colour, linestyle=dash, label=name)
     axes.set_xlabel('frequency of the road (Hz)')
     axes.set_ylabel('largest displacement (mm)')
     axes.legend()

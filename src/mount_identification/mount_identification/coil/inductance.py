@@ -118,8 +118,8 @@ class InductanceResult:
             )
             for point, rest, contact in errors
         ]
-        heads = ('air gap (um)', 'L at rest (mH)', 'error', 'crossing (A)', 'error')
-        return Table('gap curves: error of the curve as a gap (um)', 'rrrrr', rows, heads)
+        heads = ('air gap (µm)', 'L at rest (mH)', 'error', 'crossing (A)', 'error')
+        return Table('gap curves: error of the curve as a gap (µm)', 'rrrrr', rows, heads)
 
     def _temperatures(self) -> Table:
         names = ('rest_uncompensated_um', 'rest_um', 'contact_uncompensated_um', 'contact_um')
@@ -128,7 +128,7 @@ class InductanceResult:
             for row in self.left
         ]
         heads = ('degC', 'at rest', 'compensated', 'at contact', 'compensated', 'from')
-        return Table('largest gap error by coil temperature (um)', 'rrrrrl', rows, heads)
+        return Table('largest gap error by coil temperature (µm)', 'rrrrrl', rows, heads)
 
 
 def calibrate_inductance(

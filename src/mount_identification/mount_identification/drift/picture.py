@@ -17,7 +17,7 @@ _BLUE, _RED, _GREY = '#1f5fa8', '#b03030', '#666666'
 def draw_drift(result: DriftResult, file: Path) -> None:
     """Write points with their deviations, lines with one standard deviation, and the limit (PNG)."""
     rows = [
-        ('contact gap (um)', result.gap, [1e6 * each.contact_gap for each in result.states], 1e6),
+        ('contact gap (µm)', result.gap, [1e6 * each.contact_gap for each in result.states], 1e6),
         ('offset current (mA)', result.current, [1e3 * each.offset_current for each in result.states], 1e3),
     ]
     if result.friction is not None:
@@ -37,10 +37,10 @@ def draw_drift(result: DriftResult, file: Path) -> None:
     every[0].errorbar(hours, rows[0][2], yerr=stds, fmt='none', color=_GREY, capsize=3)
     limit = 1e6 * result.limit
     every[0].axhline(limit, color=_RED, linewidth=1.0, linestyle='--')
-    every[0].annotate(f'range of the law ends at {limit:.1f} um', (grid[0], limit), color=_RED, va='bottom')
+    every[0].annotate(f'range of the law ends at {limit:.1f} µm', (grid[0], limit), color=_RED, va='bottom')
     every[-1].set_xlabel('time (h)')
     picture.suptitle(
-        f'Contact gap {1e6 * result.gap.slope:+.3g} +- {1e6 * result.gap.slope_std:.2g} um/h, '
-        f'{1e6 * result.left:.1f} um left'
+        f'Contact gap {1e6 * result.gap.slope:+.3g} ± {1e6 * result.gap.slope_std:.2g} µm/h, '
+        f'{1e6 * result.left:.1f} µm left'
     )
     picture.savefig(file, dpi=100)

@@ -52,7 +52,7 @@ def _ramp_displacement(axes: Axes, found: Identification) -> None:
     axes.plot(
         recording.time, 1e6 * fit.displacement, color=_RED, linewidth=1.4, label='fit, Eq (10) put right'
     )
-    axes.set(title=f'step 1: {recording.name}', xlabel='time (s)', ylabel='displacement (um)')
+    axes.set(title=f'step 1: {recording.name}', xlabel='time (s)', ylabel='displacement (µm)')
     axes.legend(fontsize='small')
 
 
@@ -60,7 +60,7 @@ def _ramp_force(axes: Axes, found: Identification) -> None:
     recording, fit = found.ramps[0]
     axes.plot(1e6 * recording.displacement, recording.force, color=_GREY, linewidth=0.6, label='measured')
     axes.plot(1e6 * fit.displacement, fit.force, color=_RED, linewidth=1.4, label='fit')
-    axes.set(title='step 1: force over displacement', xlabel='displacement (um)', ylabel='friction force (N)')
+    axes.set(title='step 1: force over displacement', xlabel='displacement (µm)', ylabel='friction force (N)')
     axes.legend(fontsize='small')
 
 
@@ -74,7 +74,7 @@ def _lines(axes: Axes, found: Identification) -> None:
         axes.plot(1e6 * ends, line.a + line.b * ends, color='black', linewidth=0.9)
     axes.plot([], [], color=_BLUE, label='to the positive side')
     axes.plot([], [], color=_RED, label='to the negative side')
-    axes.set(title=f'step 2: {found.lines[0].recording}', xlabel='deflection u (um)', ylabel='mu')
+    axes.set(title=f'step 2: {found.lines[0].recording}', xlabel='deflection u (µm)', ylabel='mu')
     axes.legend(fontsize='small')
 
 

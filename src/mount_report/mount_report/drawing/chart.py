@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_report.drawing.style import COLOURS, LEVEL_COLOUR
+
 Array = NDArray[np.float64]
 
 SOLID, DASHED, DOTTED = 'solid', 'dash', 'dot'
@@ -17,14 +19,15 @@ class ChartError(ValueError):
 
 @dataclass(frozen=True)
 class Curve:
-    """A line through points; NaN interrupts it. `colour` is a place in `COLOURS`."""
+    """A line through points; NaN interrupts it. `colour` is one of `style`."""
 
     name: str
     x: Array
     y: Array
-    colour: int = 0
+    colour: str = COLOURS[0]
     dash: str = SOLID
     steps: bool = False  # holds each value until the next point
+    width: float = 1.2  # pixels
 
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y):
@@ -32,17 +35,17 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Bars:
-    """Bars at the places `x`, side by side with those of other names."""
+class Dots:
+    """Single values `y` at the places `x`."""
 
     name: str
     x: Array
-    heights: Array
-    colour: int = 0
+    y: Array
+    colour: str = COLOURS[0]
 
     def __post_init__(self) -> None:
-        if len(self.x) != len(self.heights):
-            raise ChartError(f'bars {self.name!r}: {len(self.x)} x but {len(self.heights)} heights')
+        if len(self.x) != len(self.y):
+            raise ChartError(f'dots {self.name!r}: {len(self.x)} x but {len(self.y)} y')
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class Level:
     value: float
     dash: str = DASHED
     both: bool = False
+    colour: str = LEVEL_COLOUR
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ class Panel:
 
     label: str
     curves: Sequence[Curve] = ()
-    bars: Sequence[Bars] = ()
+    dots: Sequence[Dots] = ()
     levels: Sequence[Level] = ()
     log: bool = False
     share: float = 1.0  # of the height, against the other panels
@@ -80,7 +84,8 @@ class Chart:
     """Panels above each other over one x axis.
 
     `name` is that of the file, `title` stands above, `remark` below. `spans` are shaded in all panels and
-    called `span_name`; `limits` are those of the x axis, None for all.
+    called `span_name`; `limits` are those of the x axis, None for all. `view` is the part of the x axis that
+    is looked at first: a picture shows only that.
     """
 
     name: str
@@ -90,15 +95,10 @@ class Chart:
     spans: Sequence[Span] = ()
     span_name: str = ''
     limits: tuple[float, float] | None = None
+    view: tuple[float, float] | None = None
     remark: str = ''
     ticks: Sequence[float] = field(default_factory=tuple)  # of the x axis; empty: chosen by the drawing
 
     def __post_init__(self) -> None:
         if not self.panels:
             raise ChartError(f'chart {self.name!r} has no panel')
-
-
-def needs_legend(chart: Chart) -> bool:
-    """Return whether the labels of the axes leave open what is drawn."""
-    several = any(len(panel.curves) + len(panel.bars) > 1 or panel.levels for panel in chart.panels)
-    return several or bool(chart.spans)

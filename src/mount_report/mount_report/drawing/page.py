@@ -1,93 +1,83 @@
 """A report as one HTML page that needs nothing else: no network, no other file."""
 
 import html
+import importlib.resources
 import json
 from collections.abc import Sequence
 
-from mount_report.drawing.interactive import POINTS, plotly_figure, plotly_script
-from mount_report.sections.section import Section, Table
+from mount_report.drawing.detail import NUMBERS, browser_chart, budget_of
+from mount_report.sections.section import Cell, Finding, Link, Section, Table
 
 # The page may not load anything from anywhere, whatever a recording's texts say.
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
-_STYLE = """
-body { font: 15px/1.45 sans-serif; color: #222; max-width: 1000px; margin: 1.5em auto; padding: 0 1em; }
-h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.2em; margin: 1.8em 0 .4em; }
-nav a { margin-right: 1em; } p { margin: .3em 0; } .figure { margin: .6em 0; overflow-x: auto; }
-.tables { overflow-x: auto; } table { border-collapse: collapse; margin: .6em 0; font-size: .87em; }
-caption { text-align: left; font-weight: bold; padding: .2em 0; }
-th, td { text-align: left; padding: .15em .9em .15em 0; border-bottom: 1px solid #ddd; vertical-align: top;
-         overflow-wrap: break-word; font-variant-numeric: tabular-nums; }
-tr.marked td { background: #fff3cd; } noscript { color: #b03030; }
-@page { size: A4; margin: 12mm; }
-@media print {
-  body { margin: 0; padding: 0; max-width: none; } nav, .modebar-container { display: none !important; }
-  .figure { zoom: 0.69; }
-  .figure, tr { break-inside: avoid; } h2 { break-after: avoid; } .figure, .tables { overflow: visible; }
-}
-"""
-
-# Draws one chart after the other, so that the page answers meanwhile. What goes wrong stands in the page.
-_SCRIPT = """
-'use strict';
-const root = document.documentElement;
-root.dataset.drawn = 0;
-window.addEventListener('error', event => { root.dataset.error = event.message; });
-const waiting = Array.from(document.querySelectorAll('script[type="application/json"]'));
-function drawNext() {
-  const next = waiting.shift();
-  if (next === undefined) { root.dataset.ready = 'yes'; return; }
-  const figure = JSON.parse(next.textContent);
-  Plotly.newPlot(next.previousElementSibling, figure.data, figure.layout, {displaylogo: false})
-    .then(() => { root.dataset.drawn = Number(root.dataset.drawn) + 1; })
-    .catch(error => { root.dataset.error = String(error); })
-    .finally(() => setTimeout(drawNext, 0));
-}
-drawNext();
-window.addEventListener('beforeprint', () => {
-  for (const each of document.querySelectorAll('details')) each.open = true;
-});
-"""
+_HINT = (
+    'Drag to zoom, double-click for all; with shift, drag moves; ctrl or shift with the wheel zooms. Touch: '
+    'drag and pinch. Keys on a chart: arrows, + and -, 0; shift with arrows reads values.'
+)
+_PARTS = ('charts.js', 'paint.js', 'input.js')
 
 
-def page(
-    title: str,
-    sections: Sequence[Section],
-    points: int = POINTS,
-) -> str:
-    """Return the HTML of a report; its curves have at most `points` points."""
-    body = [_section(section, points) for section in sections]
+def page(title: str, sections: Sequence[Section], numbers: int = NUMBERS) -> str:
+    """Return the HTML of a report; its long curves have at most `numbers` numbers together."""
+    charts = [section.chart for section in sections if section.chart]
+    budget = budget_of(charts, numbers)
+    body = ''.join(_section(section, budget) for section in sections)
     links = ''.join(f'<a href="#{section.name}">{html.escape(section.title)}</a>' for section in sections)
-    drawing = any(section.chart for section in sections)
-    scripts = f'<script>{plotly_script()}</script>\n' if drawing else ''
+    code = ''.join(_asset(part) for part in _PARTS)
+    script = f'<script>{code}</script>\n' if charts else ''
+    hint = f'<p class="hint">{_HINT}</p>\n' if charts else ''
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<title>{html.escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n'
-        f'<h1>{html.escape(title)}</h1>\n<nav>{links}</nav>\n'
+        f'<title>{html.escape(title)}</title>\n<style>{_asset("page.css")}</style>\n</head>\n<body>\n'
+        f'<h1>{html.escape(title)}</h1>\n<nav>{links}</nav>\n{hint}'
         '<noscript><p>The charts are drawn by a script, which this browser does not run.</p></noscript>\n'
-        f'{"".join(body)}\n{scripts}<script>{_SCRIPT}</script>\n</body>\n</html>\n'
+        f'{body}\n{script}</body>\n</html>\n'
     )
 
 
-def _section(section: Section, points: int) -> str:
+def _asset(name: str) -> str:
+    return (importlib.resources.files('mount_report.drawing') / 'browser' / name).read_text(encoding='utf-8')
+
+
+def _section(section: Section, budget: int) -> str:
     parts = [f'<section id="{section.name}">\n<h2>{html.escape(section.title)}</h2>\n']
+    if section.findings:
+        parts.append(f'<ul class="verdict">{"".join(map(_finding, section.findings))}</ul>\n')
     parts += [f'<p>{html.escape(sentence)}</p>\n' for sentence in section.words]
     if section.chart is not None:
-        figure = json.dumps(plotly_figure(section.chart, points), allow_nan=False, separators=(',', ':'))
+        figure = json.dumps(browser_chart(section.chart, budget), allow_nan=False, separators=(',', ':'))
         safe = figure.replace('<', '\\u003c')  # no text of a recording ends the script
-        parts.append(f'<div class="figure"></div><script type="application/json">{safe}</script>\n')
+        parts.append(
+            f'<div class="figure" data-chart="{section.name}"></div>'
+            f'<script type="application/json">{safe}</script>\n'
+        )
         if section.chart.remark:
             parts.append(f'<p>{html.escape(section.chart.remark)}</p>\n')
     parts += [_table(table) for table in section.tables]
     return ''.join([*parts, '</section>\n'])
 
 
+def _finding(finding: Finding) -> str:
+    text = ' '.join(map(_cell, finding.text))
+    judged = f'<b>{html.escape(finding.what)} <i>({finding.judgement.replace("look", "have a look")})</i></b>'
+    return f'<li class="{finding.judgement}">{judged}{text}</li>'
+
+
+def _cell(cell: Cell) -> str:
+    if not isinstance(cell, Link):
+        return html.escape(cell)
+    at = '' if cell.at is None else f' data-chart="#{cell.section}" data-at="{cell.at:.4f}"'
+    around = '' if cell.at is None else f' data-around="{cell.around:.4f}"'
+    return f'<a href="#{cell.section}"{at}{around}>{html.escape(cell.text)}</a>'
+
+
 def _table(table: Table) -> str:
     rows = [
         f'<tr{" class=marked" if place in table.marked else ""}>'
-        + ''.join(f'<td>{html.escape(cell)}</td>' for cell in row)
+        + ''.join(f'<td>{_cell(cell)}</td>' for cell in row)
         + '</tr>\n'
         for place, row in enumerate(table.rows)
     ]

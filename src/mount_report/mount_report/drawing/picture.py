@@ -11,72 +11,97 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Bars, Chart, Panel, Span, needs_legend
-from mount_report.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
+from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Chart, Curve, Level, Panel
+from mount_report.drawing.envelope import envelope
+from mount_report.drawing.style import SPAN_COLOUR
 
 _STYLES: dict[str, Any] = {SOLID: '-', DASHED: '--', DOTTED: ':'}
 _WIDTH, _PANEL_HEIGHT = 10.0, 2.6  # inches, chosen: 1000 pixels wide
+_POINTS = 8000  # of a curve, chosen: 4 to a pixel of both kinds, lowest and highest
 
 
 def draw_chart(chart: Chart, file: Path) -> None:
-    """Write the picture of `chart` to `file` (PNG, 1000 pixels wide)."""
+    """Write the picture of `chart` to `file` (PNG, 1000 pixels wide, or by its suffix SVG)."""
     shares = [panel.share for panel in chart.panels]
     picture = Figure(figsize=(_WIDTH, 1.0 + _PANEL_HEIGHT * sum(shares)), layout='constrained')
     rows = picture.subplots(len(shares), 1, sharex=True, height_ratios=shares, squeeze=False)[:, 0]
     for axes, panel in zip(rows, chart.panels, strict=True):
-        _draw_panel(axes, panel, chart.spans, chart.span_name)
+        draw_panel(axes, panel, chart.view or chart.limits)
+        for place, span in enumerate(chart.spans):
+            name = chart.span_name if place == 0 and axes is rows[0] else None
+            axes.axvspan(span.begin, span.end, color=SPAN_COLOUR, alpha=0.15, linewidth=0, label=name)
+        name_lines(axes, panel)
     rows[-1].set_xlabel(chart.x_label)
-    if chart.limits is not None:
-        rows[-1].set_xlim(*chart.limits)
     if chart.ticks:
         rows[-1].set_xticks(list(chart.ticks))
-    named = {
-        label: handle
-        for axes in rows
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    if needs_legend(chart):
-        picture.legend(
-            list(named.values()), list(named), loc='outside lower center', ncols=3, fontsize='small'
-        )
     picture.suptitle(chart.title)
     picture.savefig(file, dpi=100)
 
 
-def _draw_panel(axes: Axes, panel: Panel, spans: Any, span_name: str) -> None:
+def draw_panel(axes: Axes, panel: Panel, limits: tuple[float, float] | None = None) -> None:
+    """Draw curves, dots and levels of `panel`, its x axis within `limits`."""
     for curve in panel.curves:
-        colour = COLOURS[curve.colour % len(COLOURS)]
-        axes.plot(
-            curve.x,
-            curve.y,
-            color=colour,
-            linestyle=_STYLES[curve.dash],
-            linewidth=1.0,
-            label=curve.name if len(panel.curves) > 1 else None,  # a single one is named by its axis
-            drawstyle='steps-post' if curve.steps else 'default',
-        )
-    for place, bars in enumerate(panel.bars):
-        _draw_bars(axes, bars, place, len(panel.bars))
+        _draw_curve(axes, curve, limits)
+    for dots in panel.dots:
+        axes.plot(dots.x, dots.y, 'o', color=dots.colour, markersize=5, label=dots.name)
     for level in panel.levels:
-        style = {'color': LEVEL_COLOUR, 'linestyle': _STYLES[level.dash], 'linewidth': 1.0}
-        axes.axhline(level.value, label=level.name, **style)
-        if level.both:
-            axes.axhline(-level.value, **style)
-    for place, span in enumerate(spans):
-        _draw_span(axes, span, span_name if place == 0 else '')
+        _draw_level(axes, level)
+    if limits is not None:
+        axes.set_xlim(*limits)
     if panel.log:
         axes.set_yscale('log')
     axes.set_ylabel(panel.label)
     axes.grid(alpha=0.25)
 
 
-def _draw_bars(axes: Axes, bars: Bars, place: int, of: int) -> None:
-    width = 0.8 / of
-    positions = np.asarray(bars.x) + (place - 0.5 * (of - 1)) * width
-    axes.bar(positions, bars.heights, width, color=COLOURS[bars.colour % len(COLOURS)], label=bars.name)
+def name_lines(axes: Axes, panel: Panel) -> None:
+    """Name what is drawn above the axes, in its own colour; a single curve is named by its axis."""
+    handles, labels = axes.get_legend_handles_labels()
+    single = len(panel.curves) + len(panel.dots) == 1
+    names = {curve.name for curve in (*panel.curves, *panel.dots)}
+    kept = [
+        (handle, label)
+        for handle, label in zip(handles, labels, strict=True)
+        if not single or label not in names
+    ]
+    if kept:
+        legend = axes.legend(
+            *zip(*kept, strict=True), loc='lower right', bbox_to_anchor=(1.0, 0.99), ncols=len(kept),
+            frameon=False, fontsize='small', labelcolor='linecolor', handlelength=1.4, columnspacing=1.2,
+            borderaxespad=0.1,
+        )  # fmt: skip
+        for text, (_, label) in zip(legend.get_texts(), kept, strict=True):
+            if label not in names:
+                text.set_color(SPAN_COLOUR)  # a shaded stretch, whose own colour is too pale to read
 
 
-def _draw_span(axes: Axes, span: Span, name: str) -> None:
-    axes.axvspan(
-        span.begin, span.end, color=SPAN_COLOUR, alpha=0.15, linewidth=0, label=name if name else None
+def _draw_curve(axes: Axes, curve: Curve, limits: tuple[float, float] | None) -> None:
+    x, y = _shown(curve.x, curve.y, limits)
+    axes.plot(
+        x,
+        y,
+        color=curve.colour,
+        linestyle=_STYLES[curve.dash],
+        linewidth=curve.width,
+        label=curve.name,
+        drawstyle='steps-post' if curve.steps else 'default',
     )
+
+
+def _shown(x: Array, y: Array, limits: tuple[float, float] | None) -> tuple[Array, Array]:
+    """Return what lies within the limits, of a long curve over a rising x its envelope."""
+    if len(x) < 2 or not np.all(np.diff(x) > 0.0):
+        return x, y
+    if limits is not None:
+        inside = slice(max(0, np.searchsorted(x, limits[0]) - 1), np.searchsorted(x, limits[1]) + 1)
+        x, y = x[inside], y[inside]
+    return envelope(x, y, _POINTS)
+
+
+def _draw_level(axes: Axes, level: Level) -> None:
+    for value in (level.value, -level.value) if level.both else (level.value,):
+        axes.axhline(value, color=level.colour, linestyle=_STYLES[level.dash], linewidth=1.0)
+    axes.annotate(
+        level.name, (0.0, level.value), xycoords=('axes fraction', 'data'), textcoords='offset points',
+        xytext=(4, 1), color=level.colour, fontsize='small', va='bottom',
+    )  # fmt: skip

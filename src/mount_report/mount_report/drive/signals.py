@@ -16,6 +16,7 @@ FloatArray = NDArray[np.float64]
 _SECOND = 1e9  # ns
 _TRACED = ('damping_active', 'current', 'desired_force')
 _OF_SOME = 'band_displacement'  # of some policies
+_EXCITED = ('road_height',)  # by which an undamped run finds its place in the drive
 _AT_THE_END = ('rest_gap', 'contact_gap')  # what the summary of a drive asks for, read in the same pass
 
 
@@ -75,7 +76,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
         {
             DISPLACEMENT.name: DISPLACEMENT.names,
             CONTROL_TRACE.name: (*_TRACED, _OF_SOME),
-            SIM_TRUTH.name: (*scalars, *_AT_THE_END),
+            SIM_TRUTH.name: (*scalars, *_EXCITED, *_AT_THE_END),
         }
     )
     zero = recording.time_axis.zero

@@ -154,7 +154,7 @@ def print_summary(figures: dict[str, Any], found: Losses, screen: Screen, mount:
 def _gap_row(figures: dict[str, Any], name: str) -> tuple[str, str]:
     measured, std = _UM * figures[f'{name}_gap_m'], _UM * figures[f'{name}_gap_std_m']
     true = _UM * figures[f'true_{name}_gap_m']
-    return f'{name} gap', f'{measured:.1f} ± {std:.1f} um measured, {true:.1f} um true'
+    return f'{name} gap', f'{measured:.1f} ± {std:.1f} µm measured, {true:.1f} µm true'
 
 
 def _switching_text(figures: dict[str, Any]) -> str:
@@ -182,7 +182,7 @@ def _latency_text(figures: dict[str, Any]) -> str:
     median, p99 = figures['latency_median_s'], figures['latency_p99_s']
     if median is None or p99 is None:
         return 'none (no middleware)'
-    return f'{_US * median:.0f} us median, {_US * p99:.0f} us in 99 of 100 (sample sent to setpoint back)'
+    return f'{_US * median:.0f} µs median, {_US * p99:.0f} µs in 99 of 100 (sample sent to setpoint back)'
 
 
 def _restart_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:

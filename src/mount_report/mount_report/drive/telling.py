@@ -23,6 +23,7 @@ from mount_report.drive.summary import (
     summarise,
     summarise_snapshots,
 )
+from mount_report.drive.undamped import Undamped, UndampedError, undamped_of
 from mount_report.json_file import write_json
 
 
@@ -92,7 +93,9 @@ def _tell_mount(
         figure = folder.figure
         if recording.mount:
             figure = figure.with_name(f'{figure.stem}_{recording.mount}{figure.suffix}')
-        told.complaints += _complaint(figure, lambda: _draw(figure, parameters, drive, figures))
+        told.complaints += _complaint(
+            figure, lambda: _draw(figure, parameters, drive, figures, _undamped(recording, parameters))
+        )
         told.pictures += [figure] if figure.exists() else []
     return figures
 
@@ -132,14 +135,29 @@ def _audited(recording: Recording, screen: Screen) -> list[str]:
     return [*recording.warnings, *(f'{name}: {words}' for words in found.complaints())]
 
 
-def _draw(figure: Path, parameters: Parameters, drive: DriveSignals, figures: dict[str, Any]) -> None:
+def _draw(
+    figure: Path,
+    parameters: Parameters,
+    drive: DriveSignals,
+    figures: dict[str, Any],
+    undamped: Undamped | None,
+) -> None:
     from mount_report.drive.picture import draw_drive  # after the drive: what draws takes a second to load
 
-    policy, own = policy_of(parameters)
-    levels = levels_of(policy, own)
+    levels = levels_of(*policy_of(parameters))
     title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
-    begin = figures['excitation_start_s']
-    draw_drive(drive.seen, levels, begin, title, figure)
+    grey = None
+    if undamped is not None:
+        grey = ((undamped.stamps - drive.zero) / 1e9, undamped.displacement)
+    files = (figure, figure.with_suffix('.svg'))
+    draw_drive(drive.seen, levels, figures['excitation_start_s'], title, files, grey, figures['mount'])
+
+
+def _undamped(recording: Recording, parameters: Parameters) -> Undamped | None:
+    try:
+        return undamped_of(recording, parameters)
+    except UndampedError:
+        return None  # the page says why
 
 
 def _write_report(folder: RunFolder, parts: list[Recording], screen: Screen) -> None:

@@ -4,12 +4,13 @@ They take arrays, so no recording is needed.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import cycle
 
 import numpy as np
 
-from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Bars, Chart, Curve, Level, Panel, Span
+from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Chart, Curve, Dots, Level, Panel, Span
+from mount_report.drawing.style import COLOUR_OF, COLOURS, DIFFERENCE_COLOUR, UNDAMPED_COLOUR
 
 _MM = 1e3
 TIME_LABEL = 'time from the first sample (s)'
@@ -17,11 +18,15 @@ TIME_LABEL = 'time from the first sample (s)'
 
 @dataclass(frozen=True)
 class Named:
-    """A series of numbers `y` over `x` with the name that the legend gives it; empty: only one is drawn."""
+    """A series of numbers `y` over `x` with the name that the legend gives it; empty: only one is drawn.
+
+    `colour` is that of a thing with a colour of its own, empty: that of its place among the others.
+    """
 
     name: str
     x: Array
     y: Array
+    colour: str = ''
 
 
 @dataclass(frozen=True)
@@ -40,26 +45,37 @@ def time_traces(
     title: str = 'Displacement and current',
     name: str = 'time_traces',
     limits: tuple[float, float] | None = None,
+    undamped: Named | None = None,
+    differ: bool = False,
 ) -> Chart:
     """Return displacement (m) with the levels of its policy above current (A), over time (s), as in Fig. 15.
 
-    `damping` are the stretches in which damping is on.
+    `damping` are the stretches in which damping is on; `undamped` is the displacement of the same mount
+    without current. Where two series `differ`, the second less the first stands below each pair.
     """
     panels = []
     if displacements:
-        panels.append(
-            Panel(
-                'displacement (mm)',
-                [_curve(series, place, 'displacement', _MM) for place, series in enumerate(displacements)],
-                levels=_lines(levels),
-                share=1.5,
-            )
-        )
+        curves = [_curve(series, place, 'displacement', _MM) for place, series in enumerate(displacements)]
+        if undamped is not None:
+            grey = Curve('undamped', undamped.x, _MM * undamped.y, UNDAMPED_COLOUR)
+            curves.insert(0, grey)  # below the others
+        panels.append(Panel('displacement (mm)', curves, levels=_lines(levels), share=1.5))
+        panels += _difference(displacements, 'displacement, B - A (mm)', _MM) if differ else []
     if currents:
         panels.append(
             Panel('current (A)', [_curve(series, place, 'current') for place, series in enumerate(currents)])
         )
+        panels += _difference(currents, 'current, B - A (A)') if differ else []
     return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', limits)
+
+
+def _difference(series: Sequence[Named], label: str, factor: float = 1.0) -> list[Panel]:
+    """Return the panel of the last series less the first one, where both are known."""
+    if len(series) < 2:
+        return []
+    first, other = series[0], series[-1]
+    y = other.y - np.interp(other.x, first.x, first.y, np.nan, np.nan)
+    return [Panel(label, [Curve('B - A', other.x, factor * y, DIFFERENCE_COLOUR)], share=0.7)]
 
 
 def hysteresis_loops(
@@ -80,19 +96,24 @@ def hysteresis_loops(
     return Chart(name, title, 'displacement (mm)', panels)
 
 
-def harmonics_bars(
-    amplitudes: Sequence[tuple[str, Array]],
+def harmonics_dots(
+    amplitudes: Sequence[Named],
     title: str = 'Harmonics of the mount force',
     name: str = 'harmonics',
 ) -> Chart:
-    """Return the amplitudes (N) of harmonics 1, 2, ..., as in Fig. 13 right; logarithmic."""
-    count = max(len(values) for _, values in amplitudes)
-    bars = [
-        Bars(each or 'mount force', np.arange(1.0, len(values) + 1.0), values, place)
-        for place, (each, values) in enumerate(amplitudes)
+    """Return the amplitudes (N) of harmonics (their numbers as x) in dB above 1 N, as in Fig. 13 right."""
+    dots = [
+        Dots(each.name or 'mount force', each.x, decibels(each.y), each.colour or COLOURS[place])
+        for place, each in enumerate(amplitudes)
     ]
-    ticks = tuple(float(number) for number in range(1, count + 1))
-    return Chart(name, title, 'harmonic', [Panel('amplitude (N)', bars=bars, log=True)], ticks=ticks)
+    ticks = tuple(max((each.x for each in amplitudes), key=len).tolist())
+    return Chart(name, title, 'harmonic', [Panel('amplitude above 1 N (dB)', dots=dots)], ticks=ticks)
+
+
+def decibels(amplitudes: Array) -> Array:
+    """Return 20 log10 of `amplitudes`, NaN where one is 0."""
+    known = np.where(np.asarray(amplitudes) > 0.0, amplitudes, np.nan)
+    return np.asarray(20.0 * np.log10(known))
 
 
 def spectra(
@@ -122,7 +143,8 @@ def sweep_bands(
 ) -> Chart:
     """Return the peak displacement (m) of each band of frequency (Hz), below it the rms acceleration (m/s^2).
 
-    The x of a series are the lower edges of its bands; as in Fig. 14.
+    The x of a series are the lower edges of its bands; as in Fig. 14, both
+    logarithmic.
     """
     panels = [
         Panel(
@@ -132,6 +154,7 @@ def sweep_bands(
                 for place, series in enumerate(peaks)
             ],
             levels=_lines(levels or Levels(), both=False),
+            log=True,
         )
     ]
     if accelerations:
@@ -142,6 +165,7 @@ def sweep_bands(
                     _curve(_held(series), place, 'acceleration', steps=True)
                     for place, series in enumerate(accelerations)
                 ],
+                log=True,
             )
         )
     return Chart(name, title, 'frequency of the excitation (Hz)', panels)
@@ -156,14 +180,21 @@ def tracking(
     name: str = 'tracking',
 ) -> Chart:
     """Return wanted and true friction force (N) over time (s), and their difference."""
-    forces = [_curve(series, 2 * place, 'wanted', dash=DASHED) for place, series in enumerate(wanted)]
-    forces += [_curve(series, 2 * place + 1, 'true') for place, series in enumerate(actual)]
+    forces = [_curve(series, place, 'true') for place, series in enumerate(actual)]
+    forces += [
+        Curve(f'wanted{_of(series)}', series.x, series.y, _wanted_colour(place), DASHED)
+        for place, series in enumerate(wanted)
+    ]
     errors = [
-        _curve(Named(one.name, other.x, other.y - np.interp(other.x, one.x, one.y)), 2 * place + 1, 'error')
+        _curve(Named(one.name, other.x, other.y - np.interp(other.x, one.x, one.y)), place, 'error')
         for place, (one, other) in enumerate(zip(wanted, actual, strict=True))
     ]
     panels = [Panel('friction force (N)', forces, share=1.6), Panel('true minus wanted (N)', errors)]
-    return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', limits)
+    return Chart(name, title, TIME_LABEL, panels, _spans(damping), 'damping on', view=limits)
+
+
+def _wanted_colour(place: int) -> str:
+    return COLOUR_OF['desired_force'] if place == 0 else COLOURS[(place + 1) % len(COLOURS)]
 
 
 def plain_traces(
@@ -179,15 +210,18 @@ def plain_traces(
 
 def _curve(
     series: Named,
-    colour: int,
+    place: int,
     what: str,
     factor: float = 1.0,
     x_factor: float = 1.0,
-    dash: str = SOLID,
     steps: bool = False,
 ) -> Curve:
-    named = f'{what}, {series.name}' if series.name else what
-    return Curve(named, x_factor * series.x, factor * series.y, colour, dash, steps)
+    colour = series.colour or COLOURS[place % len(COLOURS)]
+    return Curve(f'{what}{_of(series)}', x_factor * series.x, factor * series.y, colour, SOLID, steps)
+
+
+def _of(series: Named) -> str:
+    return f', {series.name}' if series.name else ''
 
 
 def _lines(levels: Levels, both: bool = True) -> list[Level]:
@@ -204,10 +238,10 @@ def _spans(stretches: Sequence[tuple[float, float]]) -> list[Span]:
 
 def _within(series: Named, highest: float) -> Named:
     shown = (series.x > 0.0) & (series.x <= highest)
-    return Named(series.name, series.x[shown], series.y[shown])
+    return replace(series, x=series.x[shown], y=series.y[shown])
 
 
 def _held(series: Named) -> Named:
     """Return the series with the end of its last band, so that steps show all of it."""
     width = float(np.min(np.diff(series.x))) if len(series.x) > 1 else 1.0
-    return Named(series.name, np.append(series.x, series.x[-1] + width), np.append(series.y, series.y[-1]))
+    return replace(series, x=np.append(series.x, series.x[-1] + width), y=np.append(series.y, series.y[-1]))

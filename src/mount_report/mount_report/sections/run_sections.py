@@ -1,11 +1,10 @@
-"""The sections of a report about the run itself: figures, coil, tracking, losses, differences, parameters."""
+"""The sections of a report about the run itself: coil, tracking, losses, differences, parameters."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from mount_bags.audit.peak_current import peak_current
 from mount_bags.audit.report import sentences as audit_sentences
 from mount_bags.compare.quantity_text import quantity_text, time_text
 from mount_bags.compare.words import by_importance
@@ -14,7 +13,7 @@ from mount_bags.run.session import session_values
 from mount_report.sections import charts
 from mount_report.sections.charts import Named
 from mount_report.sections.coil_load import CoilLoad, coil_load
-from mount_report.sections.section import Section, Table
+from mount_report.sections.section import Link, Section, Table
 from mount_report.sections.subject import Subject
 from mount_report.sections.wording import Sentences
 from mount_report.signals import Signal
@@ -22,23 +21,7 @@ from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, SIM_TRUTH
 
 _COVERING = 0.95  # chosen: this share of the longest counts as all
 _ROWS = 25  # of the table of differences
-_HEAD_OF_SESSION = ('scenario', 'mode', 'started')
-
-
-def overview(subjects: Sequence[Subject]) -> Section:
-    """Return the figures that one wants to see first, and what the recordings lack, in words."""
-    columns = [_figures(subject) for subject in subjects]
-    rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
-    words, said = [], Sentences(subjects)
-    for subject in subjects:
-        prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
-        words += [f'{prefix}{warning}.' for warning in subject.signals.recording.warnings]
-        if subject.signals.missing:
-            said.say(subject, f'missing: {"; ".join(subject.signals.missing)}')
-    words += said.told()
-    return Section(
-        'overview', 'Overview', words, None, [Table(('', *(each.name for each in subjects)), rows)]
-    )
+HEAD_OF_SESSION = ('scenario', 'mode', 'started')
 
 
 def coil(subjects: Sequence[Subject]) -> Section:
@@ -101,7 +84,7 @@ def losses(subjects: Sequence[Subject]) -> Section:
         told = audit_sentences(topics, lost)
         words.append(f'{prefix}{told[-1]}')
         if lost.faults:
-            faults = [(time_text(fault.time), fault.node, fault.sentence) for fault in lost.faults]
+            faults = [(_moment(fault.time), fault.node, fault.sentence) for fault in lost.faults]
             tables.append(Table(('time', 'node', 'fault'), faults, f'{prefix}faults'))
         rows = [
             (
@@ -135,11 +118,11 @@ def differences(subjects: Sequence[Subject]) -> Section | None:
         (
             signal.name,
             f'{signal.differing} of {signal.samples}',
-            '' if signal.first is None else time_text(signal.first.time),
+            '' if signal.first is None else _moment(signal.first.time),
             'unknown'
             if signal.largest is None
             else quantity_text(abs(signal.largest.difference), signal.unit),
-            '' if signal.largest is None else time_text(signal.largest.time),
+            '' if signal.largest is None else _moment(signal.largest.time),
             quantity_text(signal.rms, signal.unit),
         )
         for signal in ordered[:_ROWS]
@@ -162,7 +145,7 @@ def parameters(subjects: Sequence[Subject]) -> Section:
         words.append('Parameters that a run without nodes does not list have their defaults.')
     names = list(dict.fromkeys(name for values in told for name in values))
     versions = [name for name in names if name.startswith('versions.')]
-    others = [name for name in names if name not in versions and name not in _HEAD_OF_SESSION]
+    others = [name for name in names if name not in versions and name not in HEAD_OF_SESSION]
     heads = ('', *(subject.name for subject in subjects))
     tables = [
         _parameter_table(heads, group, told, title, folded)
@@ -191,46 +174,6 @@ def _value(values: dict, name: str) -> str:
         if isinstance(value, list)
         else str(value)
     )
-
-
-def _figures(subject: Subject) -> dict[str, str]:
-    recording, session = subject.signals.recording, session_values(subject.signals.session)
-    moved = subject.displacement()
-    return {
-        'recording': str(recording.path),
-        **{name: str(session.get(name, 'not known')) for name in _HEAD_OF_SESSION},
-        'messages': str(recording.message_count),
-        'length': 'not known' if moved is None else quantity_text(float(np.ptp(moved.time)), 's', 5),
-        'peak displacement': _highest(moved, 'm'),
-        **_friction_figures(subject),
-        **dict(subject.losses.rows()),
-    }
-
-
-def _friction_figures(subject: Subject) -> dict[str, str]:
-    if subject.facts.without_friction:
-        names = ('peak current', 'damping switched on', 'friction force error')
-        return dict.fromkeys(names, f'not applicable: {subject.facts.without_friction}')
-    spans = subject.signals.damping()
-    peak = peak_current(subject.signals.recording, subject.audits)
-    error = subject.facts.tracking.error if subject.facts.tracking else math.nan
-    return {
-        'peak current': 'not recorded' if math.isnan(peak) else quantity_text(peak, 'A'),
-        'damping switched on': 'not recorded'
-        if spans is None
-        else f'{len(spans)} times'
-        if len(spans) != 1
-        else 'once',
-        'friction force error': 'not known'
-        if math.isnan(error)
-        else f'{100.0 * error:.1f} % rms of the peak wanted force',
-    }
-
-
-def _highest(signal: Signal | None, unit: str) -> str:
-    if signal is None or not np.isfinite(signal.values).any():
-        return 'not recorded'
-    return quantity_text(float(np.nanmax(np.abs(signal.values))), unit)
 
 
 def _current(subject: Subject) -> tuple[Signal | None, str]:
@@ -296,6 +239,10 @@ def _load_cells(found: tuple[CoilLoad, float]) -> tuple[str, ...]:
 
 def _digits(value: float, digits: int) -> str:
     return 'not known' if math.isnan(value) else f'{value:.{digits}f}'
+
+
+def _moment(time: float) -> Link:
+    return Link(time_text(time), 'traces', time)
 
 
 def _around_largest(force: Named) -> tuple[float, float]:

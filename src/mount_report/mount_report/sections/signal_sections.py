@@ -11,17 +11,12 @@ from mount_report.drawing.chart import Array
 from mount_report.sections import charts, periodic
 from mount_report.sections.charts import Levels, Named
 from mount_report.sections.periodic import Sine, cycle_work, distortion, whole_periods
-from mount_report.sections.section import Section, Table
+from mount_report.sections.section import Cell, Link, Section, Table
 from mount_report.sections.spectrum import amplitude_density, evenly
 from mount_report.sections.subject import Subject
 from mount_report.sections.sweep import peak_per_band, rms_per_band
 from mount_report.sections.wording import Sentences
 from mount_report.signals import Signal
-from mount_ros.topics import (
-    CURRENT_SETPOINT,
-    SIM_CHASSIS_ACCELERATION,
-    SIM_TRUTH,
-)
 
 OfSubject = Callable[[Subject], Signal | None]
 
@@ -31,6 +26,7 @@ _WITHOUT_PERIOD = 0.5  # s, chosen: stretch of a loop where nothing is periodic
 _FOREIGN = 6  # signals drawn of a recording that is not of this project
 _TOLD = 200  # switchings listed
 _LABEL = 24  # letters
+_AROUND = 0.5  # s, chosen: shown to either side of what a number links to
 _LEAST_SAMPLES = 1000  # chosen: of a spectrum
 _LEAST_LOST = 0.0005  # share of made-up samples above which a spectrum says so
 
@@ -38,7 +34,7 @@ _LEAST_LOST = 0.0005  # share of made-up samples above which a spectrum says so
 def traces(subjects: Sequence[Subject]) -> Section:
     """Return displacement and current over time."""
     moved = _named(subjects, [subject.displacement() for subject in subjects])
-    currents = _named(subjects, [_setpoint(subject) for subject in subjects])
+    currents = _named(subjects, [subject.setpoint() for subject in subjects])
     words = []
     levels = next((each.facts.levels for each in subjects if each.facts.levels != Levels()), Levels())
     damping: list[tuple[float, float]] = next(
@@ -49,12 +45,24 @@ def traces(subjects: Sequence[Subject]) -> Section:
         words.append(f'Shaded: damping on in {subjects[0].name}.')
     if levels == Levels():
         words.append(f'The levels of the policy are not drawn: {subjects[0].facts.levels_remark}.')
-    words += _absent(subjects, (Subject.displacement, 'no displacement'), (_setpoint, 'no current setpoint'))
+    words += _absent(
+        subjects, (Subject.displacement, 'no displacement'), (Subject.setpoint, 'no current setpoint')
+    )
     chart = None
     if moved or currents:
         first = min(float(series.x[0]) for series in (*moved, *currents))
         last = max(float(series.x[-1]) for series in (*moved, *currents))
-        chart = charts.time_traces(moved, currents, levels, damping, limits=(first, last))
+        undamped = subjects[0].facts.undamped
+        grey = None if undamped is None else Named('', undamped.time, undamped.displacement)
+        if grey is not None:
+            of = f' of {subjects[0].name}' if len(subjects) > 1 else ''
+            words.append(f'Grey: the undamped mount on the same excitation{of}, computed with 0 A.')
+        differ = subjects[-1].comparison is not None
+        if differ:
+            words.append(f'B - A: {subjects[-1].name} less {subjects[0].name}.')
+        chart = charts.time_traces(
+            moved, currents, levels, damping, limits=(first, last), undamped=grey, differ=differ
+        )
     return Section('traces', 'Displacement and current', words, chart)
 
 
@@ -72,7 +80,10 @@ def switching(subjects: Sequence[Subject]) -> Section:
         else:
             tables.append(_switching_table(subjects, subject, spans))
         if marks := subject.signals.marks():
-            rows = [(_time_cell(time), mark.kind, mark.text) for time, mark in marks[:_TOLD]]
+            rows: list[tuple[Cell, ...]] = [
+                (Link(_time_cell(time), 'traces', time, _AROUND), mark.kind, mark.text)
+                for time, mark in marks[:_TOLD]
+            ]
             tables.append(Table(('time (s)', 'kind', 'text'), rows, f'{_of(subjects, subject)}marks'))
     return Section('switching', 'Switching and marks', said.told(), None, tables)
 
@@ -91,7 +102,7 @@ def loops(subjects: Sequence[Subject]) -> Section:
                 continue
             x, y = _together(moved, force, stretch)
             if len(x) > 2:
-                group.append(Named(_name(subjects, subject), x, y))
+                group.append(_series(subjects, subject, x, y))
                 found = True
         said.say(subject, how if found else 'no force was recorded')
     chart = charts.hysteresis_loops(mount, friction) if mount or friction else None
@@ -101,7 +112,8 @@ def loops(subjects: Sequence[Subject]) -> Section:
 def harmonics(subjects: Sequence[Subject]) -> Section:
     """Return harmonics 1 to 8 of the mount force, its distortion and the work per cycle."""
     said = Sentences(subjects)
-    bars, rows = [], []
+    found_of: list[Named] = []
+    rows = []
     for subject in subjects:
         steady, force = subject.steady, subject.mount_force()
         moved = subject.true_displacement() or subject.displacement()
@@ -112,7 +124,8 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
         elif (found := _harmonics_of(moved, force, steady)) is None:
             said.say(subject, 'the mount force was not recorded for long enough there: no harmonics')
         else:
-            bars.append((_name(subjects, subject), found.amplitudes))
+            numbers = np.arange(1.0, len(found.amplitudes) + 1.0)
+            found_of.append(_series(subjects, subject, numbers, found.amplitudes))
             rows.append((subject.name, *found.cells))
             said.say(subject, f'over the last {found.periods} periods until {found.end:.2f} s')
     head = (
@@ -120,7 +133,7 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
         *(f'h{number} (N)' for number in range(1, 9)),
     )  # fmt: skip
     tables = [Table(head, rows)] if rows else []
-    chart = charts.harmonics_bars(bars) if bars else None
+    chart = charts.harmonics_dots(found_of) if found_of else None
     return Section('harmonics', 'Harmonics of the mount force', said.told(), chart, tables)
 
 
@@ -161,7 +174,7 @@ def spectra(subjects: Sequence[Subject]) -> Section:
     for label, factor, of in (
         ('displacement\n(mm/√Hz)', 1e3, Subject.displacement),
         ('mount force\n(N/√Hz)', 1.0, Subject.mount_force),
-        ('chassis acceleration\n(m/s²/√Hz)', 1.0, _acceleration),
+        ('chassis acceleration\n(m/s²/√Hz)', 1.0, Subject.acceleration),
     ):
         group = []
         for subject in subjects:
@@ -173,12 +186,12 @@ def spectra(subjects: Sequence[Subject]) -> Section:
             if made_up > _LEAST_LOST:
                 share = f'{100.0 * made_up:.1f} % of the samples of the {label.splitlines()[0]}'
                 said.say(subject, f'{share} are missing and were replaced by straight lines')
-            group.append(Named(_name(subjects, subject), frequency, factor * values))
+            group.append(_series(subjects, subject, frequency, factor * values))
         if group:
             groups.append((label, group))
     words += said.told()
     words += _absent(
-        subjects, (Subject.mount_force, 'no mount force'), (_acceleration, 'no chassis acceleration')
+        subjects, (Subject.mount_force, 'no mount force'), (Subject.acceleration, 'no chassis acceleration')
     )
     chart = charts.spectra(groups) if groups else None
     return Section('spectra', 'Spectra', words, chart)
@@ -189,14 +202,14 @@ def sweep(subjects: Sequence[Subject]) -> Section | None:
     said = Sentences(subjects)
     peaks, accelerations = [], []
     for subject in subjects:
-        swept, moved, acceleration = subject.sweep(), subject.displacement(), _acceleration(subject)
+        swept, moved, acceleration = subject.sweep(), subject.displacement(), subject.acceleration()
         if swept is None or moved is None:
             said.say(subject, 'the excitation is no sweep')
             continue
-        peaks.append(Named(_name(subjects, subject), *peak_per_band(swept.at(moved.time), moved.values)))
+        peaks.append(_series(subjects, subject, *peak_per_band(swept.at(moved.time), moved.values)))
         if acceleration is not None:
             bands = rms_per_band(swept.at(acceleration.time), acceleration.values)
-            accelerations.append(Named(_name(subjects, subject), *bands))
+            accelerations.append(_series(subjects, subject, *bands))
     if not peaks:
         return None
     chart = charts.sweep_bands(peaks, accelerations, subjects[0].facts.levels)
@@ -217,7 +230,7 @@ def signals(subjects: Sequence[Subject]) -> Section | None:
             continue
         for label, series in _foreign(subject):
             if label in groups or len(groups) < _FOREIGN:
-                groups.setdefault(label, []).append(Named(_name(subjects, subject), *series))
+                groups.setdefault(label, []).append(_series(subjects, subject, *series))
     if not groups:
         return None
     words = [f'The first {len(groups)} numbers that change; their units are not known here.']
@@ -248,21 +261,16 @@ def _foreign(subject: Subject) -> list[tuple[str, tuple[Array, Array]]]:
 # What several sections need.
 
 
-def _setpoint(subject: Subject) -> Signal | None:
-    return subject.signals.signal(CURRENT_SETPOINT.name, 'coil_current')
-
-
-def _acceleration(subject: Subject) -> Signal | None:
-    measured = subject.signals.signal(SIM_CHASSIS_ACCELERATION.name, 'linear_acceleration.z')
-    return measured or subject.signals.signal(SIM_TRUTH.name, 'chassis_acceleration')
-
-
 def _named(subjects: Sequence[Subject], signals: Sequence[Signal | None]) -> list[Named]:
     return [
-        Named(_name(subjects, subject), signal.time, signal.values)
+        _series(subjects, subject, signal.time, signal.values)
         for subject, signal in zip(subjects, signals, strict=True)
         if signal is not None
     ]
+
+
+def _series(subjects: Sequence[Subject], subject: Subject, x: Array, y: Array) -> Named:
+    return Named(_name(subjects, subject), x, y, subject.facts.colour)
 
 
 def _name(subjects: Sequence[Subject], subject: Subject) -> str:
@@ -285,14 +293,14 @@ def _absent(subjects: Sequence[Subject], *wanted: tuple[OfSubject, str]) -> list
 def _switching_table(
     subjects: Sequence[Subject], subject: Subject, spans: Sequence[tuple[float, float]]
 ) -> Table:
-    moved, current = subject.displacement(), _setpoint(subject)
+    moved, current = subject.displacement(), subject.setpoint()
     rows = [
         (
-            _time_cell(begin),
-            _time_cell(end),
+            Link(_time_cell(begin), 'traces', begin, _AROUND),
+            Link(_time_cell(end), 'traces', end, _AROUND),
             quantity_text(end - begin, 's'),
-            _peak_within(moved, begin, end, 'm'),
-            _peak_within(current, begin, end, 'A'),
+            peak_within(moved, begin, end, 'm'),
+            peak_within(current, begin, end, 'A'),
         )
         for begin, end in spans[:_TOLD]
     ]
@@ -301,11 +309,16 @@ def _switching_table(
     return Table(head, rows, f'{_of(subjects, subject)}damping on{more}')
 
 
-def _peak_within(signal: Signal | None, begin: float, end: float, unit: str) -> str:
+def peak_within(signal: Signal | None, begin: float, end: float, unit: str) -> Cell:
+    """Return the highest absolute value between two times (s), with a link to where it is."""
     if signal is None:
         return 'not recorded'
-    inside = np.abs(signal.values[(signal.time >= begin) & (signal.time <= end)])
-    return quantity_text(float(np.nanmax(inside)), unit) if np.isfinite(inside).any() else 'unknown'
+    inside = (signal.time >= begin) & (signal.time <= end)
+    time, values = signal.time[inside], np.abs(signal.values[inside])
+    if not np.isfinite(values).any():
+        return 'unknown'
+    place = int(np.nanargmax(values))
+    return Link(quantity_text(float(values[place]), unit), 'traces', float(time[place]), _AROUND)
 
 
 def _loop_stretch(subject: Subject) -> tuple[tuple[float, float] | None, str]:

@@ -14,7 +14,14 @@ from mount_report.sections.charts import Levels
 from mount_report.sections.periodic import Sine, dominant_sine
 from mount_report.sections.sweep import Sweep, find_sweep
 from mount_report.signals import Signal, Signals
-from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_MOUNT_FORCE, SIM_TRUTH
+from mount_ros.topics import (
+    CONTROL_TRACE,
+    CURRENT_SETPOINT,
+    DISPLACEMENT,
+    SIM_CHASSIS_ACCELERATION,
+    SIM_MOUNT_FORCE,
+    SIM_TRUTH,
+)
 
 _STEADY = 4.0  # s, chosen: long enough for 32 periods at 8 Hz
 _SETTLING = 0.5  # s, chosen: after damping went on
@@ -32,6 +39,19 @@ class Tracking:
 
 
 @dataclass(frozen=True)
+class WithoutDamping:
+    """The undamped mount on the same excitation: displacement (m), acceleration of the chassis (m/s^2).
+
+    Over time (s); the excitation starts at `begin` (s).
+    """
+
+    time: Array
+    displacement: Array
+    chassis_acceleration: Array
+    begin: float
+
+
+@dataclass(frozen=True)
 class RunFacts:
     """What the caller knows of a run beside its messages; sentences say where it is from or why it lacks."""
 
@@ -41,7 +61,10 @@ class RunFacts:
     resistance_remark: str = 'the resistance of the coil is not known'
     tracking: Tracking | None = None
     tracking_remark: str = 'what the controller wanted is not known'
+    undamped: WithoutDamping | None = None
+    undamped_remark: str = 'no simulator recorded the excitation'
     without_friction: str = ''  # why figures of friction are not applicable
+    colour: str = ''  # of the mount in the seat; empty: that of its place among the recordings
 
 
 @dataclass(frozen=True)
@@ -83,6 +106,15 @@ class Subject:
     def friction_force(self) -> Signal | None:
         """Return the true friction force (N), None where the mount has none."""
         return None if self.facts.without_friction else self.signals.signal(SIM_TRUTH.name, 'friction_force')
+
+    def acceleration(self) -> Signal | None:
+        """Return the acceleration of the chassis (m/s^2): of the sensor, else the true one."""
+        measured = self.signals.signal(SIM_CHASSIS_ACCELERATION.name, 'linear_acceleration.z')
+        return measured or self.signals.signal(SIM_TRUTH.name, 'chassis_acceleration')
+
+    def setpoint(self) -> Signal | None:
+        """Return the current setpoint (A)."""
+        return self.signals.signal(CURRENT_SETPOINT.name, 'coil_current')
 
     def active_from(self) -> float:
         """Return when control began to answer (s), the beginning of the recording if it does not tell."""

@@ -1,0 +1,83 @@
+"""The undamped run beside a drive: the mount without current on the same excitation, to the bit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from mount_bags.bag.recording import Recording, open_recording
+from mount_bags.edit.cut import cut
+from mount_bags.run.session import recorded_session, session_content, session_parameters
+from mount_cli.command import app
+from mount_report.drive.undamped import UndampedError, undamped_of
+
+SHORT = ('--duration', '3', '--set', 'mount_sim.timeline.start=2.8', '--set', 'mount_sim.motorway.gap_time=1')
+
+
+def driven(folder: Path, *options: str) -> Recording:
+    """Return the recording of a drive in core."""
+    result = CliRunner().invoke(app, ['drive', '--core', '--no-report', *options, '--out', str(folder)])
+    assert result.exit_code == 0, result.output
+    return open_recording(folder / 'recording')
+
+
+def parameters_of(recording: Recording) -> dict[str, dict]:
+    """Return {node: {parameter: value}} of a recording's session."""
+    return session_parameters(session_content(recorded_session(recording)))
+
+
+@pytest.fixture(scope='module')
+def drive(tmp_path_factory) -> Recording:
+    """Return a short drive over the gap in the road."""
+    return driven(tmp_path_factory.mktemp('undamped') / 'drive', *SHORT)
+
+
+def test_it_is_the_drive_of_the_mount_whose_coil_driver_opens(drive, tmp_path):
+    free = driven(tmp_path / 'free', *SHORT, '--mount', 'friction_off')['sim/truth']
+    undamped = undamped_of(drive, parameters_of(drive))
+    np.testing.assert_array_equal(undamped.displacement, free['displacement'])
+    np.testing.assert_array_equal(undamped.chassis_acceleration, free['chassis_acceleration'])
+    assert (undamped.begin - undamped.stamps[0]) / 1e9 == pytest.approx(2.8)
+    assert np.abs(undamped.displacement).max() > 1.3 * np.abs(drive['sim/truth']['displacement']).max()
+
+
+def test_it_has_the_sample_rate_of_the_drive(tmp_path):
+    slow = (*SHORT, '--sample-rate', '500')
+    recording = driven(tmp_path / 'slow', *slow)
+    undamped = undamped_of(recording, parameters_of(recording))
+    assert len(undamped.stamps) == pytest.approx(5.8 * 500, abs=2)
+    assert (undamped.begin - undamped.stamps[0]) / 1e9 == pytest.approx(2.8)
+
+
+def test_of_a_part_of_a_drive_it_is_the_same_part(drive, tmp_path):
+    cut(drive, tmp_path / 'part', 3.5, 4.5)
+    part = open_recording(tmp_path / 'part')
+    whole, of_part = (undamped_of(each, parameters_of(drive)) for each in (drive, part))
+    inside = np.isin(whole.stamps, of_part.stamps)
+    assert 900 < inside.sum() < 1100
+    np.testing.assert_array_equal(of_part.displacement, whole.displacement[inside])
+    assert of_part.begin == whole.begin
+
+
+def test_what_another_road_gave_is_not_told_of_this_drive(drive):
+    parameters = parameters_of(drive)
+    other = {**parameters, 'mount_sim': {**parameters['mount_sim'], 'seed': 2}}
+    with pytest.raises(UndampedError, match='is not that of the session'):
+        undamped_of(drive, other)
+
+
+@pytest.mark.parametrize(
+    ('changed', 'reason'),
+    [
+        ({'mount': 'elastomer'}, 'this is the undamped run itself'),
+        ({'scenario': 'bench'}, 'a rack imposes the displacement'),
+        ({'timeline.duration': 301.0}, 'for runs of up to 300 s'),
+        ({'mounts': 'left,right'}, 'with several mounts it is not computed'),
+        ({'scenario': 'recorded'}, 'cannot be computed again: scenario recorded needs a file'),
+    ],
+)
+def test_where_it_cannot_be_told_a_sentence_says_why(drive, changed, reason):
+    parameters = parameters_of(drive)
+    with pytest.raises(UndampedError, match=reason):
+        undamped_of(drive, {**parameters, 'mount_sim': {**parameters['mount_sim'], **changed}})
