@@ -163,9 +163,16 @@ def test_a_current_that_is_not_valid_at_0_ampere_is_no_doubt():
     assert watched(np.zeros(SAMPLES), lambda k, current, wanted: math.nan) is None
 
 
-def test_a_deviation_shorter_than_the_duration_is_no_doubt():
-    glitches = watched(DAMPING, lambda k, current, wanted: 3.0 if k % 40 < 15 else wanted)
-    assert glitches is None
+def test_a_deviation_shorter_than_the_duration_is_no_doubt_unless_it_comes_again_and_again():
+    assert watched(DAMPING, lambda k, current, wanted: 3.0 if k % 1000 < 15 else wanted) is None
+    assert watched(DAMPING, lambda k, current, wanted: 3.0 if k % 40 < 15 else wanted) is not None
+
+
+def test_a_current_stuck_where_the_setpoints_pass_is_found_by_where_they_do_not():
+    swinging = 0.5 + 0.6 * np.abs(np.sin(50.0 * TIME))
+    found = watched(swinging, lambda k, current, wanted: wanted if k < 300 else 1.05)
+    assert found is not None
+    assert 300 < found[0] < 800
 
 
 def test_samples_are_counted_on_where_their_counter_wraps():

@@ -19,6 +19,7 @@ from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
 _UNSURE = 0.5  # s, chosen: so long 0 A may be followed late, or once more
+_FORGIVEN = 50  # samples, chosen: of a sound coil one deviates now and then, far more seldom (measured)
 _COUNTER_MASK = 0xFFFF
 
 
@@ -63,7 +64,8 @@ class CoilWatch:
         self._number = -1  # of the last sample: its counter, unwrapped
         self._off_sent = False
         self._sure_from = 0
-        self._deviating = 0  # samples, one behind the other
+        self._deviating = 0  # samples, less one for each `_FORGIVEN` that fitted
+        self._fitting = 0
 
     def note_sent(self, setpoint: Setpoint) -> None:
         """Take a setpoint that leaves; one thread at a time, which need not be that of `judge`."""
@@ -97,10 +99,18 @@ class CoilWatch:
         current = sample.coil_current
         within = self._low - self._limit <= current <= self._high + self._limit  # not so for NaN
         if within or (current != current and wanted == 0.0):
-            self._deviating = 0
+            self._forgive()
             return ''
         self._deviating += 1
         return self._sentence(current) if self._deviating > self._duration else ''
+
+    def _forgive(self) -> None:
+        """Forget a sample that deviated for many that fit: a coil that is stuck fits now and then too."""
+        if self._deviating:
+            self._fitting += 1
+            if self._fitting == _FORGIVEN:
+                self._fitting = 0
+                self._deviating -= 1
 
     def _count(self, counter: int) -> int:
         """Return how many samples were lost; forget what answered the oldest, nothing answers the new yet."""
@@ -134,5 +144,5 @@ class CoilWatch:
         lasted = 1e3 * self._period * (self._deviating - 1)
         return (
             f'coil current ({measured}) must lie within {low:.3f} .. {high:.3f} A, {self._limit:g} A about '
-            f'its setpoint; it has not for {lasted:.0f} ms: check coil, cable and power stage'
+            f'its setpoint; it has not for {lasted:.0f} ms in all: check coil, cable and power stage'
         )
