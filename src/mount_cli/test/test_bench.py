@@ -34,7 +34,7 @@ def test_only_the_groups_asked_for_are_measured_and_written(tmp_path, monkeypatc
         'what': 'a thing', 'ours': 2e-6, 'other': 8e-6, 'beside': 'another', 'unit': 's', 'ratio': 0.25,
     }  # fmt: skip
     assert figures['y']['ratio'] is None
-    assert '2.00 us' in result.output
+    assert '2.00 µs' in result.output
     assert '0.25' in result.output
 
 
