@@ -1,5 +1,6 @@
 """The matrix as a table in the terminal and as the page docs/reference/faults.md."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from mount_replay.faults.outcome import AFTER_DETECTION, AFTER_OCCURRENCE, Outco
 
 Rows = Mapping[FaultCase, Outcome]
 
+_RUN_FOLDER = re.compile(r'/\S*_faults/')  # of the machine that wrote the page
 HEADS = ('fault', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recovery')
 _INTRODUCTION = """# Faults
 
@@ -78,7 +80,7 @@ def _cells(case: FaultCase, outcome: Outcome) -> list[str]:
         _milliseconds(outcome.detected_s),
         _milliseconds(outcome.zero_s),
         '-' if outcome.coil_current is None else f'{outcome.coil_current:.2f}',
-        outcome.sentence or '-',
+        _RUN_FOLDER.sub('bags/.../', outcome.sentence) or '-',
         f'{outcome.recovery}; NOT AS REQUIRED: {wrong}' if wrong else outcome.recovery,
     ]
 
