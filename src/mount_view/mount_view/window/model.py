@@ -12,6 +12,7 @@ import numpy as np
 from mount_bags.messages.layout import LayoutError
 from mount_bringup.chosen import policy_of
 from mount_models.quantity import ParameterError
+from mount_report.drive.evaluation import levels_of
 from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
 from mount_ros.topics import CURRENT_FORCE_TABLE, DISPLACEMENT, SIM_CHASSIS_ACCELERATION
 from mount_view.beside.alternatives import Beside
@@ -95,8 +96,7 @@ class Model:
             policy, own = policy_of(self.state.parameters)
         except (ParameterError, ValueError):
             return {}
-        levels = getattr(policy, 'levels', None)
-        return {label: _MM * value for label, value in levels(own).items()} if levels else {}
+        return {label: _MM * value for label, value in levels_of(policy, own).items()}
 
     def _serve(self) -> None:
         next_one = time.monotonic()
