@@ -21,6 +21,7 @@ from mount_sim.excitation.scenario import (
     RecordedScenario,
     SweepScenario,
     Timeline,
+    TipIn,
 )
 from mount_sim.plant.mounts import seated_mount
 from mount_sim.plant.places import Places
@@ -41,6 +42,7 @@ class SimParameters(NamedTuple):
     sweep: SweepScenario = SweepScenario()
     recorded: RecordedScenario = RecordedScenario()
     idle: IdleForce = IdleForce()
+    tip_in: TipIn = TipIn()
     actuator: ReluctanceActuator = ReluctanceActuator()
     coil: RippleCoil = RippleCoil()
     temperature: TemperatureCoefficients = TemperatureCoefficients()

@@ -8,7 +8,7 @@ from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS
 
 README = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
-OWN = ('timeline', 'bench', 'motorway', 'sweep', 'recorded', 'idle', 'electronics', 'temperature')
+OWN = ('timeline', 'bench', 'motorway', 'sweep', 'recorded', 'idle', 'tip_in', 'electronics', 'temperature')
 
 
 def rows(parameters, prefix=''):

@@ -119,6 +119,22 @@ def test_the_idle_force_is_a_sine_with_its_second_harmonic(parameters, recording
     np.testing.assert_array_equal(other.values[:], excitation.values[:])
 
 
+def test_a_tip_in_lifts_the_engine_once_and_adds_to_the_idle_force(parameters):
+    pushed = {'tip_in__force': 400.0, 'tip_in__time': 0.2, 'tip_in__rise': 0.1}
+    alone = build_excitation(parameters(timeline__duration=0.5, **pushed)).engine_forces
+    for time, force in ((0.1, 0.0), (0.25, 200.0), (0.31, 400.0), (0.49, 400.0)):
+        assert alone[:][round(time / STEP_TIME)] == pytest.approx(force)
+    idle = build_excitation(parameters(timeline__duration=0.5, idle__amplitude=80.0)).engine_forces
+    both = build_excitation(parameters(timeline__duration=0.5, idle__amplitude=80.0, **pushed)).engine_forces
+    np.testing.assert_array_equal(both[:], idle[:] + alone[:])
+    np.testing.assert_array_equal(both[17:4242], both[:][17:4242])
+
+
+def test_a_tip_in_on_the_bench_is_refused(parameters):
+    refusal = _refusal(parameters(scenario='bench', tip_in__force=-20.0))
+    assert refusal.startswith('tip_in.force (-20 N) has no effect in scenario bench')
+
+
 def test_an_idle_force_on_the_bench_is_refused(parameters):
     refusal = _refusal(parameters(scenario='bench', idle__amplitude=200.0))
     assert refusal.startswith('idle.amplitude (200 N) has no effect in scenario bench')

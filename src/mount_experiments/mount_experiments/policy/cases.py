@@ -57,6 +57,7 @@ ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 _GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
 _RACK_AMPLITUDE, _RACK_SECONDS = 1e-3, 3.5  # m, s
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
+_TIP_IN = 400.0  # N, chosen
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 
 
@@ -163,7 +164,8 @@ class Jobs:
                 recorded = self._parameters.recorded
                 yield self._job(('road', who, 'recorded', idle), sim, 'road', recorded=recorded, kept=True)
         for who in COMPARED:
-            yield self._job(('tip-in', who), _motorway(2e-6, _HELD_OUT_SEED, 4.0), 'tip_in')
+            sim = _motorway(2e-6, _HELD_OUT_SEED, 4.0) | {'tip_in.force': _TIP_IN}
+            yield self._job(('tip-in', who), sim, 'road')
 
     def robustness(self) -> Iterator[PolicyJob]:
         """Yield sweeps with other engines, pads, sensors and temperatures."""

@@ -1,12 +1,11 @@
-"""Roads and forces that no scenario holds: the road behind a recorded acceleration, a tip-in."""
+"""What no scenario holds: the road behind a recorded acceleration."""
 
 import functools
-from dataclasses import replace
 
 import numpy as np
 
 from mount_models.arithmetic.averages import mean
-from mount_models.arithmetic.series import series_of, series_over_time
+from mount_models.arithmetic.series import series_of
 from mount_models.vehicle import Vehicle
 from mount_report.drive.signals import FloatArray
 from mount_sim.excitation.excitation import Excitation, Seat, idle_force
@@ -15,14 +14,11 @@ from mount_sim.excitation.scenario import (
     STEP_TIME,
     IdleForce,
     RecordedScenario,
-    build_excitation,
     recorded_signal,
 )
-from mount_sim.parameters import SimParameters
 
 LOWEST, HIGHEST = 0.9, 50.0  # Hz: no more is inverted; below, the sensor drifts, above, it has nothing
 _EDGE = 0.2  # chosen: share of an edge frequency over which the band fades
-TIP_IN, TIP_IN_RISE, TIP_IN_TIME = 400.0, 0.05, 1.0  # N, s, s (chosen)
 
 
 def road_of(acceleration: FloatArray, step_time: float, vehicle: Vehicle) -> FloatArray:
@@ -80,13 +76,3 @@ def on_recorded_road(recorded: RecordedScenario, idle: IdleForce, start: float) 
     road = recorded_road(recorded)
     forces = idle_force(idle.amplitude, idle.frequency, idle.second_share, road.size, STEP_TIME)
     return Excitation(Seat.VEHICLE, series_of(road), STEP_TIME, start, forces)
-
-
-def tip_in(sim: SimParameters) -> Excitation:
-    """Return the scenario of `sim` with a force that lifts the engine and stays: a pedal pushed down."""
-    excitation = build_excitation(sim)
-
-    def force(time: FloatArray) -> FloatArray:
-        return TIP_IN * np.clip((time - TIP_IN_TIME) / TIP_IN_RISE, 0.0, 1.0)
-
-    return replace(excitation, engine_forces=series_over_time(len(excitation.values), STEP_TIME, force))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_experiments.policy.excitations import on_recorded_road, tip_in
+from mount_experiments.policy.excitations import on_recorded_road
 from mount_experiments.policy.learnable import frequency_in_band, friction_scale
 from mount_experiments.recorded_drive.evaluation import rms_in_bands
 from mount_experiments.sensitivity.grid import TruthOnly
@@ -58,8 +58,6 @@ def run_policy_job(job: PolicyJob) -> tuple[tuple[Any, ...], dict[str, Any]]:
     excitation = None
     if job.recorded is not None:
         excitation = on_recorded_road(job.recorded, sim.idle, sim.timeline.start)
-    elif job.kind == 'tip_in':
-        excitation = tip_in(sim)
     outcome = run_core_into(truth, job.parameters, excitation=excitation)
     signals = dict(zip(_FIELDS, truth.signals(outcome.excitation_start), strict=True))
     figures = _FIGURES[job.kind](signals, sim, job)
@@ -122,4 +120,4 @@ def _of_road(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob)
     }
 
 
-_FIGURES = {'sweep': _of_sweep, 'gap': _of_gap, 'rack': _of_rack, 'road': _of_road, 'tip_in': _of_road}
+_FIGURES = {'sweep': _of_sweep, 'gap': _of_gap, 'rack': _of_rack, 'road': _of_road}

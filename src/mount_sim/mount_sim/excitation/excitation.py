@@ -86,3 +86,12 @@ def idle_force(
         return np.asarray(amplitude * (sines(turns) + second_share * sines(2.0 * turns)))
 
     return series_over_time(count, step_time, force)
+
+
+def tip_in_force(force: float, begin: float, rise: float, count: int, step_time: float) -> StreamedSeries:
+    """Return a force (n,) in N that grows linearly from the time `begin` (s) on for `rise` (s) and stays."""
+
+    def pushed(time: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(force * np.clip((time - begin) / rise, 0.0, 1.0))
+
+    return series_over_time(count, step_time, pushed)

@@ -89,6 +89,20 @@ class IdleForce(NamedTuple):
     ] = 0.4
 
 
+class TipIn(NamedTuple):
+    """Force on the engine from a pedal pushed down: it rises once and stays; none on a bench."""
+
+    force: Annotated[
+        float, Quantity('N', 'force upwards on the engine; 0: no tip-in', -5000.0, 5000.0, 'chosen')
+    ] = 0.0
+    time: Annotated[float, Quantity('s', 'it begins so long after the excitation', 0.0, 3600.0, 'chosen')] = (
+        1.0
+    )
+    rise: Annotated[float, Quantity('s', 'the force grows linearly for so long', 0.001, 10.0, 'chosen')] = (
+        0.05
+    )
+
+
 AccelerationScale = Annotated[
     float, Quantity('1', 'factor to m/s^2 upwards; -1 for an axis that points down', -1e4, 1e4, 'chosen')
 ]
@@ -134,20 +148,30 @@ class Scenarios(Protocol):
     @property
     def idle(self) -> IdleForce: ...
 
+    @property
+    def tip_in(self) -> TipIn: ...
+
 
 def build_excitation(scenarios: Scenarios) -> Excitation:
     """Return the excitation of the chosen scenario, or raise `ValueError` with what is wrong."""
-    shaken, idle = _scenario(scenarios), scenarios.idle
-    if idle.amplitude == 0.0:
+    shaken, idle, tip_in = _scenario(scenarios), scenarios.idle, scenarios.tip_in
+    given = {'idle.amplitude': idle.amplitude, 'tip_in.force': tip_in.force}
+    acting = {name: size for name, size in given.items() if size != 0.0}
+    if not acting:
         return shaken
     if shaken.seat is Seat.BENCH:
+        name, size = next(iter(acting.items()))
         raise ParameterError(
-            f'idle.amplitude ({idle.amplitude:g} N) has no effect in scenario {scenarios.scenario}, where a '
+            f'{name} ({size:g} N) has no effect in scenario {scenarios.scenario}, where a '
             'rack imposes the displacement; set it to 0 or choose another scenario'
         )
-    forces = excitation.idle_force(
-        idle.amplitude, idle.frequency, idle.second_share, len(shaken.values), shaken.step_time
-    )
+    count, step_time = len(shaken.values), shaken.step_time
+    forces = None
+    if idle.amplitude != 0.0:
+        forces = excitation.idle_force(idle.amplitude, idle.frequency, idle.second_share, count, step_time)
+    if tip_in.force != 0.0:
+        pushed = excitation.tip_in_force(tip_in.force, tip_in.time, tip_in.rise, count, step_time)
+        forces = pushed if forces is None else forces.plus(pushed)
     return replace(shaken, engine_forces=forces)
 
 
