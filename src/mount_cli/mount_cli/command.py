@@ -10,6 +10,7 @@ from mount_cli.commands import (
     audit,
     bench,
     calibrate,
+    check,
     compare,
     cut,
     drive,
@@ -69,6 +70,7 @@ app.command(name='status', epilog=view.STATUS_EPILOG)(view.status)
 app.command(name='cut', epilog=cut.EPILOG)(cut.cut)
 app.command(name='merge', epilog=merge.EPILOG)(merge.merge)
 app.command(name='experiment', epilog=experiment.EPILOG)(experiment.experiment)
+app.command(name='check', epilog=check.EPILOG)(check.check)
 app.command(name='faults', epilog=faults.EPILOG)(faults.faults)
 app.add_typer(identify.app, name='identify')
 app.command(name='accept', epilog=accept.EPILOG)(accept.accept)

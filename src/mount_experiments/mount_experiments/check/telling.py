@@ -1,0 +1,105 @@
+"""What a check says: one table in the terminal, worst first, and the figures of `--json`."""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import Any
+
+from mount_bags.run.screen import Table
+from mount_experiments.check.judgement import Judged, Verdict, passed, worst_first
+from mount_experiments.check.session import CheckOrder
+from mount_experiments.check.trial import Result
+
+HEADS = ('', 'manoeuvre', 'quantity', 'value', 'limit', 'left')
+_SIGNS = {'at_most': '≤', 'at_least': '≥'}
+
+Verdicts = Mapping[str, Sequence[Verdict]]
+
+
+def table_of(verdicts: Verdicts) -> Table:
+    """Return the table of all verdicts; a limit of all manoeuvres that held in all of them is told once."""
+    rows = told_once(verdicts)
+    told = [cells(verdict, len(verdicts)) for verdict in rows]
+    marked = frozenset(place for place, row in enumerate(rows) if row.judged is Judged.FAILED)
+    return Table('', 'lllrrr', told, HEADS, sentence_of(verdicts), marked)
+
+
+def sentence_of(verdicts: Verdicts) -> str:
+    """Return how many manoeuvres passed."""
+    failed = [name for name, each in verdicts.items() if not passed(each)]
+    count = sum(1 for each in chain(*verdicts.values()) if each.judged is not Judged.LEFT_OUT)
+    told = f'{len(verdicts) - len(failed)} of {len(verdicts)} manoeuvres within their {count} limits'
+    return f'{told}; not {", ".join(failed)}.' if failed else f'{told}.'
+
+
+def told_once(verdicts: Verdicts) -> list[Verdict]:
+    """Return the verdicts worst first, each common limit that held everywhere once, where least is left."""
+    failed, held, common = [], [], {}
+    for verdict in chain(*verdicts.values()):
+        key = (verdict.limit.measure, verdict.limit.bound)
+        if verdict.judged is Judged.FAILED:
+            failed.append(verdict)
+        elif verdict.common:
+            common.setdefault(key, []).append(verdict)
+        else:
+            held.append(verdict)
+    broken = {(verdict.limit.measure, verdict.limit.bound) for verdict in failed if verdict.common}
+    for key, group in common.items():
+        if key not in broken:
+            held.append(worst_first(group)[0])
+    return worst_first([*failed, *held])
+
+
+def cells(verdict: Verdict, of: int = 0) -> tuple[str, ...]:
+    """Return the texts of a row; of a common limit that held, the number `of` manoeuvres stands for them."""
+    limit = verdict.limit
+    everywhere = of > 1 and verdict.common and verdict.judged is not Judged.FAILED
+    return (
+        verdict.judged.value,
+        f'all {of}' if everywhere else verdict.manoeuvre,
+        limit.measure,
+        number(verdict.value),
+        f'{_SIGNS[limit.bound]}\N{NO-BREAK SPACE}{limit.value:g}',
+        '' if math.isnan(verdict.margin) else f'{100.0 * verdict.margin:.0f}\N{NO-BREAK SPACE}%',
+    )
+
+
+def number(value: float) -> str:
+    """Return a figure with three digits, – where it is not known."""
+    return '–' if math.isnan(value) else f'{value:.3g}'
+
+
+def figures_of(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdicts) -> dict[str, Any]:
+    """Return what `--json` writes: the same order gives the same, whatever the number of jobs."""
+    return {
+        'passed': all(map(passed, verdicts.values())),
+        'through': order.through,
+        'set': {node: dict(values) for node, values in order.settings.items()},
+        'manoeuvres': {
+            each.name: {
+                'about': each.about,
+                'passed': passed(verdicts[each.name]),
+                'remarks': list(results[each.name].remarks),
+                'figures': {name: _known(value) for name, value in results[each.name].figures.items()},
+                'verdicts': [_as_json(verdict) for verdict in verdicts[each.name]],
+            }
+            for each in order.manoeuvres
+        },
+    }
+
+
+def _as_json(verdict: Verdict) -> dict[str, Any]:
+    limit = verdict.limit
+    return {
+        'quantity': limit.measure,
+        'value': _known(verdict.value),
+        limit.bound: limit.value,
+        'verdict': verdict.judged.value,
+        'left': _known(verdict.margin),
+        'source': limit.source,
+        'reason': limit.reason,
+    }
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

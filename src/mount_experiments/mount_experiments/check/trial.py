@@ -1,0 +1,143 @@
+"""One manoeuvre driven, beside it hydromount and undamped mount on the same excitation, and its figures."""
+
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mount_bags.audit.audit import audit
+from mount_bags.audit.losses import Losses, losses
+from mount_bags.bag.recording import Recording, open_recording
+from mount_bags.run.screen import Screen
+from mount_bringup.graph.errors import GraphError
+from mount_experiments.check.evaluation import Beside, Driven, figures_of
+from mount_experiments.check.suite import Manoeuvre
+from mount_experiments.sensitivity.grid import TruthOnly
+from mount_replay.drive.drive import DriveOrder, record_drive
+from mount_replay.loop.run import run_core_into
+from mount_report.drive.evaluation import samples_at_the_ends
+from mount_report.drive.signals import FloatArray, load_drive
+
+CORE, LOCKSTEP, GRAPH = 'core', 'lockstep', 'graph'
+MODES = {CORE: 'core', LOCKSTEP: 'lock-step', GRAPH: 'real time'}
+"""{what `--through` says: what a drive calls it}."""
+MOUNT_OF = {'hydromount': 'hydro', 'undamped': 'friction_off'}
+_FIELDS = ('displacement', 'velocity', 'mount_force', 'chassis_acceleration')
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A manoeuvre with the parameters of all nodes, driven `through` what, into the folder `out`."""
+
+    manoeuvre: Manoeuvre
+    parameters: Mapping[str, Mapping[str, Any]]
+    through: str
+    out: Path
+    domain: int = 0
+    priority: int = 0
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the page draws: signals over time (s from the begin of the excitation) by mount, SI.
+
+    `damping` are the stretches (s) with damping on.
+    """
+
+    displacement: Mapping[str, FloatArray] = field(default_factory=dict)
+    force: Mapping[str, FloatArray] = field(default_factory=dict)
+    current: FloatArray = field(default_factory=lambda: np.zeros(0))
+    damping: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Result:
+    """The figures of a manoeuvre by the names of their measures, and what was not as it should be."""
+
+    figures: Mapping[str, float]
+    remarks: tuple[str, ...]
+    shown: Shown
+
+
+def run_trial(trial: Trial) -> tuple[tuple[str], Result]:
+    """Drive one manoeuvre and return its name, as a key, and what came of it; raises `Interrupted`.
+
+    A graph that breaks down is a remark, and none of its figures is known.
+    """
+    name = trial.manoeuvre.name
+    order = DriveOrder(
+        scenario=str(trial.parameters['mount_sim']['scenario']),
+        mode=MODES[trial.through],
+        parameters={node: dict(values) for node, values in trial.parameters.items()},
+        domain=trial.domain,
+        out=trial.out / name,
+        priority=trial.priority,
+    )
+    try:
+        folder, run, complaints = record_drive(order, Screen(io.StringIO()))
+    except GraphError as error:
+        return (name,), Result({}, (str(error),), Shown())
+    recording = open_recording(folder.recording)
+    return (name,), _result(trial, recording, run, complaints)
+
+
+def _result(trial: Trial, recording: Recording, run: dict[str, Any], complaints: list[str]) -> Result:
+    audits = audit(recording)
+    found = losses(recording, audits)
+    remarks = [*complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run['samples'])]
+    beside = {other: _alone(trial.parameters, mount) for other, mount in MOUNT_OF.items()}
+    drive = load_drive(recording, float(run['excitation_start']))
+    driven = Driven(drive, drive.truth.since(0.0), trial.parameters)
+    figures = {
+        **figures_of(driven, beside, trial.manoeuvre),
+        **_gap_errors(recording),
+        **_of_losses(found),
+        'remarks': float(len(remarks)),
+        'latency_p99_us': 1e6 * run['latency_p99_s'],
+    }
+    told = [*remarks, *found.complaints()]
+    return Result(figures, tuple(told), _shown(driven, beside))
+
+
+def _alone(parameters: Mapping[str, Mapping[str, Any]], mount: str) -> Beside:
+    """Return another mount on the same excitation: no bus, no recording, the same plant."""
+    truth = TruthOnly(_FIELDS)
+    sim = {**parameters['mount_sim'], 'mount': mount}
+    outcome = run_core_into(truth, {**parameters, 'mount_sim': sim})
+    return Beside(*truth.signals(outcome.excitation_start))
+
+
+def _gap_errors(recording: Recording) -> dict[str, float]:
+    gap, truth = recording['air_gap'], recording['sim/truth']
+    return {
+        f'{name}_error_um': 1e6 * abs(float(gap[name][-1]) - float(truth[name][-1]))
+        for name in ('rest_gap', 'contact_gap')
+    }
+
+
+def _of_losses(found: Losses) -> dict[str, float]:
+    return {
+        'lost_samples': _known(found.lost_samples),
+        'unanswered_samples': _known(found.unanswered),
+        'faults': float(len(found.faults)),
+    }
+
+
+def _known(count: int | None) -> float:
+    return math.nan if count is None else float(count)
+
+
+def _shown(driven: Driven, beside: Mapping[str, Beside]) -> Shown:
+    truth, changes = driven.truth, driven.switching
+    ends = (*changes.off, float(driven.drive.seen.time[-1]))
+    return Shown(
+        displacement={'driven': truth.displacement}
+        | {name: other.displacement for name, other in beside.items()},
+        force={'driven': truth.mount_force} | {name: other.mount_force for name, other in beside.items()},
+        current=truth.coil_current,
+        damping=tuple((on, min(end for end in ends if end >= on)) for on in changes.on),
+    )
