@@ -12,6 +12,7 @@ PYTHON ?= $(shell for p in /usr/bin/python3 python3 python3.13 python3.12 python
 	$$p -c 'import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 DRIVE_OPTIONS ?=
 FAULTS_OPTIONS ?=
+CHECK_OPTIONS ?=
 REAL_TIME_TESTS = $(shell grep -rl --include='test_*.py' 'mark.real_time' src test)
 # Processes that pass tests at the same time: one more than cores, for many tests wait for processes of their own.
 WORKERS ?= $(shell echo $$(($$(nproc) < 3 ? $$(nproc) + 1 : 4)))
@@ -25,7 +26,7 @@ RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test faults experiments identify bench lint format setup setup-dev clean
+.PHONY: help drive test check faults experiments identify bench lint format setup setup-dev clean
 
 help: ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
@@ -36,6 +37,9 @@ drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and 
 test: $(VENV)/.ready-dev ## pass all tests
 	@$(BIN)/python -m pytest -m 'not real_time' -n $(WORKERS) --dist worksteal
 	@$(BIN)/python -m pytest -m real_time $(REAL_TIME_TESTS)
+
+check: $(VENV)/.ready ## drive the manoeuvre suite and judge it by its limits, before a change goes into the car
+	@$(BIN)/engine-mount check $(CHECK_OPTIONS)
 
 faults: $(VENV)/.ready ## bring every fault into the real graph; writes docs/reference/faults.md
 	@$(BIN)/engine-mount faults --page docs/reference/faults.md $(FAULTS_OPTIONS)

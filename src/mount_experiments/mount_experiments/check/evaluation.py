@@ -116,7 +116,7 @@ def _loop(signals: Truth | Beside, frequency: float) -> tuple[float, float]:
 
 def _of_control(driven: Driven) -> dict[str, float]:
     seen, truth = driven.drive.seen, driven.truth
-    excited = seen.time >= 0.0
+    excited = (seen.time >= 0.0) & (seen.time <= truth.time[-1])
     if without_friction(seat_of(driven.parameters)):
         error = math.nan
     else:

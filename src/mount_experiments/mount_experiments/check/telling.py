@@ -34,7 +34,9 @@ def sentence_of(verdicts: Verdicts) -> str:
 
 def told_once(verdicts: Verdicts) -> list[Verdict]:
     """Return the verdicts worst first, each common limit that held everywhere once, where least is left."""
-    failed, held, common = [], [], {}
+    failed: list[Verdict] = []
+    held: list[Verdict] = []
+    common: dict[tuple[str, str], list[Verdict]] = {}
     for verdict in chain(*verdicts.values()):
         key = (verdict.limit.measure, verdict.limit.bound)
         if verdict.judged is Judged.FAILED:
@@ -66,7 +68,7 @@ def cells(verdict: Verdict, of: int = 0) -> tuple[str, ...]:
 
 def number(value: float) -> str:
     """Return a figure with three digits, – where it is not known."""
-    return '–' if math.isnan(value) else f'{value:.3g}'
+    return '–' if math.isnan(value) else f'{value:.0f}' if abs(value) >= 1000.0 else f'{value:.3g}'
 
 
 def figures_of(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdicts) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import io
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,11 @@ from mount_bringup.graph.errors import GraphError
 from mount_experiments.check.evaluation import Beside, Driven, figures_of
 from mount_experiments.check.suite import Manoeuvre
 from mount_experiments.sensitivity.grid import TruthOnly
+from mount_models.sampling import SAMPLE_TIME
 from mount_replay.drive.drive import DriveOrder, record_drive
 from mount_replay.loop.run import run_core_into
 from mount_report.drive.evaluation import samples_at_the_ends
-from mount_report.drive.signals import FloatArray, load_drive
+from mount_report.drive.signals import FloatArray, Truth, load_drive
 
 CORE, LOCKSTEP, GRAPH = 'core', 'lockstep', 'graph'
 MODES = {CORE: 'core', LOCKSTEP: 'lock-step', GRAPH: 'real time'}
@@ -91,16 +92,32 @@ def _result(trial: Trial, recording: Recording, run: dict[str, Any], complaints:
     remarks = [*complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run['samples'])]
     beside = {other: _alone(trial.parameters, mount) for other, mount in MOUNT_OF.items()}
     drive = load_drive(recording, float(run['excitation_start']))
-    driven = Driven(drive, drive.truth.since(0.0), trial.parameters)
+    truth = at_samples(drive.truth, beside['undamped'].displacement.size)
+    driven = Driven(drive, truth, trial.parameters)
     figures = {
         **figures_of(driven, beside, trial.manoeuvre),
         **_gap_errors(recording),
         **_of_losses(found),
         'remarks': float(len(remarks)),
-        'latency_p99_us': 1e6 * run['latency_p99_s'],
+        'latency_p99_us': 1e6 * run['latency_p99_s'] if trial.through == GRAPH else math.nan,
     }
     told = [*remarks, *found.complaints()]
     return Result(figures, tuple(told), _shown(driven, beside))
+
+
+def at_samples(truth: Truth, count: int) -> Truth:
+    """Return the truth at the `count` samples of the excitation, those that are missing on a straight line.
+
+    In real time the electronics go on behind the end of the excitation, and a recording may lack samples.
+    """
+    places = np.round(truth.time / SAMPLE_TIME)
+    inside = (places >= 0) & (places < count)
+    values = {field.name: getattr(truth, field.name)[inside] for field in fields(Truth)}
+    if int(inside.sum()) == count:
+        return Truth(**values)
+    samples = np.arange(count)
+    found = {name: np.interp(samples, places[inside], each) for name, each in values.items()}
+    return Truth(**found)
 
 
 def _alone(parameters: Mapping[str, Mapping[str, Any]], mount: str) -> Beside:

@@ -1,0 +1,269 @@
+"""Suites of manoeuvres: what is read, what is refused, and how figures are judged."""
+
+import json
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from mount_experiments.check.judgement import Judged, all_verdicts, passed, verdicts_of, worst_first
+from mount_experiments.check.measures import MEASURES
+from mount_experiments.check.page import write_page
+from mount_experiments.check.session import CheckError, CheckOrder, trials_of
+from mount_experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
+from mount_experiments.check.telling import figures_of, table_of
+from mount_experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples
+from mount_report.drive.signals import Truth
+
+LIMIT = {'at_most': 0.7, 'source': 'chosen', 'reason': 'less is no use'}
+ROAD = {'mount_sim.scenario': 'motorway', 'mount_sim.timeline.duration': 3}
+
+
+def content(**changes):
+    """A suite of two manoeuvres; `changes` are those of the second one."""
+    road = {'about': 'A road.', 'set': dict(ROAD), 'limits': {'peak_over_undamped': dict(LIMIT)}}
+    common = {'faults': {'at_most': 0, 'source': 'contract', 'reason': 'none is brought in'}}
+    return {'limits': common, 'manoeuvres': {'first': road, 'second': {**road, **changes}}}
+
+
+def refusal(given):
+    with pytest.raises(SuiteError) as caught:
+        suite_of(given)
+    return str(caught.value)
+
+
+def result(**figures):
+    moved = {name: np.zeros(3000) for name in ('driven', 'hydromount', 'undamped')}
+    shown = Shown(moved, moved, np.zeros(3000), ((-1.0, 0.5), (1.0, 2.0)))
+    return Result({'peak_over_undamped': 0.5, 'faults': 0.0, **figures}, (), shown)
+
+
+# What is read.
+
+
+def test_the_shipped_suite_names_a_reason_and_a_source_for_every_limit_and_can_be_driven(tmp_path):
+    suite = shipped_suite()
+    assert {'gap_10mm', 'gap_20mm', 'gap_30mm', 'rough_road', 'sweep', 'idle', 'rack', 'tip_in'} <= {
+        each.name for each in suite
+    }
+    assert all(limit.reason and limit.source for each in suite for limit in (*each.limits, *each.common))
+    for through in (CORE, LOCKSTEP, GRAPH):
+        assert len(trials_of(CheckOrder(suite, through), tmp_path)) == len(suite)
+
+
+def test_a_limit_of_all_manoeuvres_is_one_of_each_on_which_it_can_be_told():
+    given = content()
+    given['limits']['rms_displacement_mm'] = dict(LIMIT)
+    given['manoeuvres']['second']['set'] = {'mount_sim.scenario': 'bench'}
+    given['manoeuvres']['second']['limits'] = {'switched_on': {**LIMIT, 'at_least': 0.5}}
+    road, rack = suite_of(given)
+    measures = [[v.limit.measure for v in verdicts_of(each, result(), CORE)] for each in (road, rack)]
+    assert measures == [
+        ['peak_over_undamped', 'faults', 'rms_displacement_mm'],
+        ['switched_on', 'switched_on', 'faults'],
+    ]
+
+
+def test_manoeuvres_are_chosen_by_name_in_the_order_of_the_suite():
+    suite = suite_of(content())
+    assert [each.name for each in chosen_of(suite, ['second', 'first'])] == ['first', 'second']
+    with pytest.raises(SuiteError, match="'secnd' is no manoeuvre of the suite; did you mean second"):
+        chosen_of(suite, ['secnd'])
+
+
+@pytest.mark.parametrize(
+    ('changes', 'sentence'),
+    [
+        ({'limit': {}}, "'limit' is no key of second; did you mean limits?"),
+        ({'evaluated_from': 1.0}, "'evaluated_from' is no key of second; did you mean evaluated_from_s?"),
+        ({'evaluated_from_s': '1 s'}, "second.evaluated_from_s must be a number; instead received '1 s'"),
+        ({'evaluated_from_s': -1}, 'second.evaluated_from_s (-1 s) must be 0 or more'),
+        ({'about': ''}, "second.about must be a text; instead received ''"),
+        ({'limits': {'peak_over_undampd': LIMIT}}, "'peak_over_undampd' is no quantity of second"),
+        ({'limits': {'faults': {**LIMIT, 'at_mots': 1}}}, "'at_mots' is no key of second.faults; did"),
+        ({'limits': {'faults': {'source': 'paper', 'reason': 'x'}}}, 'second.faults must have at_most'),
+        ({'limits': {'faults': {**LIMIT, 'source': 'guess'}}}, 'second.faults.source must be contract'),
+        ({'limits': {'faults': {**LIMIT, 'reason': None}}}, 'second.faults.reason must be a text'),
+        ({'limits': {'faults': {**LIMIT, 'at_most': math.nan}}}, 'second.faults.at_most must be a number'),
+        ({'limits': {'distortion_percent': LIMIT}}, 'second: distortion_percent cannot be told on a road'),
+        ({'set': {**ROAD, 'mount_sim.sed': 1}}, "second.set: 'sed' is no parameter of mount_sim; did"),
+        ({'set': {**ROAD, 'mount_smi.seed': 1}}, "'mount_smi' is no node of second.set; did"),
+        ({'set': {'mount_sim.seed': 1}}, 'second.set must have mount_sim.scenario'),
+        ({'set': [1]}, 'second.set must be a mapping; instead received [1]'),
+    ],
+)  # fmt: skip
+def test_what_a_suite_cannot_mean_is_refused_with_its_place(changes, sentence):
+    assert refusal(content(**changes)).startswith(sentence)
+
+
+def test_names_that_do_not_fit_the_table_and_suites_without_manoeuvres_are_refused():
+    given = content()
+    given['manoeuvres']['a_long_way_home'] = given['manoeuvres']['first']
+    assert refusal(given) == 'a_long_way_home: a name has at most 10 characters, this one 15'
+    assert refusal({'manoeuvres': {}}) == 'manoeuvres must name at least one manoeuvre'
+    assert refusal(None).startswith('the suite must be a mapping with about, limits, manoeuvres')
+
+
+def test_a_file_is_refused_with_its_name(tmp_path):
+    file = tmp_path / 'ours.yaml'
+    file.write_text('manoeuvres: {}\nmanoeuvres: {}\n', encoding='utf-8')
+    with pytest.raises(SuiteError, match=r'ours\.yaml: is refused in line 2'):
+        suite_in_file(file)
+    with pytest.raises(SuiteError, match=r'none\.yaml: cannot be read'):
+        suite_in_file(tmp_path / 'none.yaml')
+
+
+# What is driven.
+
+
+def trials(tmp_path, settings=None, through=CORE, **more):
+    return trials_of(CheckOrder(suite_of(content()), through, settings or {}, **more), tmp_path)
+
+
+def test_settings_of_the_user_reach_every_manoeuvre(tmp_path):
+    made = trials(tmp_path, {'mount_control': {'policy': 'switched_viscous'}})
+    assert [each.parameters['mount_control'] for each in made] == [{'policy': 'switched_viscous'}] * 2
+    always = trials(tmp_path, {'mount_sim': {'mount': 'friction_always_on'}})[0].parameters
+    assert always['mount_control']['switching'] == 'always'
+
+
+@pytest.mark.parametrize(
+    ('settings', 'sentence'),
+    [
+        ({'mount_sim': {'scenario': 'sweep'}}, 'mount_sim.scenario is set by the manoeuvre first itself'),
+        ({'mount_sim': {'mounts': 'left,right'}}, 'a suite checks one mount'),
+        ({'mount_control': {'sample_rate': 2000.0}}, 'a suite is judged at 1000 Hz'),
+        ({'mount_control': {'policy': 'none'}}, 'first: '),
+    ],
+)
+def test_orders_that_no_manoeuvre_can_follow_are_refused_before_the_first(tmp_path, settings, sentence):
+    with pytest.raises(CheckError) as caught:
+        trials(tmp_path, settings)
+    assert str(caught.value).startswith(sentence)
+    assert not any(tmp_path.iterdir())
+
+
+def test_through_nodes_one_manoeuvre_is_driven_at_a_time(tmp_path):
+    with pytest.raises(CheckError, match='one manoeuvre is driven at a time'):
+        trials(tmp_path, through=LOCKSTEP, jobs=2)
+
+
+def test_a_manoeuvre_that_ends_before_it_is_looked_at_is_refused(tmp_path):
+    late = suite_of(content(evaluated_from_s=3.0))
+    with pytest.raises(CheckError, match=r'second: evaluated_from_s \(3 s\) must lie before the end'):
+        trials_of(CheckOrder(late), tmp_path)
+
+
+# How it is judged.
+
+
+def judged(through=CORE, **figures):
+    first = suite_of(content())[0]
+    return {v.limit.measure: v.judged for v in verdicts_of(first, result(**figures), through)}
+
+
+def test_a_limit_holds_up_to_its_value_and_what_is_not_known_fails():
+    assert judged(peak_over_undamped=0.7)['peak_over_undamped'] is Judged.PASSED
+    assert judged(peak_over_undamped=0.7001)['peak_over_undamped'] is Judged.FAILED
+    assert judged(peak_over_undamped=math.nan)['peak_over_undamped'] is Judged.FAILED
+    assert judged(faults=1.0)['faults'] is Judged.FAILED
+    broken = replace(result(), figures={})  # a graph that broke down
+    assert not passed(verdicts_of(suite_of(content())[0], broken, GRAPH))
+
+
+def test_a_limit_from_below_fails_below_it():
+    given = content(limits={'switched_on': {'at_least': 1, 'source': 'chosen', 'reason': 'x'}})
+    second = suite_of(given)[1]
+    assert not passed(verdicts_of(second, result(switched_on=0.0), CORE))
+    assert passed(verdicts_of(second, result(switched_on=1.0), CORE))
+
+
+def test_latency_is_judged_in_real_time_alone():
+    given = content(limits={'latency_p99_us': {'at_most': 1000, 'source': 'chosen', 'reason': 'x'}})
+    second, late = suite_of(given)[1], result(latency_p99_us=2000.0)
+    assert [passed(verdicts_of(second, late, each)) for each in (CORE, LOCKSTEP, GRAPH)] == [
+        True,
+        True,
+        False,
+    ]
+
+
+def test_the_worst_stands_first_and_what_is_not_known_before_it():
+    limits = {name: dict(LIMIT) for name in ('rms_over_undamped', 'ringing_s', 'pad_energy_j', 'switched_on')}
+    manoeuvre = suite_of(content(limits=limits))[1]
+    figures = result(rms_over_undamped=0.1, ringing_s=9.0, pad_energy_j=math.nan, switched_on=0.6)
+    ordered = [v.limit.measure for v in worst_first(verdicts_of(manoeuvre, figures, CORE))]
+    assert ordered == ['pad_energy_j', 'ringing_s', 'switched_on', 'rms_over_undamped', 'faults']
+
+
+def told(**figures):
+    suite = suite_of(content())
+    results = {'first': result(), 'second': result(**figures)}
+    return CheckOrder(suite), results, all_verdicts(suite, results, CORE)
+
+
+def test_a_common_limit_that_holds_everywhere_is_told_once_and_one_that_fails_by_its_manoeuvre():
+    rows = [row[:3] for row in table_of(told()[2]).rows]
+    assert rows == [
+        ('ok', 'first', 'peak_over_undamped'),
+        ('ok', 'second', 'peak_over_undamped'),
+        ('ok', 'all 2', 'faults'),
+    ]
+    table = table_of(told(faults=2.0)[2])
+    assert table.rows[0][:4] == ('fail', 'second', 'faults', '2')
+    assert table.marked == {0}
+    assert table.caption == '1 of 2 manoeuvres within their 4 limits; not second.'
+
+
+def test_figures_are_plain_json_with_null_for_what_is_not_known():
+    order, results, verdicts = told(rms_over_undamped=math.nan)
+    figures = json.loads(json.dumps(figures_of(order, results, verdicts), allow_nan=False))
+    assert figures['passed'] is True
+    assert figures['manoeuvres']['second']['figures']['rms_over_undamped'] is None
+    assert figures['manoeuvres']['first']['verdicts'][0] == {
+        'quantity': 'peak_over_undamped',
+        'value': 0.5,
+        'at_most': 0.7,
+        'verdict': 'ok',
+        'left': pytest.approx(2 / 7),
+        'source': 'chosen',
+        'reason': 'less is no use',
+    }
+
+
+def test_the_page_leads_from_each_verdict_to_its_manoeuvre_and_survives_a_graph_that_broke_down(tmp_path):
+    order, results, verdicts = told(peak_over_undamped=0.9)
+    results['first'] = Result({}, ('mount_sim ended with code 1 <b>',), Shown())
+    verdicts = all_verdicts(order.manoeuvres, results, CORE)
+    write_page(order, results, verdicts, tmp_path / 'check.html')
+    text = (tmp_path / 'check.html').read_text(encoding='utf-8')
+    assert text.count('<li class="bad">') == 2
+    assert 'href="#second"' in text
+    assert 'data-chart="second"' in text
+    assert 'mount_sim ended with code 1 &lt;b&gt;' in text
+
+
+def test_the_truth_is_that_of_the_samples_of_the_excitation_where_some_are_missing():
+    time = np.arange(-5, 20) * 1e-3
+    whole = Truth(time, *(time + place for place in range(6)))
+    cut = at_samples(whole, 10)
+    np.testing.assert_array_equal(cut.time, time[5:15])
+    np.testing.assert_array_equal(cut.chassis_acceleration, time[5:15] + 5)
+    kept = np.delete(np.arange(25), [8, 9])
+    holed = Truth(*(getattr(whole, field.name)[kept] for field in fields(Truth)))
+    np.testing.assert_allclose(at_samples(holed, 10).displacement, cut.displacement, atol=1e-15)
+
+
+def test_every_measure_has_its_unit_in_its_name():
+    ends = {
+        'mm': '_mm',
+        's': '_s',
+        'J': '_j',
+        'W': '_w',
+        'A': '_a',
+        'µm': '_um',
+        'µs': '_us',
+        '%': '_percent',
+    }
+    assert all(name.endswith(ends[each.unit]) for name, each in MEASURES.items() if each.unit)
