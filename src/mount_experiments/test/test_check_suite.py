@@ -2,7 +2,9 @@
 
 import json
 import math
+import re
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +16,10 @@ from mount_experiments.check.session import CheckError, CheckOrder, trials_of
 from mount_experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
 from mount_experiments.check.telling import figures_of, table_of
 from mount_experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples
+from mount_models.plain_yaml import plain_yaml
 from mount_report.drive.signals import Truth
 
+PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'how-to' / 'check_a_change.md'
 LIMIT = {'at_most': 0.7, 'source': 'chosen', 'reason': 'less is no use'}
 ROAD = {'mount_sim.scenario': 'motorway', 'mount_sim.timeline.duration': 3}
 
@@ -253,6 +257,13 @@ def test_the_truth_is_that_of_the_samples_of_the_excitation_where_some_are_missi
     kept = np.delete(np.arange(25), [8, 9])
     holed = Truth(*(getattr(whole, field.name)[kept] for field in fields(Truth)))
     np.testing.assert_allclose(at_samples(holed, 10).displacement, cut.displacement, atol=1e-15)
+
+
+def test_the_suite_of_the_page_can_be_used_and_the_page_names_every_quantity():
+    text = PAGE.read_text(encoding='utf-8')
+    (block,) = re.findall(r'```yaml\n(.*?)```', text, re.DOTALL)
+    assert [each.name for each in suite_of(plain_yaml(block))] == ['deep_gap']
+    assert [name for name in MEASURES if f'`{name}`' not in text] == []
 
 
 def test_every_measure_has_its_unit_in_its_name():
