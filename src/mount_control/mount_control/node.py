@@ -94,7 +94,7 @@ class MountControl(SafeLifecycleNode):
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
         self._send_trace = path.sender(topics.CONTROL_TRACE)
         self._send_event = path.sender(topics.EVENT)
-        path.subscribe(topics.DISPLACEMENT, self._on_displacement)
+        path.subscribe(topics.DISPLACEMENT, self._on_displacement, directly=True)
         path.subscribe(topics.AIR_GAP, self._on_air_gap)
         path.subscribe(topics.CURRENT_FORCE_TABLE, self._on_table)
         path.start()

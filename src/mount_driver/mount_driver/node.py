@@ -59,7 +59,7 @@ class MountDriver(SafeLifecycleNode):
         self._publish_displacement = path.sender(DISPLACEMENT)
         self._publish_ripple = path.sender(COIL_RIPPLE)
         self._publish_temperature = path.sender(COIL_TEMPERATURE)
-        path.subscribe(CURRENT_SETPOINT, self._on_setpoint)
+        path.subscribe(CURRENT_SETPOINT, self._on_setpoint, directly=True)
         path.start()
         self._path = path
 

@@ -34,11 +34,11 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
-from mount_bringup.graph.shared_memory import remove_abandoned
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.leaving import leave_middleware
+from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, SESSION
 from mount_sim.diagnosis import FINISHED
