@@ -165,7 +165,7 @@ class MountInit(SafeLifecycleNode):
 
     def _on_verdicts(self, raw: bytes) -> None:
         for told in verdicts_of(raw):
-            self._driver.take(*told)
+            self._driver.take(told.node, told.sentence, told.figures)
 
     def _on_setpoint(self, raw: bytes) -> None:
         try:
