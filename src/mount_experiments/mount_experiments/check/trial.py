@@ -92,6 +92,7 @@ def _result(trial: Trial, recording: Recording, run: dict[str, Any], complaints:
     remarks = [*complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run['samples'])]
     beside = {other: _alone(trial.parameters, mount) for other, mount in MOUNT_OF.items()}
     drive = load_drive(recording, float(run['excitation_start']))
+    remarks += _late_control(recording, drive.zero)
     truth = at_samples(drive.truth, beside['undamped'].displacement.size)
     driven = Driven(drive, truth, trial.parameters)
     figures = {
@@ -103,6 +104,15 @@ def _result(trial: Trial, recording: Recording, run: dict[str, Any], complaints:
     }
     told = [*remarks, *found.complaints()]
     return Result(figures, tuple(told), _shown(driven, beside))
+
+
+def _late_control(recording: Recording, excited: int) -> list[str]:
+    """Return a sentence if control began to answer behind the stamp `excited` (ns), where it has to."""
+    stamps = recording['control_trace'].stamps
+    begin = (int(stamps.min()) - excited) / 1e9 if len(stamps) else math.inf
+    return (
+        [f'control began {begin:.1f} s after the excitation: it was initialised late'] if begin > 0.0 else []
+    )
 
 
 def at_samples(truth: Truth, count: int) -> Truth:
