@@ -17,7 +17,6 @@ from mount_control.diagnosis import ControlFigures, Unread, verdict
 from mount_control.policy.contract import trace_fields
 from mount_control.sample_watch import Judgement
 from mount_control.settings import (
-    FILES,
     FRICTION,
     check_policies,
     control_settings,
@@ -59,8 +58,6 @@ class MountControl(SafeLifecycleNode):
         super().__init__('mount_control', **arguments)
         for prefix, parameters in parameter_sets():
             declare(self, parameters, prefix)
-        for name, text in FILES.items():
-            self.declare_parameter(name, text)
         self.declare_parameter(*_MEASURED_BEFORE)
         self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)

@@ -4,17 +4,26 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
+from mount_ros.nodes.declaring import DeclaringNode
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
-from mount_ros.nodes.parameters import refuse_unknown
+from mount_ros.nodes.parameters import refuse_sim_time, refuse_unknown
 from mount_ros.nodes.real_time import Beats, RealTime, Urgent
-from mount_ros.private_rclpy import OpenLifecycleNode, integer_as_float
 from mount_ros.writers import WriterWatch
+
+_LOCKSTEP = (
+    'lockstep',
+    False,
+    ParameterDescriptor(
+        description='time stands in the stamps alone: each sample waits for its answer; one value in the '
+        'whole graph'
+    ),
+)
 
 
 class ServedPath(Protocol):
@@ -34,7 +43,7 @@ class ServedPath(Protocol):
         """End serving; safe to call twice."""
 
 
-class SafeLifecycleNode(OpenLifecycleNode):
+class SafeLifecycleNode(DeclaringNode):
     """Base of all nodes of the graph.
 
     A node overrides `configure`, `activate`, `deactivate`, `cleanup` and `judge`; it raises an
@@ -53,7 +62,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
         self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
-        self._lockstep = bool(self.declare_parameter('lockstep', False).value)
+        self._lockstep = bool(self.declare_parameter(*_LOCKSTEP).value)
         self.data_path: ServedPath | None = None
         self._writers: WriterWatch | None = None  # of what the data path hears
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
@@ -65,12 +74,6 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self._refusal = ''
         self._diagnostics = Diagnostics(self, self._look_and_judge)
         self._diagnostics.start()
-
-    def declare_parameter(self, name: str, value: Any = None, *arguments, **options) -> Parameter:
-        """Declare a parameter; a whole number given at the start for one that is a float becomes one."""
-        if isinstance(value, float):
-            integer_as_float(self, name)
-        return super().declare_parameter(name, value, *arguments, **options)
 
     # What a node fills in.
 
@@ -204,6 +207,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
 
     def _configure(self) -> None:
         refuse_unknown(self)
+        refuse_sim_time(self)
         self.configure()
 
     def _attempt(self, what, step, undo) -> TransitionCallbackReturn:

@@ -7,6 +7,8 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from mount_ros.nodes.parameters import SIM_TIME_REFUSED, USE_SIM_TIME
+
 
 class Change(NamedTuple):
     """A parameter before and after it was set."""
@@ -49,6 +51,8 @@ class ParameterGate:
         self._present = None
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        if any(parameter.name == USE_SIM_TIME and parameter.value for parameter in parameters):
+            return SetParametersResult(successful=False, reason=SIM_TIME_REFUSED)
         changes = self._changes(parameters)
         fixed = [name for name in changes if name not in self._run_time]
         if fixed:

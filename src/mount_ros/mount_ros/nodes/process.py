@@ -4,15 +4,19 @@ import contextlib
 import gc
 import os
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from mount_models.quantity import ParameterError
 from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process, leave_middleware
@@ -40,9 +44,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     inherited = drop_real_time()
     real_time = RealTime(given_priority() or inherited)
     prepare_environment()
-    # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    nodes = [create() for create in creates]
+    nodes = _created(creates, args)
     data_thread = DataThread(nodes[0].context, nodes[0].tell_failure)
     over = _Ending()
     for node in nodes:
@@ -70,6 +72,22 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     code = 1 if over.failed else 0
     if not leave_middleware(partial(_take_down, nodes)) or code:
         end_process(code)
+
+
+def _created(creates: Sequence[Create], args: list[str] | None) -> list[SafeLifecycleNode]:
+    """Return the nodes, or end the process with code 1 and why its arguments do not fit."""
+    try:
+        # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # a parameter file that is missing or no YAML
+        print(f'[FATAL] {" ".join(str(error).split())}', file=sys.stderr)
+        sys.exit(1)
+    try:
+        return [create() for create in creates]
+    except ParameterError as error:
+        get_logger(Path(sys.argv[0]).name).fatal(str(error))
+        rclpy.try_shutdown()
+        sys.exit(1)
 
 
 def _freeze() -> None:
