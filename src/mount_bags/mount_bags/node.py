@@ -63,7 +63,9 @@ class MountRecorder(SafeLifecycleNode):
         self._announced_failure = ''
         self._announced_malformed: set[str] = set()
         self._begun_at = 0.0
-        self._mark_service = self.create_service(Trigger, '~/mark', self._on_mark)
+        self._mark_service = self.create_service(
+            Trigger, '~/mark', self._on_mark, callback_group=self.transitions
+        )
 
     def configure(self) -> None:
         parameters = read(self, RecorderParameters())

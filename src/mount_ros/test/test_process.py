@@ -11,7 +11,7 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from mount_ros.nodes.process import wake
+from mount_ros.nodes.aside import wake
 from mount_ros.nodes.starter import environment_of_children
 from mount_ros.testing import LIMIT, free_domain
 

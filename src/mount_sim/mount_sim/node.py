@@ -53,7 +53,7 @@ class MountSim(SafeLifecycleNode):
         declare(self, SimParameters())
         declare(self, DriverParameters(), only=('interface', 'channel', 'port'))
         declare(self, NodeParameters())
-        self.create_service(SetBool, '~/inject_fault', self._inject)
+        self.create_service(SetBool, '~/inject_fault', self._inject, callback_group=self.transitions)
         self._own = _declare_own(self)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None

@@ -9,6 +9,7 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
+from mount_ros.nodes.aside import done_aside
 from mount_ros.nodes.declaring import DeclaringNode
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
@@ -195,11 +196,16 @@ class SafeLifecycleNode(DeclaringNode):
         self.close()
         return TransitionCallbackReturn.SUCCESS
 
+    def serve_transition(self, answer: Callable[[], Any]) -> Any:
+        # An activation may take seconds, and parameters and state shall be told meanwhile.
+        assert self.executor is not None
+        return done_aside(self.executor, answer, f'{self.get_name()} transition')
+
     def change_state(self, transition_id: int) -> TransitionCallbackReturn:
         # rclpy lets a transition that is not valid in the present state end the process with an
         # exception; a node that drives a coil answers "no" and goes on.
         try:
-            with self._diagnostics.pause:
+            with self._diagnostics.pause, self._gate.held():
                 return super().change_state(transition_id)
         except Exception as error:
             self.get_logger().warning(f'transition {transition_id} refused: {error}')

@@ -12,20 +12,19 @@ from functools import partial
 from pathlib import Path
 
 import rclpy
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
 from mount_models.quantity import ParameterError
 from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
+from mount_ros.nodes.aside import SPIN_PERIOD, wake
 from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 from mount_ros.nodes.starter import Starter, given_priority
-
-_SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
 
 Create = Callable[[], SafeLifecycleNode]
 
@@ -99,15 +98,6 @@ def _freeze() -> None:
     gc.freeze()
 
 
-def wake(executor: Executor) -> None:
-    """End the `spin_once` of another thread; `Executor.wake` alone lets it look and sleep on."""
-    executor.create_task(_nothing)
-
-
-def _nothing() -> None:
-    """Something to do."""
-
-
 def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
     for node in reversed(nodes):
         node.destroy_node()
@@ -161,9 +151,10 @@ class _Ending:
 
 
 class _Service:
-    """The thread that serves the rest of a node: transitions, parameters, diagnostics.
+    """The thread that serves the rest of a node: transitions, parameters, questions about its state.
 
-    It sleeps until something arrives: whatever wakes Python there takes the interpreter from the data path.
+    A transition is made in another thread meanwhile. It sleeps until something arrives: whatever wakes Python
+    there takes the interpreter from the data path.
     """
 
     def __init__(self, node: SafeLifecycleNode, over: _Ending):
@@ -184,7 +175,7 @@ class _Service:
     def _serve(self) -> None:
         try:
             while rclpy.ok() and not self._node.ending.is_set():
-                self._executor.spin_once(_SPIN_PERIOD)
+                self._executor.spin_once(SPIN_PERIOD)
         except Exception as error:
             # The border of the process: without it the nodes would not be closed.
             traceback.print_exc()
