@@ -120,12 +120,19 @@ def operator(context, serve, probe):
     return operator
 
 
-def test_a_node_goes_through_its_steps(probe, operator):
+def test_a_node_goes_through_its_steps_and_says_so(probe, operator, capfd):
     assert [operator.change(transition) for transition in (CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP)] == [
         True
     ] * 4
     assert probe.steps == ['configure', 'activate', 'deactivate', 'cleanup']
     assert operator.state == UNCONFIGURED
+    told = [line for line in capfd.readouterr().err.splitlines() if line.startswith('[INFO]')]
+    assert told == [
+        '[INFO] [mount_right.probe]: configured; its topics are those of the node /mount_right/probe_io',
+        '[INFO] [mount_right.probe]: active',
+        '[INFO] [mount_right.probe]: inactive',
+        '[INFO] [mount_right.probe]: cleaned up',
+    ]
 
 
 @pytest.mark.parametrize('transition', [ACTIVATE, DEACTIVATE, CLEANUP])
@@ -305,6 +312,7 @@ def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(pro
         'state': 'active',
         'unmatched': '/mount_right/displacement',
         'other_writer': '',
+        'data_node': '/mount_right/probe_io',
     }
 
 

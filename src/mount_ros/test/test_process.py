@@ -85,6 +85,7 @@ class Process:
                 self._process.send_signal(number)
         out, errors = self._process.communicate(timeout=LIMIT)
         self.lines += out.splitlines()
+        errors = ''.join(line for line in errors.splitlines(keepends=True) if not line.startswith('[INFO]'))
         return self._process.returncode, errors
 
     def kill(self):

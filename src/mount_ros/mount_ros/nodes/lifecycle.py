@@ -34,6 +34,10 @@ class ServedPath(Protocol):
     refusal: str
 
     @property
+    def name(self) -> str:
+        """The full name of the node that has the topics."""
+
+    @property
     def failure(self) -> str:
         """Why its thread has ended by itself; empty while it serves."""
 
@@ -168,6 +172,9 @@ class SafeLifecycleNode(DeclaringNode):
         outcome = self._attempt('configure', self._configure, undo=self._release)
         if outcome == TransitionCallbackReturn.SUCCESS:
             self._gate.close()
+            path = self.data_path
+            place = f'; its topics are those of the node {path.name}' if path is not None else ''
+            self.get_logger().info(f'configured{place}')
         self.after_configure()
         return outcome
 
@@ -176,16 +183,19 @@ class SafeLifecycleNode(DeclaringNode):
         self._active = outcome == TransitionCallbackReturn.SUCCESS
         if self._active:
             self.real_time.begin(self)
+            self.get_logger().info('active')
         else:
             self.real_time.end(self)  # where the activation itself took it
         return outcome
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._leave_active()
+        self.get_logger().info('inactive')
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._release()
+        self.get_logger().info('cleaned up')
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -273,6 +283,7 @@ class SafeLifecycleNode(DeclaringNode):
             verdict = Verdict(max(verdict.level, Level.WARN), sentence, verdict.figures)
         state = 'active' if self._active else 'inactive'
         figures = {**verdict.figures, 'state': state, 'unmatched': unmatched, 'other_writer': other}
+        figures['data_node'] = path.name if path is not None else ''
         return Verdict(verdict.level, verdict.sentence, figures)
 
     def _verdict_without_path(self) -> Verdict:
