@@ -313,6 +313,7 @@ def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(pro
         'unmatched': '/mount_right/displacement',
         'other_writer': '',
         'data_node': '/mount_right/probe_io',
+        'path_errors': '0',
     }
 
 
@@ -374,5 +375,5 @@ def test_errors_in_the_data_path_are_a_warning_where_the_node_knows_of_none(prob
         return False
 
     probe.data_path.attend(work)
-    sentence = 'errors in the data path (1), the last: work not done: ValueError: too hard'
+    sentence = 'errors in the data path (1, limit: none), the last: work not done: ValueError: too hard'
     wait_until(lambda: operator.heard(Level.WARN, sentence), 'the sentence in the diagnostics')
