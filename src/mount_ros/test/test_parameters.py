@@ -170,6 +170,15 @@ def test_a_whole_number_becomes_the_float_that_is_declared(make_declaring):
     assert not node.set_parameters([Parameter('level', value=1)])[0].successful  # beyond its range
 
 
+@pytest.mark.parametrize('text', ['5e-05', '1E3', 'nan'])
+def test_the_text_of_a_float_is_one_as_ros2_param_load_hands_it_on(make_declaring, text):
+    node = make_declaring()
+    assert node.set_parameters([Parameter('open_ended', value=text)])[0].successful
+    assert repr(node.get_parameter('open_ended').value) == repr(float(text))
+    assert node.set_parameters([Parameter('name', value=text)])[0].successful
+    assert node.get_parameter('name').value == text
+
+
 @pytest.mark.parametrize('kind', [Parameter.Type.STRING_ARRAY, Parameter.Type.BOOL_ARRAY])
 def test_a_list_of_texts_can_be_emptied_whatever_ros_takes_an_empty_list_for(make_declaring, kind):
     node = make_declaring(marks=['a', 'b'])

@@ -1,5 +1,6 @@
 """Node parameters declared from parameter sets: unit, sentence and range travel with the value."""
 
+import contextlib
 import math
 from array import array
 from collections.abc import Collection, Iterable, Mapping
@@ -83,20 +84,25 @@ def refuse_sim_time(node: Node) -> None:
 def fitted(node: Node, parameters: Iterable[Parameter]) -> list[Parameter]:
     """Return parameters about to be set on `node` in the types that it has declared.
 
-    A whole number becomes a float where one is wanted, and an empty list one of the wanted kind, since ROS
-    cannot tell of what it is empty. Raises `ParameterError` with the nearest names for an unknown one.
+    A whole number becomes a float where one is wanted; so does the text of a float such as 5e-05 or nan, as
+    which `ros2 param load` hands on what `ros2 param dump` has written. An empty list becomes one of the
+    wanted kind, since ROS cannot tell of what it is empty. Raises `ParameterError` for an unknown name.
     """
     known = list(node.get_parameters_by_prefix(''))
     fit = []
     for parameter in parameters:
         check_name(node.get_name(), parameter.name, known)
         wanted = Parameter.Type(node.describe_parameter(parameter.name).type)
-        if wanted is Parameter.Type.DOUBLE and parameter.type_ is Parameter.Type.INTEGER:
-            parameter = Parameter(parameter.name, value=float(parameter.value))
+        if wanted is Parameter.Type.DOUBLE and parameter.type_ in _MAY_BE_FLOAT:
+            with contextlib.suppress(ValueError):  # ROS refuses it then, by its type
+                parameter = Parameter(parameter.name, value=float(parameter.value))
         elif wanted is Parameter.Type.STRING_ARRAY and _is_empty_list(parameter.value):
             parameter = Parameter(parameter.name, wanted, [])
         fit.append(parameter)
     return fit
+
+
+_MAY_BE_FLOAT = (Parameter.Type.INTEGER, Parameter.Type.STRING)
 
 
 def _is_empty_list(value: Any) -> bool:
