@@ -14,14 +14,15 @@ from mount_control.settings import parameter_sets
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.quantity import Quantity, quantities
-from mount_sim.parameters import SimParameters
+from mount_models.specimen_choice import SpecimenChoice
+from mount_sim.parameters import NodeParameters, SimParameters
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'parameters.md'
 README = {'mount_recorder': 'mount_bags'}
 SETS: dict[str, list[tuple[str, Any]]] = {
-    'mount_driver': [('', DriverParameters())],
-    'mount_sim': [('', SimParameters())],
-    'mount_init': [('', InitParameters())],
+    'mount_driver': [('', DriverParameters()), ('', SpecimenChoice())],
+    'mount_sim': [('', SimParameters()), ('', NodeParameters())],
+    'mount_init': [('', InitParameters()), ('', SpecimenChoice())],
     'mount_control': parameter_sets(),
     'mount_recorder': [('', RecorderParameters())],
 }
@@ -50,7 +51,7 @@ def page() -> str:
                 [
                     '| parameter | default | unit | range | meaning | source |',
                     '|---|---|---|---|---|---|',
-                    *(row(name, default, notes.get(name)) for name, default in defaults.items()),
+                    *(row(name, default, notes[name]) for name, default in defaults.items()),
                 ]
             ),
         ]
@@ -66,16 +67,13 @@ def notes_of(parameters: NamedTuple, prefix: str) -> Iterator[tuple[str, Quantit
             yield from notes_of(value, f'{before}{name}')
 
 
-def row(name: str, default: Any, note: Quantity | None) -> str:
+def row(name: str, default: Any, note: Quantity) -> str:
     """Return the row of one parameter."""
     if isinstance(default, (int, float)):
         value = 'unknown' if math.isnan(default) else f'{default:g}'
     else:
         value = f'`{default}`' if default else 'empty'
-    if note is None:
-        return f'| `{name}` | {value} | | | | |'
-    limits = f'{note.low:g} .. {note.high:g}' if note.low > -math.inf else ''
-    return f'| `{name}` | {value} | {note.unit} | {limits} | {note.meaning} | {note.source} |'
+    return f'| `{name}` | {value} | {note.unit} | {note.limits} | {note.meaning} | {note.source} |'
 
 
 if __name__ == '__main__':

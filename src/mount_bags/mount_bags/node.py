@@ -1,6 +1,7 @@
 """The node `mount_recorder`: records the topics of the graph into rosbag2 MCAP bags."""
 
 import time
+from collections import deque
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -34,6 +35,7 @@ from mount_ros.nodes.sliding_window import SlidingWindow
 from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
 NAME = 'mount_recorder'
+_MARKS_TOLD = 10  # chosen: of those set by itself between two looks
 _FAMILY = 'mount_record'  # all recorders are called so or something longer
 _PLACES = {
     'uri': ('', 'folder that the recording creates; it must not exist'),
@@ -63,9 +65,12 @@ class MountRecorder(SafeLifecycleNode):
         self._event = EVENT.name
         self._announced_failure = ''
         self._announced_malformed: set[str] = set()
+        self._marked: deque[str] = deque(maxlen=_MARKS_TOLD)  # and not yet in the log
         self._counted = SlidingWindow(Counted())
         self._begun_at = 0.0
-        self._mark_service = self.create_service(Trigger, '~/mark', self._on_mark)
+        self._mark_service = self.create_service(
+            Trigger, '~/mark', self._on_mark, callback_group=self.transitions
+        )
 
     def configure(self) -> None:
         parameters = read(self, RecorderParameters())
@@ -137,6 +142,8 @@ class MountRecorder(SafeLifecycleNode):
         if figures.failure and not self._announced_failure:
             self._announced_failure = figures.failure
             self.get_logger().error(figures.failure)
+        if marked := [self._marked.popleft() for _ in range(len(self._marked))]:
+            self.get_logger().info(f'marked: {"; ".join(marked)}')
         unobserved = dict(recorder.unobserved)
         if new := {name: unobserved[name] for name in unobserved.keys() - self._announced_malformed}:
             self._announced_malformed |= new.keys()
@@ -163,6 +170,7 @@ class MountRecorder(SafeLifecycleNode):
             raise RecordingError(f'{self.get_name()} is not active; nothing would be marked')
         mark = Mark(self._present_time(), kind, text)
         self._publish(mark)
+        self.get_logger().info(f'marked: {text or kind}')
         return mark
 
     def _on_mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -209,6 +217,7 @@ class MountRecorder(SafeLifecycleNode):
             names = [info.node_name for info in infos if info.node_name.startswith(_FAMILY)]
             if min(names, default=data_path.node.get_name()) >= data_path.node.get_name():
                 self._publish(mark)
+                self._marked.append(f'{mark.kind}, {mark.text}')
         except RuntimeError:  # rclpy's errors of a context that is already shut down
             return
 

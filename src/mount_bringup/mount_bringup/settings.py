@@ -11,7 +11,8 @@ from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, check_name, flattened
-from mount_sim.parameters import SimParameters
+from mount_models.specimen_choice import SpecimenChoice
+from mount_sim.parameters import NodeParameters, SimParameters
 from mount_sim.plant.places import general_name
 
 OF_EACH = ('mount_driver', 'mount_init', 'mount_control')
@@ -25,9 +26,9 @@ class SettingError(ParameterError):
 def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
     return {
-        'mount_driver': {**flattened(DriverParameters()), 'parameters_file': '', 'specimen': ''},
-        'mount_sim': {**flattened(SimParameters()), 'answer_patience': 10.0, 'inject': ''},
-        'mount_init': {**flattened(InitParameters()), 'parameters_file': '', 'specimen': ''},
+        'mount_driver': {**flattened(DriverParameters()), **flattened(SpecimenChoice())},
+        'mount_sim': {**flattened(SimParameters()), **flattened(NodeParameters())},
+        'mount_init': {**flattened(InitParameters()), **flattened(SpecimenChoice())},
         'mount_control': control.defaults(),
         'mount_recorder': flattened(RecorderParameters()),
     }

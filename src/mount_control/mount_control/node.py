@@ -14,11 +14,11 @@ from std_msgs.msg import String
 from mount_control.activation import Activation, AirGap
 from mount_control.answering import OFF, Answering
 from mount_control.controller import load_compiled_law
+from mount_control.damping_log import DampingLog
 from mount_control.diagnosis import ControlFigures, Counted, Unread, counted, verdict
 from mount_control.policy.contract import trace_fields
 from mount_control.sample_watch import Judgement
 from mount_control.settings import (
-    FILES,
     FRICTION,
     check_policies,
     control_settings,
@@ -61,13 +61,12 @@ class MountControl(SafeLifecycleNode):
         super().__init__('mount_control', **arguments)
         for prefix, parameters in parameter_sets():
             declare(self, parameters, prefix)
-        for name, text in FILES.items():
-            self.declare_parameter(name, text)
         self.declare_parameter(*_MEASURED_BEFORE)
         self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)
         self.answering = Answering()
         self._activation = Activation()
+        self._damping_log = DampingLog()
         self._foreign = False  # whether another node publishes what this one hears
         self._unread = Unread()
         self._last_sample: tuple[int, float] | None = None  # stamp ns, m
@@ -109,8 +108,13 @@ class MountControl(SafeLifecycleNode):
         self._latency = LatencyHistogram()
         self._counted = SlidingWindow(Counted())
         self._heard = time.monotonic()
+        self._damping_log = DampingLog()
         self.answering.begin(self._settings, currents, air_gap.stamp)
         self.tell_writers()
+        self.get_logger().info(
+            f'takes the table of {air_gap.stamp * 1e-9:.3f} s: up to {max(table.normal_force):.0f} N, offset '
+            f'current {air_gap.offset_current:.3f} A; policy {self._settings.parameters.policy}'
+        )
         if self.lockstep and self._last_sample is not None:
             self._answer(*self._last_sample)  # the electronics wait for an answer to what came before
 
@@ -137,6 +141,8 @@ class MountControl(SafeLifecycleNode):
         self._settings = control_settings(self._values(), self._specimen)
         self._parameter_changes += len(changes)
         self._warn_without_effect(changes)
+        told = ', '.join(f'{name} from {change.old} to {change.new}' for name, change in changes.items())
+        self.get_logger().info(f'goes on with {told}')
         text = change_text(self.get_name(), changes)
         if self.answering.controller is not None:
             self.answering.change(self._settings, text)
@@ -145,6 +151,8 @@ class MountControl(SafeLifecycleNode):
 
     def judge(self) -> Verdict:
         answering, now = self.answering, time.monotonic()
+        if line := self._damping_log.look(answering.damping_active, now):
+            self.get_logger().info(line)
         counts = replace(answering.watch.counts)
         earlier = self._counted.earlier(now, counted(counts, self._unread))
         return verdict(

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from mount_control.policy.registry import DEFAULT
+from mount_control.policy.registry import DEFAULT, POLICIES
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SampleRate
 
@@ -10,7 +10,9 @@ from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SampleRate
 class ControlParameters(NamedTuple):
     """Name of the policy, rate of the samples, what is believed of them, and the limit of the output."""
 
-    policy: str = DEFAULT
+    policy: Annotated[
+        str, Quantity('word', 'what decides when and how much is damped', words=tuple(POLICIES))
+    ] = DEFAULT
     sample_rate: SampleRate = SAMPLE_RATE
     longest_bridge: Annotated[
         float,

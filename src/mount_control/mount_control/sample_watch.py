@@ -64,6 +64,7 @@ class SampleWatch:
         self.last: int | None = None
         self.measured_before = False
         """Whether the measurements are known to have come without a break before the first sample, too."""
+        self._broken = False  # whether `first` came after a break that was heard
         self.interrupted = False  # since the activation
         self.foreign = ''  # which other sender there is, since the activation
         self.writer_doubt = ''  # which other sender there may be at present
@@ -86,6 +87,7 @@ class SampleWatch:
             self._counted_from, self._noted = stamp, 1
         elif abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
+            self._broken = True
             self._counted_from, self._noted = stamp, 1
         elif stamp > self.last:
             self.last = stamp
@@ -109,8 +111,7 @@ class SampleWatch:
             raise ForceTableError('no displacement was received; activate mount_driver first')
         if table_stamp < self.first:
             raise ForceTableError(
-                f'current_force_table is of {_seconds(table_stamp)}, but the measurements restarted at '
-                f'{_seconds(self.first)}; {remedy}'
+                f'current_force_table is of {_seconds(table_stamp)}, but {self._since(self.first)}; {remedy}'
             )
         if table_stamp > self.last:
             raise ForceTableError(
@@ -118,6 +119,14 @@ class SampleWatch:
                 f'{_seconds(self.last)}: the time of the measurements went back, or they stand still; '
                 f'{remedy}'
             )
+
+    def _since(self, first: int) -> str:
+        if self._broken:
+            return f'the measurements were interrupted or went back, and came anew at {_seconds(first)}'
+        return (
+            f'mount_control hears the measurements since {_seconds(first)} only, when it was configured, and '
+            'cannot know that they have come without a break since the table'
+        )
 
     def check_rate(self, sample_rate: float) -> None:
         """Raise `ForceTableError` if the samples so far did not come at `sample_rate` (Hz)."""

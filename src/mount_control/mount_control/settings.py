@@ -15,13 +15,12 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, flattened, with_flattened, with_values
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen import Specimen, SpecimenError
+from mount_models.specimen_choice import SpecimenChoice
 
 P = TypeVar('P', bound=NamedTuple)
 
 FRICTION = {'friction': FrictionCoefficients(), 'contact': FrictionContact()}
 """The sets of parameters that a specimen may know better, by their prefixes."""
-FILES = {'parameters_file': '', 'specimen': ''}
-"""The parameters that choose the specimen, with their defaults."""
 
 
 class ControlSettings(NamedTuple):
@@ -41,7 +40,7 @@ class ControlSettings(NamedTuple):
 def parameter_sets() -> list[tuple[str, Any]]:
     """Return (prefix, defaults) of all sets of parameters, those of every policy among them."""
     policies = [(prefix_of(name), policy.Parameters()) for name, policy in POLICIES.items()]
-    return [('', ControlParameters()), *policies, *FRICTION.items()]
+    return [('', ControlParameters()), *policies, *FRICTION.items(), ('', SpecimenChoice())]
 
 
 def run_time_parameters() -> frozenset[str]:
@@ -55,7 +54,7 @@ def defaults() -> dict[str, Any]:
     values = {}
     for prefix, parameters in parameter_sets():
         values.update(flattened(parameters, prefix))
-    return {**values, **FILES}
+    return values
 
 
 def control_settings(values: Mapping[str, Any], specimen: Specimen) -> ControlSettings:

@@ -126,7 +126,15 @@ def test_without_displacement_it_is_refused():
 
 def test_a_table_from_before_a_break_is_refused():
     assert _refusal(2 * S, 2 * S, _stream(S, 2 * S, 4 * S, 5 * S)) == (
-        'current_force_table is of 2.000 s, but the measurements restarted at 4.000 s; '
+        'current_force_table is of 2.000 s, but the measurements were interrupted or went back, and came '
+        'anew at 4.000 s; activate mount_init (again)'
+    )
+
+
+def test_a_table_from_before_the_node_heard_the_measurements_is_refused_for_that_reason():
+    assert _refusal(2 * S, 2 * S, _stream(4 * S, 5 * S)) == (
+        'current_force_table is of 2.000 s, but mount_control hears the measurements since 4.000 s only, '
+        'when it was configured, and cannot know that they have come without a break since the table; '
         'activate mount_init (again)'
     )
 

@@ -15,6 +15,7 @@ from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_models.coil.heating import check_heating
 from mount_models.sampling import sample_time_ns
+from mount_models.specimen_choice import SpecimenChoice
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.nodes.diagnostics import Level, Verdict
@@ -35,8 +36,7 @@ class MountDriver(SafeLifecycleNode):
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
         declare(self, DriverParameters())
-        self.declare_parameter('parameters_file', '')
-        self.declare_parameter('specimen', '')
+        declare(self, SpecimenChoice())
         self._of_specimen = SpecimenValues(self)
         self._settings, self._law = DriverParameters(), RippleLaw()
         self._codec: MountCodec | None = None

@@ -11,6 +11,7 @@ from mount_init.errors import DriverRefusalError, InitialisationError
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
 from mount_models.specimen import chosen_specimen
+from mount_models.specimen_choice import SpecimenChoice
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import serialised
@@ -33,8 +34,7 @@ class MountInit(SafeLifecycleNode):
     def __init__(self, **arguments):
         super().__init__('mount_init', **arguments)
         declare(self, InitParameters())
-        self.declare_parameter('parameters_file', '')
-        self.declare_parameter('specimen', '')
+        declare(self, SpecimenChoice())
         self._dialogue: CoilDialogue | None = None
         self._result: tuple[int, InitialisationResult] | None = None
 

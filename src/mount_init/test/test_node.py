@@ -7,6 +7,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import GetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -116,6 +117,7 @@ class Graph:
         self._client_node = Node('client', context=self.context)
         self._change = self._client_node.create_client(ChangeState, '/mount_init/change_state')
         self._state = self._client_node.create_client(GetState, '/mount_init/get_state')
+        self._get = self._client_node.create_client(GetParameters, '/mount_init/get_parameters')
         self._ending = threading.Event()
         self._threads = [
             threading.Thread(target=self._spin, args=(node,)) for node in (self.init, self._client_node)
@@ -150,6 +152,12 @@ class Graph:
         assert self._change.wait_for_service(LIMIT)
         request = ChangeState.Request(transition=Transition(id=transition))
         return self._result(self._change.call_async(request)).success
+
+    def ask_for(self, transition):
+        return self._change.call_async(ChangeState.Request(transition=Transition(id=transition)))
+
+    def parameter(self, name):
+        return self._result(self._get.call_async(GetParameters.Request(names=[name]))).values[0]
 
     def state(self):
         return self._result(self._state.call_async(GetState.Request())).current_state.id
@@ -243,6 +251,19 @@ def test_a_measured_coil_temperature_is_compensated_as_in_plain_function_calls(
     core = run_initialisation(simulated_actuator(), specimen, given)
     assert g.electronics.results[0][1][:2] == (core.rest_gap, core.contact_gap)
     assert g.init.judge().figures['coil_temperature_from'] == 'measured'
+
+
+def test_state_and_parameters_are_told_while_the_gap_is_measured(graph):
+    g = graph(silence_timeout=60.0)
+    g.configure()
+    answer = g.ask_for(Transition.TRANSITION_ACTIVATE)
+    wait_until(lambda: g.state() == State.TRANSITION_STATE_ACTIVATING, 'begin of the activation')
+    assert g.parameter('silence_timeout').double_value == 60.0
+    assert not answer.done()
+    g.electronics.send_sample()
+    wait_until(lambda: answer.done() and g.electronics.tables, 'the table')
+    assert answer.result().success
+    assert g.state() == State.PRIMARY_STATE_ACTIVE
 
 
 def test_after_the_ramp_the_node_leaves_the_coil_to_others(graph):

@@ -21,9 +21,10 @@ class ParameterError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a number means: unit, one sentence, allowed range (inclusive) and where it comes from.
+    """What a value means: unit, one sentence, allowed range (inclusive) and where it comes from.
 
-    With `may_be_unknown` NaN is allowed beside the range.
+    With `may_be_unknown` NaN is allowed beside the range. A text has a kind in the place of the unit (word,
+    name, path); `words` are those that it may be, where it is one of a few.
     """
 
     unit: str
@@ -32,6 +33,16 @@ class Quantity:
     high: float = math.inf
     source: str = 'chosen'
     may_be_unknown: bool = False
+    words: tuple[str, ...] = ()
+
+    @property
+    def limits(self) -> str:
+        """What the value must keep to, for people; empty where it may be anything."""
+        if self.words:
+            return ', '.join(self.words)
+        if math.isinf(self.low) and math.isinf(self.high):
+            return ''
+        return f'{self.low:g} .. {self.high:g}'
 
 
 def check_name(owner: str, name: str, known: Collection[str]) -> None:

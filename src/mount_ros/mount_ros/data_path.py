@@ -59,6 +59,11 @@ class DataPath:
         self.refusal = ''
 
     @property
+    def name(self) -> str:
+        """The full name of the node that has the topics."""
+        return self.node.get_fully_qualified_name()
+
+    @property
     def failure(self) -> str:
         """Why the thread that serves this path has ended by itself; empty while it serves."""
         return self._thread.failure

@@ -6,11 +6,14 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_ros.data_path import DataPath
+from mount_ros.nodes.aside import done_aside
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.qos import publisher_qos
@@ -20,7 +23,7 @@ from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 DEACTIVATE, CLEANUP = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
 UNCONFIGURED, INACTIVE = State.PRIMARY_STATE_UNCONFIGURED, State.PRIMARY_STATE_INACTIVE
-ACTIVE = State.PRIMARY_STATE_ACTIVE
+ACTIVE, ACTIVATING = State.PRIMARY_STATE_ACTIVE, State.TRANSITION_STATE_ACTIVATING
 
 
 class Probe(SafeLifecycleNode):
@@ -62,6 +65,8 @@ class Operator:
         self.said = []
         self._change = self.node.create_client(ChangeState, '/mount_right/probe/change_state')
         self._state = self.node.create_client(GetState, '/mount_right/probe/get_state')
+        self._get = self.node.create_client(GetParameters, '/mount_right/probe/get_parameters')
+        self._set = self.node.create_client(SetParameters, '/mount_right/probe/set_parameters')
         self.node.create_subscription(
             DiagnosticArray,
             DIAGNOSTICS.name,
@@ -71,6 +76,16 @@ class Operator:
 
     def change(self, transition):
         return self._ask(self._change, ChangeState.Request(transition=Transition(id=transition))).success
+
+    def ask_for(self, transition):
+        return self._change.call_async(ChangeState.Request(transition=Transition(id=transition)))
+
+    def parameter(self, name):
+        return self._ask(self._get, GetParameters.Request(names=[name])).values[0]
+
+    def set(self, name, value):
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        return self._ask(self._set, request).results[0]
 
     @property
     def state(self):
@@ -105,12 +120,19 @@ def operator(context, serve, probe):
     return operator
 
 
-def test_a_node_goes_through_its_steps(probe, operator):
+def test_a_node_goes_through_its_steps_and_says_so(probe, operator, capfd):
     assert [operator.change(transition) for transition in (CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP)] == [
         True
     ] * 4
     assert probe.steps == ['configure', 'activate', 'deactivate', 'cleanup']
     assert operator.state == UNCONFIGURED
+    told = [line for line in capfd.readouterr().err.splitlines() if line.startswith('[INFO]')]
+    assert told == [
+        '[INFO] [mount_right.probe]: configured; its topics are those of the node /mount_right/probe_io',
+        '[INFO] [mount_right.probe]: active',
+        '[INFO] [mount_right.probe]: inactive',
+        '[INFO] [mount_right.probe]: cleaned up',
+    ]
 
 
 @pytest.mark.parametrize('transition', [ACTIVATE, DEACTIVATE, CLEANUP])
@@ -123,6 +145,57 @@ def test_a_transition_that_is_not_valid_is_answered_with_no_and_the_node_lives(
     assert operator.change(CONFIGURE)
     assert operator.change(ACTIVATE)
     assert operator.state == ACTIVE
+
+
+def test_state_and_parameters_are_told_amid_a_transition_and_nothing_can_be_set(probe, operator):
+    assert operator.change(CONFIGURE)
+    begun, may_end = threading.Event(), threading.Event()
+    probe.activate = lambda: (begun.set(), may_end.wait(LIMIT))
+    answer = operator.ask_for(ACTIVATE)
+    assert begun.wait(LIMIT)
+    another = operator.ask_for(DEACTIVATE)  # comes to its turn afterwards
+    assert operator.state == ACTIVATING
+    assert operator.parameter('lockstep').bool_value is False
+    refused = operator.set('lockstep', True)
+    assert not refused.successful
+    assert refused.reason == 'lockstep cannot be set while probe is amid a transition: wait for its end'
+    assert not answer.done()
+    assert not another.done()
+    may_end.set()
+    wait_until(another.done, 'the other transition')
+    assert answer.result().success
+    assert another.result().success
+    assert operator.state == INACTIVE
+    assert operator.change(CLEANUP)
+    assert operator.set('lockstep', True).successful
+
+
+def test_an_exception_beside_a_transition_waits_for_its_end(context):
+    executor = SingleThreadedExecutor(context=context)
+    steps = []
+
+    def work():
+        executor.create_task(fail)
+        begun.wait(LIMIT)
+        steps.append('work')
+
+    def fail():
+        begun.set()
+        raise RuntimeError('out of order')
+
+    begun = threading.Event()
+    with pytest.raises(RuntimeError, match='out of order'):
+        done_aside(executor, work, 'transition')
+    assert steps == ['work']
+    executor.shutdown()
+
+
+def test_what_long_work_raises_concerns_who_asked_for_it(context):
+    executor = SingleThreadedExecutor(context=context)
+    with pytest.raises(ZeroDivisionError):
+        done_aside(executor, lambda: 1 / 0, 'transition')
+    assert done_aside(executor, lambda: 7, 'transition') == 7
+    executor.shutdown()
 
 
 def test_a_whole_number_given_for_a_float_is_taken_as_one(context):
@@ -239,6 +312,7 @@ def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(pro
         'state': 'active',
         'unmatched': '/mount_right/displacement',
         'other_writer': '',
+        'data_node': '/mount_right/probe_io',
         'path_errors': '0',
     }
 

@@ -82,6 +82,11 @@ def test_all_others_are_refused_until_cleanup(subject, name, value):
     assert subject.taken == []
 
 
-def test_what_belongs_to_the_middleware_is_not_touched(subject):
+def test_the_time_of_a_simulator_is_refused_in_words_at_any_time(subject):
+    (refused,) = _set(subject, use_sim_time=True)
+    assert not refused.successful
+    assert refused.reason.startswith('use_sim_time must be false: the stamps of the messages are the time')
     subject.trigger_configure()
-    assert _set(subject, use_sim_time=True)[0].successful
+    assert not _set(subject, use_sim_time=True)[0].successful
+    assert _set(subject, use_sim_time=False)[0].successful
+    assert '/clock' not in dict(subject.get_topic_names_and_types())

@@ -8,6 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity
+from mount_ros.nodes.declaring import DeclaringNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
 
 
@@ -19,8 +20,12 @@ class Settings(NamedTuple):
     level: Annotated[float, Quantity('m', 'when to act', 0.001, 0.01, 'section 6')] = 0.002
     count: Annotated[int, Quantity('1', 'how often', 1, 9)] = 3
     open_ended: Annotated[float, Quantity('s', 'any time', 0.0)] = 5.0
-    name: str = 'first'
+    name: Annotated[str, Quantity('word', 'which one', words=('first', 'second'))] = 'first'
     spring: Spring = Spring()
+
+
+class Marks(NamedTuple):
+    marks: Annotated[tuple[str, ...], Quantity('words', 'what is marked')] = ()
 
 
 @pytest.fixture
@@ -67,10 +72,22 @@ def test_unit_sentence_source_and_range_travel_with_the_parameter(make_node):
     assert (nested.from_value, nested.to_value) == (1.0, 1e6)
 
 
-def test_parameters_without_both_limits_have_no_range(make_node):
+def test_limits_that_are_no_range_of_ros_are_told_in_words(make_node):
     node = make_node()
     assert not node.describe_parameter('open_ended').floating_point_range
-    assert not node.describe_parameter('name').floating_point_range
+    assert node.describe_parameter('open_ended').additional_constraints == '0 .. inf s'
+    name = node.describe_parameter('name')
+    assert (name.description, name.additional_constraints) == (
+        'which one [word]; chosen',
+        'one of first, second',
+    )
+
+
+def test_only_the_chosen_fields_of_a_set_are_declared(context):
+    node = Node('subject', context=context)
+    declare(node, Settings(), only=('count', 'name'))
+    assert sorted(set(node.get_parameters_by_prefix('')) & {*Settings._fields}) == ['count', 'name']
+    node.destroy_node()
 
 
 @pytest.mark.parametrize('value', [0.0005, 0.02])
@@ -119,7 +136,80 @@ def test_a_number_that_may_be_unknown_may_be_nan_and_no_other(context):
                 read(node, Measured())
         else:
             assert str(read(node, Measured()).celsius) == str(float('nan') if value is None else value)
+        described = node.describe_parameter('celsius')
+        assert described.additional_constraints == '-60 .. 250 degC, or nan'
         node.destroy_node()
+
+
+# What is set on a node of the graph.
+
+
+@pytest.fixture
+def make_declaring(context):
+    made = []
+
+    def make(**overrides):
+        values = [Parameter(name, value=value) for name, value in overrides.items()]
+        node = DeclaringNode('subject', context=context, parameter_overrides=values)
+        made.append(node)
+        declare(node, Settings())
+        declare(node, Marks())
+        return node
+
+    yield make
+    for node in made:
+        node.destroy_node()
+
+
+def test_a_whole_number_becomes_the_float_that_is_declared(make_declaring):
+    node = make_declaring(open_ended=7)
+    assert read(node, Settings()).open_ended == 7.0
+    assert node.set_parameters([Parameter('open_ended', value=8)])[0].successful
+    assert node.set_parameters_atomically([Parameter('open_ended', value=9)]).successful
+    assert read(node, Settings()).open_ended == 9.0
+    assert not node.set_parameters([Parameter('level', value=1)])[0].successful  # beyond its range
+
+
+@pytest.mark.parametrize('text', ['5e-05', '1E3', 'nan'])
+def test_the_text_of_a_float_is_one_as_ros2_param_load_hands_it_on(make_declaring, text):
+    node = make_declaring()
+    assert node.set_parameters([Parameter('open_ended', value=text)])[0].successful
+    assert repr(node.get_parameter('open_ended').value) == repr(float(text))
+    assert node.set_parameters([Parameter('name', value=text)])[0].successful
+    assert node.get_parameter('name').value == text
+
+
+@pytest.mark.parametrize('kind', [Parameter.Type.STRING_ARRAY, Parameter.Type.BOOL_ARRAY])
+def test_a_list_of_texts_can_be_emptied_whatever_ros_takes_an_empty_list_for(make_declaring, kind):
+    node = make_declaring(marks=['a', 'b'])
+    assert node.describe_parameter('marks').description == 'what is marked [words]; chosen'
+    assert node.set_parameters([Parameter('marks', kind, [])])[0].successful
+    assert node.get_parameter('marks').value == []
+
+
+@pytest.mark.parametrize('atomically', [True, False])
+def test_what_does_not_fit_is_refused_in_words(make_declaring, atomically):
+    node = make_declaring()
+
+    def refusal(name, value):
+        parameters = [Parameter(name, value=value)]
+        result = (
+            node.set_parameters_atomically(parameters) if atomically else node.set_parameters(parameters)[0]
+        )
+        assert not result.successful
+        return result.reason
+
+    assert refusal('cuont', 3) == "'cuont' is no parameter of subject; did you mean count?"
+    assert refusal('level', 'high') == "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.STRING'"
+    assert refusal('count', 2.5) == "Wrong parameter type, expected 'Type.INTEGER' got 'Type.DOUBLE'"
+    assert read(node, Settings()) == Settings()
+
+
+def test_what_was_given_at_the_start_and_does_not_fit_is_refused_in_words(make_declaring):
+    with pytest.raises(ParameterError, match=r'^subject: .*level.* out of range Min: 0.001, Max: 0.01'):
+        make_declaring(level=0.5)
+    with pytest.raises(ParameterError, match=r"^subject: .*'count' to '2.5' of type 'DOUBLE', expecting"):
+        make_declaring(count=2.5)
 
 
 # Values of a file.

@@ -11,7 +11,7 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from mount_ros.nodes.process import wake
+from mount_ros.nodes.aside import wake
 from mount_ros.nodes.starter import environment_of_children
 from mount_ros.testing import LIMIT, free_domain
 
@@ -85,6 +85,7 @@ class Process:
                 self._process.send_signal(number)
         out, errors = self._process.communicate(timeout=LIMIT)
         self.lines += out.splitlines()
+        errors = ''.join(line for line in errors.splitlines(keepends=True) if not line.startswith('[INFO]'))
         return self._process.returncode, errors
 
     def kill(self):
@@ -213,3 +214,35 @@ def test_an_executor_that_sleeps_can_be_woken(context):
     assert not sleeping.is_alive()
     executor.shutdown()
     node.destroy_node()
+
+
+CONTROLLED = """
+import sys
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.process import run_node
+
+class Probe(SafeLifecycleNode):
+    def __init__(self):
+        super().__init__('probe')
+        self.declare_parameter('limit', 1.0)
+
+run_node(Probe, sys.argv)
+"""
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'reason'),
+    [
+        (['-p', 'limit:=high'], "[FATAL] [-c]: probe: Trying to set parameter 'limit' to 'high' of type"),
+        (['-p', 'use_sim_time:=3'], "[FATAL] [-c]: probe: Trying to set parameter 'use_sim_time' to '3'"),
+        (['--params-file', 'nowhere.yaml'], "[FATAL] failed to initialize rcl: Couldn't parse params file"),
+    ],
+)
+def test_a_start_with_what_does_not_fit_ends_with_one_sentence_and_code_1(arguments, reason):
+    program = [sys.executable, '-c', CONTROLLED, '--ros-args', *arguments]
+    with free_domain() as domain:
+        environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        ended = subprocess.run(program, env=environment, capture_output=True, text=True, timeout=LIMIT)
+    assert ended.returncode == 1
+    assert reason in ended.stderr
+    assert 'Traceback' not in ended.stderr

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from functools import partial
 from typing import Any
 
@@ -31,7 +32,7 @@ from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults.schedule import Faults, injected_faults, texts_of_mount
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
-from mount_sim.parameters import SimParameters
+from mount_sim.parameters import NodeParameters, SimParameters
 from mount_sim.plant.places import general_name, mount_names, values_of_mount
 from mount_sim.plant.simulated_car import CarMount, SimulatedCar, mount_parameters
 from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
@@ -52,12 +53,9 @@ class MountSim(SafeLifecycleNode):
     def __init__(self, **arguments):
         super().__init__('mount_sim', **arguments)
         declare(self, SimParameters())
-        self.declare_parameter('interface', 'udp_multicast')
-        self.declare_parameter('channel', DriverParameters().channel)
-        self.declare_parameter('port', DriverParameters().port)
-        self.declare_parameter('answer_patience', 10.0)
-        self.declare_parameter(INJECT, '')
-        self.create_service(SetBool, '~/inject_fault', self._inject)
+        declare(self, DriverParameters(), only=('interface', 'channel', 'port'))
+        declare(self, NodeParameters())
+        self.create_service(SetBool, '~/inject_fault', self._inject, callback_group=self.transitions)
         self._own = _declare_own(self)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -229,7 +227,9 @@ def _declare_own(node: SafeLifecycleNode) -> list[str]:
         except ParameterError:
             continue  # it is refused as unknown when the node is configured
         if general != name and node.has_parameter(general):
-            node.declare_parameter(name, node.get_parameter(general).value)
+            node.declare_parameter(
+                name, node.get_parameter(general).value, deepcopy(node.describe_parameter(general))
+            )
             own.append(name)
     return own
 

@@ -15,6 +15,7 @@ from mount_models.vehicle import Engine, Vehicle
 from mount_sim.electronics.electronics import ElectronicsParameters
 from mount_sim.electronics.warm_coil import TemperatureCoefficients
 from mount_sim.excitation.scenario import (
+    SCENARIO_NAMES,
     BenchScenario,
     IdleForce,
     MotorwayScenario,
@@ -23,17 +24,25 @@ from mount_sim.excitation.scenario import (
     Timeline,
     TipIn,
 )
-from mount_sim.plant.mounts import seated_mount
-from mount_sim.plant.places import Places
+from mount_sim.plant.mounts import MOUNTS, seated_mount
+from mount_sim.plant.places import PLACES, Places
 from mount_sim.plant.plant import Plant
 
 
 class SimParameters(NamedTuple):
     """Scenario, truth and faults of one simulated run."""
 
-    scenario: str = 'motorway'
-    mount: str = 'friction'
-    mounts: str = ''
+    scenario: Annotated[str, Quantity('word', 'what shakes engine and chassis', words=SCENARIO_NAMES)] = (
+        'motorway'
+    )
+    mount: Annotated[str, Quantity('word', 'which mount is in the seat', words=tuple(MOUNTS))] = 'friction'
+    mounts: Annotated[
+        str,
+        Quantity(
+            'words',
+            f'mounts with electronics under one engine, of {", ".join(PLACES)}, as in left,right; empty: one',
+        ),
+    ] = ''
     sample_rate: SampleRate = SAMPLE_RATE
     seed: Annotated[int, Quantity('1', 'seed of noise and road', 0, 2**31 - 1, 'chosen')] = 1
     timeline: Timeline = Timeline()
@@ -54,7 +63,10 @@ class SimParameters(NamedTuple):
     places: Places = Places()
     hydromount: Hydromount = Hydromount()
     electronics: ElectronicsParameters = ElectronicsParameters()
-    faults: tuple[str, ...] = ()
+    faults: Annotated[
+        tuple[str, ...],
+        Quantity('faults', 'faults from the start on, each NAME@t or NAME@t:duration (s), as in coil_open@8'),
+    ] = ()
 
     @property
     def plant(self) -> Plant:
@@ -72,3 +84,16 @@ class SimParameters(NamedTuple):
             hydromount=self.hydromount,
             mount=seated_mount(self.mount),
         )
+
+
+class NodeParameters(NamedTuple):
+    """What the node of the simulator takes beside the run that it simulates."""
+
+    answer_patience: Annotated[
+        float,
+        Quantity('s', 'lock-step: longest wait for the answer to a sample; the first may take any time', 0.0),
+    ] = 10.0
+    inject: Annotated[
+        str,
+        Quantity('faults', 'faults that ~/inject_fault begins, as in coil_open; several with commas between'),
+    ] = ''

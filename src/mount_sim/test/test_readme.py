@@ -15,6 +15,8 @@ def rows(parameters, prefix=''):
     """The rows of the table for the numbers of a parameter set."""
     for name, note in quantities(parameters).items():
         default = getattr(parameters, name)
+        if not isinstance(default, int | float):
+            continue
         yield (
             f'| `{prefix}{name}` | {default:g} | {note.unit} '
             f'| {note.low:g} .. {note.high:g} | {note.meaning} |'

@@ -61,6 +61,11 @@ class Collector:
         self._ending = threading.Event()
 
     @property
+    def name(self) -> str:
+        """The full name of the node that has the topics."""
+        return self.node.get_fully_qualified_name()
+
+    @property
     def failure(self) -> str:
         """Why the thread that takes the messages has ended by itself; empty while it serves."""
         return self._failure if self._shared_thread is None else self._shared_thread.failure

@@ -33,6 +33,7 @@ from mount_bringup.graph.nodes import (
 )
 from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
+from mount_bringup.graph.reinitialisation import initialise_anew, offer
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
@@ -99,6 +100,7 @@ class Bringup:
             mount: self._node.create_publisher(String, f'{mount}/{SESSION.name}'.lstrip('/'), qos)
             for mount in self._mounts
         }
+        offer(self._node, self._mounts, self._begin_anew)
         say('starting the nodes')
         self.start_nodes()
         self._configure()
@@ -189,6 +191,17 @@ class Bringup:
             if self.figures(SIM).get('sentence') != FINISHED:
                 raise
             self.notes.append(f'{error}, at the end of the drive')
+        finally:
+            self._makes_good = True
+            self.verdicts.liveliness.pause()
+
+    def _begin_anew(self, mount: str) -> str:
+        """Initialise a mount anew while the graph runs, all if `mount` is empty; see `initialise_anew`."""
+        if not self._makes_good:
+            raise GraphError('the graph starts, recovers or runs in lock-step: ask when all nodes are active')
+        self._makes_good = False
+        try:
+            return initialise_anew(self, mount)
         finally:
             self._makes_good = True
             self.verdicts.liveliness.pause()

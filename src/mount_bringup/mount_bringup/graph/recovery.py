@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter
 from mount_bags.run.folder import next_recording
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphNode
+from mount_bringup.graph.reinitialisation import deactivate
 from mount_bringup.graph.restarts import (
     Loss,
     NodesLostError,
@@ -77,7 +78,7 @@ class Recovery:
         if chosen is Remedy.INITIALISE:
             for node in self._of_mounts(loss, CONTROL, INIT, DRIVER):
                 if node not in loss.nodes:
-                    self._deactivate(node)
+                    deactivate(graph, node)
         for node in (node for node in graph.nodes if node in loss.nodes):
             self._await_birth(node)
             self._prepare(node, chosen)
@@ -116,11 +117,6 @@ class Recovery:
             heard = partial(lambda driver: bool(graph.figures(driver)), driver)
             graph.wait_until(heard, _FRESH_LIMIT, f'a word of {driver.full_name}')
         return self._table_holds(loss)
-
-    def _deactivate(self, node: GraphNode) -> None:
-        state = self._graph.call(GetState, f'{node.full_name}/get_state', GetState.Request()).current_state
-        if state.id == State.PRIMARY_STATE_ACTIVE:
-            self._graph.transition(node, Transition.TRANSITION_DEACTIVATE)
 
     def _await_birth(self, node: GraphNode) -> None:
         """Return when the new node answers: not yet configured."""

@@ -20,12 +20,22 @@ from mount_models.quantity import ParameterError, Quantity
 from mount_models.sampling import SAMPLE_TIME
 
 DEFAULT_DAMPER = 'viscous_2000'
+SWITCHING = {
+    'enabled': 'damping is switched on and off by the magnitude',
+    'always': 'damping goes on one period after activation and never off, whatever the magnitude',
+}
+"""Values of `switching`, and what they mean."""
 
 
 class Parameters(NamedTuple):
     """Parameters of band-pass, prediction, switching and damper characteristic."""
 
-    switching: str = 'enabled'
+    switching: Annotated[
+        str,
+        Quantity(
+            'word', ', '.join(f'{word}: {what}' for word, what in SWITCHING.items()), words=tuple(SWITCHING)
+        ),
+    ] = 'enabled'
     eigenfrequency: Annotated[
         float,
         Quantity(
@@ -53,7 +63,14 @@ class Parameters(NamedTuple):
     switch_off_level: Annotated[
         float, Quantity('m', 'magnitude below which damping is switched off', 1e-6, 0.01, 'paper, section 6')
     ] = 0.00035
-    damper: str = DEFAULT_DAMPER
+    damper: Annotated[
+        str,
+        Quantity(
+            'damper',
+            'characteristic, force over velocity: a name such as viscous_2000 (N s/m), a law, points, or the '
+            'path of a file',
+        ),
+    ] = DEFAULT_DAMPER
 
     def period_samples(self, sample_time: float) -> int:
         """Return the samples in one period of the eigenfrequency, `sample_time` s apart."""
@@ -75,12 +92,6 @@ def wanted_force(
     band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, sample_time)
     return damper_curve(parameters.damper).force(band_pass.filtered(band, velocity))
 
-
-SWITCHING = {
-    'enabled': 'damping is switched on and off by the magnitude',
-    'always': 'damping goes on one period after activation and never off, whatever the magnitude',
-}
-"""Values of `switching`, and what they mean."""
 
 _ANY_MAGNITUDE = -1.0  # m: each one lies above, none below
 

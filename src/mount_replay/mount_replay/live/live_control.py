@@ -6,6 +6,7 @@ import time
 import numpy as np
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
 from mount_bringup.chosen import Parameters
@@ -29,6 +30,7 @@ class LiveControl:
         values = {**parameters.get('mount_control', {}), 'lockstep': False}
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         self._node = MountControl(context=context, namespace=namespace, parameter_overrides=overrides)
+        self._node.get_logger().set_level(LoggingSeverity.WARN)  # this command speaks for it
         self._send = path.sender(topics.DISPLACEMENT)
         self._send_gap, self._send_table = (
             path.sender(topics.AIR_GAP),

@@ -5,18 +5,28 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
+from mount_ros.nodes.aside import done_aside
+from mount_ros.nodes.declaring import DeclaringNode
 from mount_ros.nodes.diagnostics import Diagnostics, Finding, Level, Standing, Verdict, verdict_on
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
-from mount_ros.nodes.parameters import refuse_unknown
+from mount_ros.nodes.parameters import refuse_sim_time, refuse_unknown
 from mount_ros.nodes.real_time import Beats, RealTime, Urgent
 from mount_ros.nodes.sliding_window import SlidingWindow
-from mount_ros.private_rclpy import OpenLifecycleNode, integer_as_float
 from mount_ros.writers import WriterWatch
+
+_LOCKSTEP = (
+    'lockstep',
+    False,
+    ParameterDescriptor(
+        description='time stands in the stamps alone: each sample waits for its answer; one value in the '
+        'whole graph'
+    ),
+)
 
 
 class ServedPath(Protocol):
@@ -24,6 +34,10 @@ class ServedPath(Protocol):
 
     refused: int
     refusal: str
+
+    @property
+    def name(self) -> str:
+        """The full name of the node that has the topics."""
 
     @property
     def failure(self) -> str:
@@ -36,7 +50,7 @@ class ServedPath(Protocol):
         """End serving; safe to call twice."""
 
 
-class SafeLifecycleNode(OpenLifecycleNode):
+class SafeLifecycleNode(DeclaringNode):
     """Base of all nodes of the graph.
 
     A node overrides `configure`, `activate`, `deactivate`, `cleanup` and `judge`; it raises an
@@ -55,7 +69,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
         self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
-        self._lockstep = bool(self.declare_parameter('lockstep', False).value)
+        self._lockstep = bool(self.declare_parameter(*_LOCKSTEP).value)
         self.data_path: ServedPath | None = None
         self._writers: WriterWatch | None = None  # of what the data path hears
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
@@ -69,12 +83,6 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self._path_errors = SlidingWindow(0)
         self._diagnostics = Diagnostics(self, self._look_and_judge)
         self._diagnostics.start()
-
-    def declare_parameter(self, name: str, value: Any = None, *arguments, **options) -> Parameter:
-        """Declare a parameter; a whole number given at the start for one that is a float becomes one."""
-        if isinstance(value, float):
-            integer_as_float(self, name)
-        return super().declare_parameter(name, value, *arguments, **options)
 
     # What a node fills in.
 
@@ -168,6 +176,9 @@ class SafeLifecycleNode(OpenLifecycleNode):
         outcome = self._attempt('configure', self._configure, undo=self._release)
         if outcome == TransitionCallbackReturn.SUCCESS:
             self._gate.close()
+            path = self.data_path
+            place = f'; its topics are those of the node {path.name}' if path is not None else ''
+            self.get_logger().info(f'configured{place}')
         self.after_configure()
         return outcome
 
@@ -176,16 +187,19 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self._active = outcome == TransitionCallbackReturn.SUCCESS
         if self._active:
             self.real_time.begin(self)
+            self.get_logger().info('active')
         else:
             self.real_time.end(self)  # where the activation itself took it
         return outcome
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._leave_active()
+        self.get_logger().info('inactive')
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._release()
+        self.get_logger().info('cleaned up')
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -196,11 +210,16 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self.close()
         return TransitionCallbackReturn.SUCCESS
 
+    def serve_transition(self, answer: Callable[[], Any]) -> Any:
+        # An activation may take seconds, and parameters and state shall be told meanwhile.
+        assert self.executor is not None
+        return done_aside(self.executor, answer, f'{self.get_name()} transition')
+
     def change_state(self, transition_id: int) -> TransitionCallbackReturn:
         # rclpy lets a transition that is not valid in the present state end the process with an
         # exception; a node that drives a coil answers "no" and goes on.
         try:
-            with self._diagnostics.pause:
+            with self._diagnostics.pause, self._gate.held():
                 return super().change_state(transition_id)
         except Exception as error:
             self.get_logger().warning(f'transition {transition_id} refused: {error}')
@@ -208,6 +227,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
 
     def _configure(self) -> None:
         refuse_unknown(self)
+        refuse_sim_time(self)
         self._path_errors = SlidingWindow(0)
         self.configure()
 
@@ -274,6 +294,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
             'unmatched': unmatched,
             'other_writer': other,
             'path_errors': path.refused if path is not None else 0,
+            'data_node': path.name if path is not None else '',
         }
         return Verdict(verdict.level, verdict.sentence, figures)
 

@@ -1,11 +1,15 @@
 """What may be set on a node when: everything before it is configured, then only what it takes at run time."""
 
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+
+from mount_ros.nodes.parameters import SIM_TIME_REFUSED, USE_SIM_TIME
 
 
 class Change(NamedTuple):
@@ -36,8 +40,18 @@ class ParameterGate:
         self._take = take
         self._foreign = frozenset(node.get_parameters_by_prefix(''))  # of rclpy itself, such as use_sim_time
         self._present: dict[str, Any] | None = None  # all values while the gate is closed
+        self._holder: int | None = None  # the thread that makes a transition
         node.add_on_set_parameters_callback(self._judge)
         node.add_post_set_parameters_callback(self._pass_on)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let nothing through but what this thread sets: the node is amid a transition."""
+        before, self._holder = self._holder, threading.get_ident()
+        try:
+            yield
+        finally:
+            self._holder = before
 
     def close(self) -> None:
         """From now on the node works with what its parameters are."""
@@ -49,6 +63,10 @@ class ParameterGate:
         self._present = None
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        if any(parameter.name == USE_SIM_TIME and parameter.value for parameter in parameters):
+            return SetParametersResult(successful=False, reason=SIM_TIME_REFUSED)
+        if self._holder not in (None, threading.get_ident()):
+            return SetParametersResult(successful=False, reason=self._amid_transition(parameters[0].name))
         changes = self._changes(parameters)
         fixed = [name for name in changes if name not in self._run_time]
         if fixed:
@@ -73,6 +91,9 @@ class ParameterGate:
             for parameter in parameters
             if parameter.name in present and parameter.value != present[parameter.name]
         }
+
+    def _amid_transition(self, name: str) -> str:
+        return f'{name} cannot be set while {self._node.get_name()} is amid a transition: wait for its end'
 
     def _when(self, name: str) -> str:
         known = ', '.join(sorted(self._run_time)) or 'nothing'

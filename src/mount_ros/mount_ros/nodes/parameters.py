@@ -1,7 +1,9 @@
 """Node parameters declared from parameter sets: unit, sentence and range travel with the value."""
 
+import contextlib
 import math
-from collections.abc import Mapping
+from array import array
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -20,24 +22,36 @@ from mount_ros.private_rclpy import given_at_start
 
 P = TypeVar('P', bound=NamedTuple)
 
+USE_SIM_TIME = 'use_sim_time'
+SIM_TIME_REFUSED = (
+    'use_sim_time must be false: the stamps of the messages are the time of this graph, also of one that is '
+    'played back, and its watches go by the steady clock; /clock is not needed'
+)
+"""Why a node takes no time from `/clock`."""
 
-def declare(node: Node, defaults: NamedTuple, prefix: str = '') -> None:
-    """Declare every field of the parameter set `defaults` on `node`; nested ones as `outer.inner`."""
+
+def declare(node: Node, defaults: NamedTuple, prefix: str = '', only: Collection[str] | None = None) -> None:
+    """Declare every field of the parameter set `defaults` on `node`; nested ones as `outer.inner`.
+
+    With `only` no others than these fields.
+    """
     notes = quantities(defaults)
     kinds = get_type_hints(type(defaults))
     for name, value in defaults._asdict().items():
         full = f'{prefix}.{name}' if prefix else name
+        if only is not None and name not in only:
+            continue
         if hasattr(value, '_asdict'):
             declare(node, value, full)
         elif isinstance(value, tuple):
-            _declare_texts(node, full, value)
+            _declare_texts(node, full, value, _descriptor(notes.get(name), kinds[name]))
         else:
             node.declare_parameter(full, value, _descriptor(notes.get(name), kinds[name]))
 
 
-def _declare_texts(node: Node, name: str, texts: tuple[str, ...]) -> None:
+def _declare_texts(node: Node, name: str, texts: tuple[str, ...], descriptor: ParameterDescriptor) -> None:
     """Declare a list of texts, which may be empty: rclpy takes an empty list for one of bytes."""
-    given = node.declare_parameter(name, Parameter.Type.STRING_ARRAY)
+    given = node.declare_parameter(name, Parameter.Type.STRING_ARRAY, descriptor)
     if given.type_ is Parameter.Type.NOT_SET:
         node.set_parameters([Parameter(name, Parameter.Type.STRING_ARRAY, list(texts))])
 
@@ -59,6 +73,40 @@ def refuse_unknown(node: Node) -> None:
     known = list(node.get_parameters_by_prefix(''))
     for name in sorted(given_at_start(node)):
         check_name(node.get_name(), name, known)
+
+
+def refuse_sim_time(node: Node) -> None:
+    """Raise `ParameterError` if `node` was told to take its time from `/clock`."""
+    if node.get_parameter(USE_SIM_TIME).value:
+        raise ParameterError(f'{node.get_name()}: {SIM_TIME_REFUSED}')
+
+
+def fitted(node: Node, parameters: Iterable[Parameter]) -> list[Parameter]:
+    """Return parameters about to be set on `node` in the types that it has declared.
+
+    A whole number becomes a float where one is wanted; so does the text of a float such as 5e-05 or nan, as
+    which `ros2 param load` hands on what `ros2 param dump` has written. An empty list becomes one of the
+    wanted kind, since ROS cannot tell of what it is empty. Raises `ParameterError` for an unknown name.
+    """
+    known = list(node.get_parameters_by_prefix(''))
+    fit = []
+    for parameter in parameters:
+        check_name(node.get_name(), parameter.name, known)
+        wanted = Parameter.Type(node.describe_parameter(parameter.name).type)
+        if wanted is Parameter.Type.DOUBLE and parameter.type_ in _MAY_BE_FLOAT:
+            with contextlib.suppress(ValueError):  # ROS refuses it then, by its type
+                parameter = Parameter(parameter.name, value=float(parameter.value))
+        elif wanted is Parameter.Type.STRING_ARRAY and _is_empty_list(parameter.value):
+            parameter = Parameter(parameter.name, wanted, [])
+        fit.append(parameter)
+    return fit
+
+
+_MAY_BE_FLOAT = (Parameter.Type.INTEGER, Parameter.Type.STRING)
+
+
+def _is_empty_list(value: Any) -> bool:
+    return isinstance(value, (list, tuple, array, bytes)) and len(value) == 0
 
 
 class SpecimenValues:
@@ -97,9 +145,15 @@ def _descriptor(quantity: Quantity | None, kind: type) -> ParameterDescriptor:
     if quantity is None:
         return descriptor
     descriptor.description = f'{quantity.meaning} [{quantity.unit}]; {quantity.source}'
+    if quantity.words:
+        descriptor.additional_constraints = f'one of {quantity.limits}'
     if quantity.may_be_unknown:
+        # rclpy holds NaN to be outside every range; `read` checks this one
         descriptor.description += '; nan: unknown'
-        return descriptor  # rclpy holds NaN to be outside every range; `read` checks this one
+        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}, or nan'
+        return descriptor
+    if math.isinf(quantity.low) != math.isinf(quantity.high):  # ROS knows ranges with two ends alone
+        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}'
     if kind is float and math.isfinite(quantity.low) and math.isfinite(quantity.high):
         descriptor.floating_point_range = [
             FloatingPointRange(from_value=float(quantity.low), to_value=float(quantity.high))

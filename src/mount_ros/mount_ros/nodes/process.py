@@ -4,25 +4,28 @@ import contextlib
 import gc
 import os
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 import rclpy
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from mount_models.quantity import ParameterError
 from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
+from mount_ros.nodes.aside import SPIN_PERIOD, wake
 from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_ros.nodes.starter import Starter, given_priority
-
-_SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
 
 Create = Callable[[], SafeLifecycleNode]
 
@@ -41,9 +44,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     inherited = drop_real_time()
     real_time = RealTime(given_priority() or inherited)
     prepare_environment()
-    # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    nodes = [create() for create in creates]
+    nodes = _created(creates, args)
     data_thread = DataThread(nodes[0].context, nodes[0].tell_failure)
     over = _Ending()
     for node in nodes:
@@ -74,6 +75,22 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         end_process(code)
 
 
+def _created(creates: Sequence[Create], args: list[str] | None) -> list[SafeLifecycleNode]:
+    """Return the nodes, or end the process with code 1 and why its arguments do not fit."""
+    try:
+        # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # a parameter file that is missing or no YAML
+        print(f'[FATAL] {" ".join(str(error).split())}', file=sys.stderr)
+        sys.exit(1)
+    try:
+        return [create() for create in creates]
+    except ParameterError as error:
+        get_logger(Path(sys.argv[0]).name).fatal(str(error))
+        rclpy.try_shutdown()
+        sys.exit(1)
+
+
 def _freeze() -> None:
     """Collect garbage now, and never look again at what stands: a full collection takes tens of milliseconds.
 
@@ -81,15 +98,6 @@ def _freeze() -> None:
     """
     gc.collect()
     gc.freeze()
-
-
-def wake(executor: Executor) -> None:
-    """End the `spin_once` of another thread; `Executor.wake` alone lets it look and sleep on."""
-    executor.create_task(_nothing)
-
-
-def _nothing() -> None:
-    """Something to do."""
 
 
 def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
@@ -145,9 +153,10 @@ class _Ending:
 
 
 class _Service:
-    """The thread that serves the rest of a node: transitions, parameters, diagnostics.
+    """The thread that serves the rest of a node: transitions, parameters, questions about its state.
 
-    It sleeps until something arrives: whatever wakes Python there takes the interpreter from the data path.
+    A transition is made in another thread meanwhile. It sleeps until something arrives: whatever wakes Python
+    there takes the interpreter from the data path.
     """
 
     def __init__(self, node: SafeLifecycleNode, over: _Ending):
@@ -168,7 +177,7 @@ class _Service:
     def _serve(self) -> None:
         try:
             while rclpy.ok() and not self._node.ending.is_set():
-                self._executor.spin_once(_SPIN_PERIOD)
+                self._executor.spin_once(SPIN_PERIOD)
         except Exception as error:
             # The border of the process: without it the nodes would not be closed.
             traceback.print_exc()

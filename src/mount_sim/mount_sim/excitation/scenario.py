@@ -111,10 +111,13 @@ AccelerationScale = Annotated[
 class RecordedScenario(NamedTuple):
     """A recorded vertical acceleration of the chassis, upwards."""
 
-    file: str = ''
-    column: str = ''
-    time_column: str = ''
-    topic: str = ''
+    file: Annotated[str, Quantity('path', 'recording: CSV, NPY, JSON, folder of NPY pairs, or MCAP')] = ''
+    column: Annotated[
+        str,
+        Quantity('name', 'column (CSV, JSON), signal.number (NPY) or field of the message (MCAP)'),
+    ] = ''
+    time_column: Annotated[str, Quantity('name', 'column of the time in s (CSV, JSON)')] = ''
+    topic: Annotated[str, Quantity('name', 'topic (MCAP); empty: the only one that fits')] = ''
     scale: AccelerationScale = 1.0
 
 

@@ -25,7 +25,10 @@ class Place(NamedTuple):
 
     x: Annotated[float, _X] = 0.0
     y: Annotated[float, _Y] = 0.0
-    support: str = 'none'
+    support: Annotated[
+        str,
+        Quantity('word', 'what holds the engine there without electronics', words=tuple(SUPPORTS)),
+    ] = 'none'
 
 
 class Places(NamedTuple):

@@ -1,0 +1,88 @@
+"""Each node is taken down to unconfigured and up again while the rest of the graph runs."""
+
+import pytest
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from mount_ros.nodes.hosting import ros_context
+from mount_ros.testing import wait_until
+
+LIMIT = 180.0  # s: other tests run at the same time, only a failure takes so long
+DOWN = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
+UP = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
+NODES = 'mount_driver', 'mount_sim', 'mount_init', 'mount_control'
+
+
+class Operator:
+    """Asks services, as `ros2 lifecycle` and `ros2 service` do."""
+
+    def __init__(self, context):
+        self._node = Node('operator', context=context)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self._node)
+
+    def ask(self, kind, service, **request):
+        client = self._node.create_client(kind, service)
+        try:
+            assert client.wait_for_service(LIMIT), service
+            answer = client.call_async(kind.Request(**request))
+            self._executor.spin_until_future_complete(answer, LIMIT)
+            assert answer.done(), service
+            return answer.result()
+        finally:
+            self._node.destroy_client(client)
+
+    def change(self, node, transition):
+        return self.ask(ChangeState, f'/{node}/change_state', transition=Transition(id=transition)).success
+
+    def active(self, node):
+        state = self.ask(GetState, f'/{node}/get_state').current_state.id
+        return state == State.PRIMARY_STATE_ACTIVE
+
+    def reinitialize(self):
+        return self.ask(Trigger, '/engine_mount_supervisor/reinitialize').success
+
+    def close(self):
+        self._executor.remove_node(self._node)
+        self._executor.shutdown()
+        self._node.destroy_node()
+
+
+@pytest.fixture
+def operator(domain):
+    with ros_context(domain) as context:
+        made = Operator(context)
+        yield made
+        made.close()
+
+
+@pytest.mark.real_time
+def test_every_node_can_be_taken_down_and_up_and_the_mount_initialised_anew(command, operator, bus_listener):
+    process, out = command.start_drive(
+        '--scenario', 'bench', '--duration', '600', '--set', 'mount_sim.timeline.start=0', '--no-report',
+        '--priority', '0',
+    )  # fmt: skip
+
+    def drives():
+        assert process.poll() is None, process.communicate()[0]
+        return all(operator.active(node) for node in NODES)
+
+    def damps():
+        return drives() and any(setpoint.current > 0.5 for setpoint in bus_listener[-200:])
+
+    wait_until(damps, 'damping', LIMIT)
+    for walker in ('mount_control', 'mount_init', 'mount_driver', 'mount_sim'):
+        for transition in DOWN:
+            assert operator.change(walker, transition), (walker, transition)
+        if walker == 'mount_control':
+            wait_until(lambda: bus_listener[-1].current == 0.0, '0 A', LIMIT)
+        assert operator.change(walker, UP[0]), walker
+        operator.change(walker, UP[1])  # init and control refuse it: the mount must be initialised first
+        wait_until(operator.reinitialize, f'initialisation after the walk of {walker}', LIMIT)
+        wait_until(damps, f'damping after the walk of {walker}', LIMIT)
+    said = (out / 'log' / 'mount_control.log').read_text()
+    assert 'but mount_control hears the measurements since' in said
+    assert 'another node sent a current_setpoint' in (out / 'log' / 'mount_init.log').read_text()
