@@ -106,7 +106,12 @@ def test_losses_are_counted_over_the_nodes(happenings):
     assert happenings.present == 'no damping yet; 7 samples or messages lost'
 
 
-def test_a_warning_is_told_when_it_begins_and_not_with_each_count(happenings, told):
+def test_a_warning_is_told_when_it_begins_and_not_with_each_count(happenings, told, clock):
+    happenings.told('mount_driver', DRIVER | {'level': '1', 'sentence': 'is mount_control active?'})
+    for node in SIMULATED:
+        happenings.state(node, 'active')
+    clock.now = 1.0
+    told.clear()
     for lost in range(20):
         happenings.told('mount_driver', DRIVER | {'level': '1', 'sentence': f'{lost} samples lost'})
     happenings.told('mount_driver', DRIVER | {'level': '2', 'sentence': 'the coil is open'})

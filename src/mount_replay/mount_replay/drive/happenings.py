@@ -13,6 +13,7 @@ from mount_ros.nodes.diagnostics import Level
 _STARTING, _ACTIVATING = 'starting', 'activating'
 _NAMED = 5  # chosen: more nodes are counted
 _NUMBERS = re.compile(r'[\d.]+')
+_SETTLING = 1.0  # s, chosen: before that a node may rightly complain of one that is not yet active
 _LOSSES = {DRIVER.name: 'lost', RECORDER.name: 'lost', CONTROL.name: 'bridged'}
 
 
@@ -38,6 +39,7 @@ class Happenings(Witness):
         self._clock = clock
         self._begin = clock()
         self._states = {node.full_name: _STARTING for node in nodes}
+        self._active: float | None = None  # when all nodes were active, s on the clock
         self._zero: int | None = None
         self._sentences: dict[str, str] = {}
         self._damping: dict[str, int] = {}  # mount -> stamp since which it damps, ns
@@ -74,6 +76,7 @@ class Happenings(Witness):
             return  # a node that was lost and came back; the supervisor tells of it
         self._states[node.full_name] = state
         if all(word == 'active' for word in self._states.values()):
+            self._active = self._clock()
             self._say(line('active', f'all nodes, {self._clock() - self._begin:.1f} s after the start'))
 
     def told(self, name: str, figures: Mapping[str, str]) -> None:
@@ -107,13 +110,14 @@ class Happenings(Witness):
             self._tell('damping', mount, _number(stamp), 'damping off')
 
     def _tell_sentence(self, name: str, node: str, figures: Mapping[str, str]) -> None:
-        """Tell the gap once, and each warning or error when it begins."""
+        """Tell the gap once, and each warning or error that begins or stands once all nodes are active."""
         before, sentence = self._sentences.get(name, ''), figures['sentence']
         grave = int(figures['level']) >= Level.WARN
         if node == INIT.name and not before and 'contact_gap_um' in figures:
             self._sentences[name] = sentence
             self._say(line('gap', f'{_of(name.rpartition("/")[0])}{_gaps(figures)}'))
-        if grave and _NUMBERS.sub('', sentence) != _NUMBERS.sub('', before):
+        settled = self._active is not None and self._clock() - self._active >= _SETTLING
+        if grave and settled and _NUMBERS.sub('', sentence) != _NUMBERS.sub('', before):
             self._sentences[name] = sentence
             self._tell(name, '', None, f'{_short(name)}: {sentence}')
 
