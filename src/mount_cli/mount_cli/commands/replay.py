@@ -146,16 +146,13 @@ def _foreign(maps: list[str], scale: float, offset: str) -> Any:
 
 
 def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
-    from mount_bringup.settings import SettingError, setting_value
+    from mount_bringup.settings import SettingError, settings_of_options
     from mount_replay.replay import parsed_changes
 
-    values = {}
-    for setting in settings:
-        name, equals, text = setting.partition('=')
-        if not (equals and name):
-            raise typer.BadParameter(f'--set {setting}: write NAME=VALUE, as in highest_current=2')
-        try:
-            values[name] = setting_value(setting, text)
-        except SettingError as error:
-            raise typer.BadParameter(str(error)) from None
-    return parsed_changes(values)
+    try:
+        given = settings_of_options(settings)
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
+    return parsed_changes(
+        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
+    )
