@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings, references
 from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
@@ -16,8 +17,15 @@ EPILOG = """Examples:
 
 
 def accept(
-    run: Annotated[Path, typer.Argument(help='folder of a run, a recording, or a replay of the reference')],
-    reference: Annotated[str, typer.Option(metavar='NAME', help='name of the reference')],
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help='folder of a run, a recording, or a replay of the reference', autocompletion=recordings
+        ),
+    ],
+    reference: Annotated[
+        str, typer.Option(metavar='NAME', help='name of the reference', autocompletion=references)
+    ],
     reason: Annotated[str, typer.Option(metavar='TEXT', help='why its setpoints may change')],
     folder: Annotated[Path, typer.Option(help='folder of the references')] = Path('bags/reference'),
 ) -> None:

@@ -8,12 +8,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from mount_cli.help import Command, Group
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_models.specimen import Specimen
 
 app = typer.Typer(
+    cls=Group,
     name='calibrate',
     help='Calibrate an actuator from rack recordings: force law, gap curves, their files.',
     no_args_is_help=True,
@@ -69,7 +71,7 @@ JsonFile = Annotated[
 Figure = Annotated[Path | None, typer.Option(metavar='FILE', help='draw measurement and result (PNG)')]
 
 
-@app.command(epilog=_ACTUATOR_EPILOG)
+@app.command(cls=Command, epilog=_ACTUATOR_EPILOG)
 def actuator(
     files: Files,
     orders: Annotated[
@@ -152,7 +154,7 @@ def actuator(
     _write(console, specimen, figures, json_file, out)
 
 
-@app.command(epilog=_INDUCTANCE_EPILOG)
+@app.command(cls=Command, epilog=_INDUCTANCE_EPILOG)
 def inductance(
     files: Files,
     gaps: Gaps = None,
@@ -234,7 +236,7 @@ def inductance(
     _write(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)
 
 
-@app.command(epilog=_RACK_EPILOG)
+@app.command(cls=Command, epilog=_RACK_EPILOG)
 def rack(
     out: Annotated[Path, typer.Option(metavar='FOLDER', help='folder for the recordings')],
     seed: Annotated[int, typer.Option(help='seed of the noise, and of the actuator with --drawn')] = 0,

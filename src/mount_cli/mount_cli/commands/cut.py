@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Examples:
@@ -18,7 +19,9 @@ EPILOG = """Examples:
 
 
 def cut(
-    recording: Annotated[Path, typer.Argument(help='folder of a recording or run, or an MCAP file')],
+    recording: Annotated[
+        Path, typer.Argument(help='folder of a recording or run, or an MCAP file', autocompletion=recordings)
+    ],
     begin: Annotated[
         str, typer.Option('--from', metavar='TIME', help='from the first displacement sample, such as 12s')
     ] = '',

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import named, setting
 from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
@@ -21,7 +22,10 @@ EPILOG = """Examples:
 
 def experiment(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar='NAME...', help='one, several, or all; see --list')
+        list[str] | None,
+        typer.Argument(
+            metavar='NAME...', help='one, several, or all; see --list', autocompletion=named('experiment')
+        ),
     ] = None,
     show: Annotated[bool, typer.Option('--list', help='tell which experiments there are')] = False,
     out: Annotated[
@@ -36,7 +40,12 @@ def experiment(
     ] = False,
     settings: Annotated[
         list[str] | None,
-        typer.Option('--set', metavar='OWNER.NAME=VALUE', help='a parameter of the experiment or of a node'),
+        typer.Option(
+            '--set',
+            metavar='[OWNER.]NAME=VALUE',
+            help='a parameter of the experiment or of a node; may be repeated',
+            autocompletion=setting(),
+        ),
     ] = None,
     page: Annotated[
         Path | None,

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import Domain
+from mount_cli.completion.values import listed
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.
@@ -27,7 +28,9 @@ _DRIVE = (sys.executable, '-c', 'from mount_cli.command import main; main()', 'd
 
 
 def faults(
-    only: Annotated[str, typer.Option(metavar='NAME,...', help='these faults only')] = '',
+    only: Annotated[
+        str, typer.Option(metavar='NAME,...', help='these faults only', autocompletion=listed('case'))
+    ] = '',
     show: Annotated[bool, typer.Option('--list', help='tell which faults there are')] = False,
     third: Annotated[bool, typer.Option('--third', help='a representative third of them')] = False,
     out: Annotated[

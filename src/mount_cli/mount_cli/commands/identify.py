@@ -7,12 +7,15 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from mount_cli.completion.values import recordings
+from mount_cli.help import Command, Group
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_identification.friction.identify import Identification
 
 app = typer.Typer(
+    cls=Group,
     name='identify',
     help='Identify parameters from recordings of a rack.',
     no_args_is_help=True,
@@ -35,7 +38,7 @@ def _top() -> None:
     """Keep sub-commands even while there is only one."""
 
 
-@app.command(epilog=EPILOG)
+@app.command(cls=Command, epilog=EPILOG)
 def friction(
     train: Annotated[
         list[Path] | None, typer.Option(metavar='FILE...', help='recordings to fit: CSV, MCAP or JSON')
@@ -116,9 +119,16 @@ DRIFT_EPILOG = """Examples:
 """
 
 
-@app.command(epilog=DRIFT_EPILOG)
+@app.command(cls=Command, epilog=DRIFT_EPILOG)
 def drift(
-    recordings: Annotated[list[Path], typer.Argument(help='runs or recordings with an initialisation')],
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar='RECORDING...',
+            help='runs or recordings with an initialisation',
+            autocompletion=recordings,
+        ),
+    ],
     specimen: Annotated[
         Path | None, typer.Option(help='specimen file of this actuator; default: the shipped one')
     ] = None,

@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 from mount_cli.commands.options import Domain, JsonFile, NewFolder
+from mount_cli.completion.values import listed, named, recordings, setting
 from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
@@ -25,7 +26,11 @@ EPILOG = """Examples:
 
 def replay(
     recording: Annotated[
-        Path, typer.Argument(help='folder of a recording, or MCAP file; with --map CSV, NPY and JSON too')
+        Path,
+        typer.Argument(
+            help='folder of a run or recording, or MCAP file; with --map CSV, NPY and JSON too',
+            autocompletion=recordings,
+        ),
     ],
     core: Annotated[
         bool, typer.Option('--core', help='through the controller as function calls; the default')
@@ -40,8 +45,9 @@ def replay(
         list[str] | None,
         typer.Option(
             '--set',
-            metavar='NAME=VALUE',
-            help='a parameter other than recorded, of mount_control, or NODE.NAME; may be repeated',
+            metavar='[NODE.]NAME=VALUE',
+            help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
+            autocompletion=setting('mount_control', 'mount_init'),
         ),
     ] = None,
     table: Annotated[
@@ -57,15 +63,27 @@ def replay(
     ] = None,
     scale: Annotated[float, typer.Option(help='foreign recording: factor to m, engine minus chassis')] = 1.0,
     offset: Annotated[
-        str, typer.Option(help='foreign recording: what is subtracted after --scale, in m, or mean')
+        str,
+        typer.Option(metavar='M', help='foreign recording: what is subtracted after --scale, in m, or mean'),
     ] = 'mean',
     out: NewFolder = None,
     json_file: JsonFile = None,
-    mount: Annotated[str, typer.Option(help='which of several mounts, such as left')] = '',
+    mount: Annotated[
+        str,
+        typer.Option(
+            metavar='NAME', help='which of several mounts, such as left', autocompletion=named('place')
+        ),
+    ] = '',
     rate: Annotated[float, typer.Option(help='live: factor on the speed of time')] = 1.0,
-    start: Annotated[float, typer.Option('--from', help='live: where to begin, s')] = 0.0,
+    start: Annotated[float, typer.Option('--from', metavar='S', help='live: where to begin, s')] = 0.0,
     topic_names: Annotated[
-        str, typer.Option('--topics', help='live: names separated by commas, or all')
+        str,
+        typer.Option(
+            '--topics',
+            metavar='NAME,...',
+            help='live: names, or all',
+            autocompletion=listed('topic'),
+        ),
     ] = '',
     with_control: Annotated[
         bool,

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Examples:
@@ -21,12 +22,19 @@ EPILOG = """Examples:
 def report(
     recordings: Annotated[
         list[Path],
-        typer.Argument(metavar='RECORDING...', help='folders of recordings or runs, or MCAP files'),
+        typer.Argument(
+            metavar='RECORDING...',
+            help='folders of recordings or runs, or MCAP files',
+            autocompletion=recordings,
+        ),
     ],
     other: Annotated[
         Path | None,
         typer.Option(
-            '--compare', metavar='OTHER', help='draw this one too and tell how it differs from the first'
+            '--compare',
+            metavar='OTHER',
+            autocompletion=recordings,
+            help='draw this one too and tell how it differs from the first',
         ),
     ] = None,
     out: Annotated[
