@@ -90,6 +90,7 @@ class TerminalScreen(Screen):
         """Draw a table as wide as its texts; long ones on the left are folded."""
         drawn = RichTable(title=table.title, title_justify='left', caption=table.caption or None)
         drawn.box, drawn.pad_edge, drawn.show_header = SIMPLE_HEAD, False, bool(table.heads)
+        drawn.padding = (0, 1, 0, 0)  # narrow, so that tables fit 80 columns
         drawn.caption_justify, drawn.show_lines = 'left', table.ruled
         for place, to in enumerate(table.columns):
             head = table.heads[place] if table.heads else ''

@@ -79,6 +79,8 @@ REFUSED = {
     'cut': (MISSING, '--from', '1s', '--to', '2s', '--out', MISSING),
     'drive': ('--core', '--scenario', 'recorded', '--file', MISSING),
     'identify drift': (MISSING, MISSING),
+    'info': (MISSING,),
+    'ls': (MISSING,),
     'identify friction': ('--train', MISSING),
     'merge': (MISSING, '--out', MISSING),
     'recover': (MISSING,),

@@ -207,9 +207,9 @@ def drive(
 
 
 def _list_faults() -> None:
+    from mount_bags.run.screen import Table
+    from mount_cli.screen import TerminalScreen
     from mount_sim.electronics.faults.kinds import FAULTS
 
-    console = terminal()
-    width = max(map(len, FAULTS))
-    for name, kind in FAULTS.items():
-        console.print(f'{name:{width}}  {kind.meaning}', soft_wrap=True, markup=False, highlight=False)
+    rows = [(name, kind.meaning) for name, kind in FAULTS.items()]
+    TerminalScreen(terminal()).table(Table('', 'll', rows, ('name', 'fault')))

@@ -56,15 +56,15 @@ def experiment(
 
     A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
     """
+    from mount_bags.run.screen import Table
+    from mount_cli.screen import TerminalScreen
     from mount_experiments.registry import experiments_named, listed
 
     console = terminal()
     if show:
-        for name, reference, title in listed():
-            console.print(f'{name:22}{reference:15}{title}', soft_wrap=True)
+        TerminalScreen(console).table(Table('', 'lll', listed(), ('name', 'in the paper', 'what is shown')))
         return
     from mount_bringup.settings import SettingError
-    from mount_cli.screen import TerminalScreen
     from mount_experiments.orders import orders, run_all
     from mount_experiments.page import print_outcome, write_page
     from mount_report.json_file import write_json

@@ -48,6 +48,7 @@ def faults(
 ) -> None:
     """Bring every fault into the real graph and tell what the graph does about it."""
     from mount_bags.run.folder import make_run_folder
+    from mount_bags.run.screen import Table
     from mount_bringup.graph.domain import chosen_domain
     from mount_cli.screen import TerminalScreen
     from mount_replay.faults.graph import Place
@@ -66,8 +67,8 @@ def faults(
         if (not only or case.name in only.split(',')) and (not third or case.third)
     ]
     if show:
-        for case in chosen:
-            console.print(f'{case.name:26}{case.meaning}: {case.reaction.value}', soft_wrap=True)
+        rows = [(case.name, case.meaning, case.reaction.value) for case in chosen]
+        TerminalScreen(console).table(Table('', 'lll', rows, ('name', 'fault', 'required')))
         return
     folder = make_run_folder(out, 'faults').path.absolute()
     screen = TerminalScreen(console)
@@ -76,12 +77,12 @@ def faults(
         outcomes = run_faults(
             chosen, place, bar, lambda case, outcome: screen.say(f'{case.name}: {outcome.wrong or "ok"}')
         )
-    rows = {MATRIX[name]: outcome for name, outcome in outcomes.items()}
-    screen.table(table(rows))
+    told = {MATRIX[name]: outcome for name, outcome in outcomes.items()}
+    screen.table(table(told))
     if json_file is not None:
         write_json({name: outcome.as_json() for name, outcome in outcomes.items()}, json_file)
     if page is not None:
-        write_page(rows, page)
+        write_page(told, page)
         console.print(f'page       {page}', soft_wrap=True)
     wrong = {name: outcome for name, outcome in outcomes.items() if not outcome.ok}
     for name, outcome in wrong.items():
