@@ -31,7 +31,7 @@ def first(offered: list[tuple[str, str]]) -> list[str]:
 
 
 def test_the_names_that_are_offered_are_those_of_the_code():
-    renew = 'python -m mount_cli.completion.collected renews them'
+    renew = 'python test/docs/parameters_page.py renews them'
     assert FILE.read_text(encoding='utf-8') == collected(), renew
 
 

@@ -62,7 +62,8 @@ def experiment(
 
     console = terminal()
     if show:
-        TerminalScreen(console).table(Table('', 'lll', listed(), ('name', 'in the paper', 'what is shown')))
+        rows = [(name, f'{title} ({reference})') for name, reference, title in listed()]
+        TerminalScreen(console).table(Table('', 'll', rows, ('name', 'what is shown (in the paper)')))
         return
     from mount_bringup.settings import SettingError
     from mount_experiments.orders import orders, run_all

@@ -67,8 +67,8 @@ def faults(
         if (not only or case.name in only.split(',')) and (not third or case.third)
     ]
     if show:
-        rows = [(case.name, case.meaning, case.reaction.value) for case in chosen]
-        TerminalScreen(console).table(Table('', 'lll', rows, ('name', 'fault', 'required')))
+        rows = [(case.name, f'{case.meaning}: {case.reaction.value}') for case in chosen]
+        TerminalScreen(console).table(Table('', 'll', rows, ('name', 'fault: what is required')))
         return
     folder = make_run_folder(out, 'faults').path.absolute()
     screen = TerminalScreen(console)

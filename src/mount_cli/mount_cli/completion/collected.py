@@ -1,4 +1,4 @@
-"""Collects the names that a shell offers; `python -m mount_cli.completion.collected` writes them."""
+"""Collects the names that a shell offers; `python test/docs/parameters_page.py` writes them."""
 
 import json
 import math
@@ -9,7 +9,6 @@ from mount_bags.recorder.diagnosis import OnFull
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.settings import defaults_of_nodes
 from mount_cli.bench.bench import GROUPS
-from mount_cli.completion.values import FILE
 from mount_control.policy.registry import POLICIES
 from mount_control.settings import parameter_sets
 from mount_driver.parameters import DriverParameters
@@ -86,7 +85,3 @@ def _text(value: Any) -> str:
     if isinstance(value, str):
         return value
     return repr(value) if isinstance(value, (int, float)) and math.isfinite(value) else ''
-
-
-if __name__ == '__main__':
-    FILE.write_text(collected(), encoding='utf-8')

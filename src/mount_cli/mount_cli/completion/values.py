@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 FILE = Path(__file__).with_name('names.json')
-"""Written by `python -m mount_cli.completion.collected`: what the code knows takes half a second to load."""
+"""Written by `python test/docs/parameters_page.py`: what the code knows takes half a second to load."""
 
 Offered = list[tuple[str, str]]  # value, and what it means
 Completer = Callable[[str], Offered]
