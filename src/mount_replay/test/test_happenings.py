@@ -9,7 +9,7 @@ from mount_ros.messages.event import BY_HAND, Mark
 
 DRIVER = {'level': '0', 'sentence': 'link is up', 'samples': '501', 'last_stamp': '7500000000'}
 DRIVER |= {'sample_rate': '1000.0', 'lost': '0'}
-GAPS = {'rest_gap_um': '507.9', 'rest_gap_std_um': '0.6', 'contact_gap_um': '349.6'}
+GAPS = {'rest_gap_um': '507.94', 'rest_gap_std_um': '0.61', 'contact_gap_um': '349.6'}
 GAPS |= {'contact_gap_std_um': '0.4', 'offset_current_A': '0.49', 'level': '0', 'sentence': 'gaps'}
 
 
@@ -76,7 +76,8 @@ def test_all_nodes_active_are_told_once_with_the_time_since_the_start(happenings
 def test_the_gap_is_told_once(happenings, told):
     for _ in range(3):
         happenings.told('mount_init', GAPS)
-    assert told == ['gap        rest 507.9 ± 0.6 µm, contact 349.6 ± 0.4 µm; offset current 0.49 A']
+    assert told == ['gap        rest 507.9 ± 0.6 µm, contact 349.6 ± 0.4 µm, offset current 0.49 A']
+    assert len(told[0]) <= 80
 
 
 def test_damping_is_told_with_times_from_the_first_displacement_sample(happenings, told):

@@ -8,7 +8,9 @@ import typer
 from mount_cli.completion.values import recordings, references
 from mount_cli.terminal import terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the reference is made, 1 when it was refused, with the reason.
+
+Examples:
 
 `engine-mount drive --core --scenario bench --duration 3 --out bags/new`
 

@@ -22,7 +22,9 @@ app = typer.Typer(
     rich_markup_mode='markdown',
 )
 
-_ACTUATOR_EPILOG = """Examples:
+_ACTUATOR_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount calibrate actuator force.csv --name left --out left.yaml`
 
@@ -34,7 +36,9 @@ _ACTUATOR_EPILOG = """Examples:
 
 CSV columns are `gap_um`, `current_a`, `force_n`, or the same with another unit (mm, m, ma, kn).
 """
-_INDUCTANCE_EPILOG = """Examples:
+_INDUCTANCE_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount calibrate inductance ripple_*um.csv --coil-temperature 20 --base left.yaml --out left.yaml`
 
@@ -46,7 +50,9 @@ CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a
 `flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
 tells them.
 """
-_RACK_EPILOG = """Example:
+_RACK_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Example:
 
 `engine-mount calibrate rack --out rack --celsius 20 --celsius 80` - then `calibrate actuator rack/force.csv`,
 `calibrate inductance rack/ripple_*.csv`, `identify friction --train rack/friction_*.csv`

@@ -8,7 +8,9 @@ import typer
 from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the piece is written and nothing of it was unreadable, 1 when something was.
+
+Examples:
 
 `engine-mount cut RECORDING --from 12s --to 20s`
 

@@ -8,7 +8,9 @@ import typer
 from mount_cli.completion.values import named, setting
 from mount_cli.terminal import terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when it ran, whatever came out; 1 when the order was refused.
+
+Examples:
 
 `engine-mount experiment --list` - which there are
 

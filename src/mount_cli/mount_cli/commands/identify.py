@@ -22,7 +22,9 @@ app = typer.Typer(
     rich_markup_mode='markdown',
 )
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount identify friction --train ramp.csv 40N.csv 120N.csv --held-out 80N.csv --base left.yaml
 --name left --out left.yaml` - into the specimen file that init and control load
@@ -111,7 +113,9 @@ def friction(
         note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
-DRIFT_EPILOG = """Examples:
+DRIFT_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount identify drift bags/monday bags/tuesday bags/friday --figure wear.png`
 

@@ -8,7 +8,10 @@ import typer
 from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
-EPILOG = 'Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`'
+EPILOG = """Exit code: 0 when all is written, 1 when something of the parts could not be read.
+
+Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`
+"""
 
 
 def merge(

@@ -10,7 +10,10 @@ from mount_cli.commands.options import Domain, JsonFile, NewFolder
 from mount_cli.completion.values import listed, named, recordings, setting
 from mount_cli.terminal import terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the setpoints are those recorded, or something was changed on purpose; 1 when
+they are not, or the order was refused.
+
+Examples:
 
 `engine-mount replay bags/2026-11-20_18-03-11_motorway/recording` - equal to what was recorded?
 
@@ -94,7 +97,7 @@ def replay(
 ) -> None:
     """Replay a recorded displacement through the same controller and tell whether its answers are the same.
 
-    Exit code 1 if nothing was changed and the setpoints are not equal to the recorded ones to the last bit.
+    Equal is to the last bit; parameters and tables can be other than recorded.
     """
     from mount_bringup.graph.domain import chosen_domain
 

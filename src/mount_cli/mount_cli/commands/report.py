@@ -9,7 +9,10 @@ import typer
 from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the page is written, also about a damaged recording; 1 when nothing can be read
+or written.
+
+Examples:
 
 `engine-mount report bags/2026-11-20_18-03-11_motorway` - beside the recording, in its run folder
 

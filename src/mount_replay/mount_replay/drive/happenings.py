@@ -142,11 +142,13 @@ def _of(mount: str) -> str:
 
 
 def _gaps(figures: Mapping[str, str]) -> str:
-    gaps = (
-        f'{name} {figures[f"{name}_gap_um"]} ± {figures[f"{name}_gap_std_um"]} µm'
+    """Return what was found, short enough for a line of 80 columns."""
+    rest, contact = (
+        ' ± '.join(f'{float(figures[f"{name}_{part}"]):.1f}' for part in ('gap_um', 'gap_std_um'))
         for name in ('rest', 'contact')
     )
-    return f'{", ".join(gaps)}; offset current {figures["offset_current_A"]} A'
+    offset = float(figures['offset_current_A'])
+    return f'rest {rest} µm, contact {contact} µm, offset current {offset:.2f} A'
 
 
 def _number(text: str) -> int:
