@@ -7,6 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from mount_cli.command import app
+from mount_models.specimen import default_specimen
+from mount_report.recording_facts import changed_parameters
 
 DRIVE = ('--core', '--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
 CHANGED = ('--set', 'switch_on_level=0.0007', '--set', 'policy=switched_viscous', '--no-report')
@@ -82,6 +84,13 @@ def test_a_recording_is_told_with_what_was_not_at_its_default(bags, tmp_path):
     assert (told['lost_samples'], told['whole'], told['replay']) == (0, True, False)
     assert set(told['versions']) > {'python', 'numpy'}
     assert max(map(len, [line for line in done.output.splitlines() if line.startswith(' ')])) <= 80
+
+
+def test_friction_of_the_shipped_specimen_is_no_change():
+    identified = default_specimen().friction['b_offset']
+    assert changed_parameters({'mount_control': {'friction.b_offset': identified}}) == {}
+    changed = changed_parameters({'mount_control': {'friction.b_offset': -14.0}})
+    assert changed == {'mount_control': {'friction.b_offset': (-14.0, identified)}}
 
 
 def test_a_replay_is_called_one(bags, tmp_path):

@@ -111,6 +111,7 @@ def test_a_warning_is_told_when_it_begins_and_not_with_each_count(happenings, to
     happenings.told('mount_driver', DRIVER | {'level': '1', 'sentence': 'is mount_control active?'})
     for node in SIMULATED:
         happenings.state(node, 'active')
+    assert told == ['active     all nodes, 0.0 s after the start']  # before that it may rightly complain
     clock.now = 1.0
     told.clear()
     for lost in range(20):
