@@ -8,6 +8,7 @@ setup(
     description='The engine-mount command: one file for each sub-command.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test']),
+    package_data={name: ['completion/names.json']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/mount_cli']),
         ('share/mount_cli', ['package.xml', 'README.md']),

@@ -1,6 +1,7 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
-`python test/docs/parameters_page.py` renews the page; `test_parameters.py` holds it against the code.
+`python test/docs/parameters_page.py` renews the page, and the names that a shell offers behind Tab, which
+hold them too; `test_parameters.py` holds the page against the code.
 """
 
 import math
@@ -10,6 +11,8 @@ from typing import Any, NamedTuple
 
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.settings import defaults_of_nodes
+from mount_cli.completion.collected import collected
+from mount_cli.completion.values import FILE as NAMES
 from mount_control.settings import parameter_sets
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
@@ -30,7 +33,7 @@ SETS: dict[str, list[tuple[str, Any]]] = {
 
 HEAD = """# Parameters
 
-Every parameter of every node, as `--set NODE.NAME=VALUE` of `engine-mount drive`, `ros2 param` and the files
+Every parameter of every node, as `--set NODE.NAME=VALUE` of `engine-mount`, `ros2 param` and the files
 in `src/mount_bringup/config` take it. `python test/docs/parameters_page.py` writes this page from the
 declarations, and a test holds it against them. *Source* says where a default is from: the paper, a
 derivation, or a choice of this project. Every node has `lockstep` too (true: time stands in the stamps
@@ -78,3 +81,4 @@ def row(name: str, default: Any, note: Quantity) -> str:
 
 if __name__ == '__main__':
     PAGE.write_text(page(), encoding='utf-8')
+    NAMES.write_text(collected(), encoding='utf-8')

@@ -154,5 +154,5 @@ def found_command(words: list[str]) -> tuple[TyperCommand, list[str]]:
     command = typer.main.get_command(app)
     while isinstance(command, TyperGroup) and words and words[0] in command.commands:
         command, words = command.commands[words[0]], words[1:]
-    assert not isinstance(command, TyperGroup) or not words or not words[0].islower(), words
+    assert not isinstance(command, TyperGroup) or not words or not words[0][0].islower(), words
     return command, words

@@ -1,7 +1,9 @@
 """Parameters of the nodes as given by the user: names known, types as declared, before a node starts."""
 
 import contextlib
+import difflib
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 from mount_bags.recorder.parameters import RecorderParameters
@@ -15,8 +17,12 @@ from mount_models.specimen_choice import SpecimenChoice
 from mount_sim.parameters import NodeParameters, SimParameters
 from mount_sim.plant.places import general_name
 
+Known = Mapping[str, Mapping[str, Any]]
+_FIRST = 'mount_control'  # the node that is meant where none is named
+
 OF_EACH = ('mount_driver', 'mount_init', 'mount_control')
 """Nodes that each mount of a car has."""
+_NODES = (*OF_EACH, 'mount_sim', 'mount_recorder')
 
 
 class SettingError(ParameterError):
@@ -34,16 +40,45 @@ def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     }
 
 
-def settings_of_options(options: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of options NODE.NAME=VALUE; raises `SettingError`."""
+def settings_of_options(options: Sequence[str], known: Known | None = None) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of options [NODE.]NAME=VALUE, which `owned` understands.
+
+    Raises `SettingError` for one that is not written like that.
+    """
     parameters: dict[str, dict[str, Any]] = {}
     for option in options:
         name, equals, text = option.partition('=')
-        node, dot, parameter = name.partition('.')
-        if not (equals and dot and parameter):
-            raise SettingError(f'--set {option}: write NODE.NAME=VALUE, as in mount_sim.seed=2')
+        if not (equals and name):
+            raise SettingError(f'--set {option}: write NAME=VALUE or NODE.NAME=VALUE, as in mount_sim.seed=2')
+        node, parameter = owned(name, known)
         parameters.setdefault(node, {})[parameter] = setting_value(option, text)
     return parameters
+
+
+def owned(name: str, known: Known | None = None) -> tuple[str, str]:
+    """Return node and parameter that `name` means, with its node before it or without.
+
+    Without, it is a parameter of mount_control where that has it, else of the only node that does. Raises
+    `ParameterError` with the nearest names if there is none, or with the nodes if there are several. `known`
+    is {node: {parameter: default}} where others than nodes of the graph have parameters.
+    """
+    known = defaults_of_nodes() if known is None else known
+    node, _, parameter = name.partition('.')
+    if parameter and (node.rpartition('/')[2] in {*known, *_NODES} or '/' in node):
+        return node, parameter
+    owners = [node for node, names in known.items() if name in names]
+    if _FIRST in owners:
+        return _FIRST, name
+    if len(owners) > 1:
+        raise ParameterError(
+            f'{name!r} is a parameter of {", ".join(owners)}: write which, as in {owners[0]}.{name}'
+        )
+    if owners:
+        return owners[0], name
+    names = [*(f'{node}.{each}' for node, names in known.items() for each in names), *chain(*known.values())]
+    near = difflib.get_close_matches(name, names, n=3)
+    hint = f'did you mean {" or ".join(near)}?' if near else f'write NODE.NAME, of {", ".join(known)}'
+    raise ParameterError(f'{name!r} is no parameter of any node; {hint}')
 
 
 def setting_value(option: str, text: str) -> Any:
@@ -60,7 +95,7 @@ def setting_value(option: str, text: str) -> Any:
 
 def checked_settings(
     settings: Mapping[str, Mapping[str, Any]],
-    known: Mapping[str, Mapping[str, Any]] | None = None,
+    known: Known | None = None,
     owner: str = 'node of the graph',
 ) -> dict[str, dict[str, Any]]:
     """Return the settings in the types that the nodes declare; unknown names raise `ParameterError`.
@@ -74,7 +109,9 @@ def checked_settings(
     for node, values in settings.items():
         kind = node.rpartition('/')[2]  # of a node of one mount, as in left/mount_control
         if kind not in known or (kind != node and kind not in OF_EACH):
-            raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
+            near = difflib.get_close_matches(kind, known, n=1)
+            hint = f'; did you mean {near[0]}?' if near else ''
+            raise ParameterError(f'{node!r} is no {owner}{hint or "; known are " + ", ".join(known)}')
         for name in values:
             check_name(node, _general(kind, name), known[kind])
         checked[node] = {

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mount_bringup.settings import checked_settings, settings_of_options
+from mount_bringup.settings import SettingError, checked_settings, owned, settings_of_options
 from mount_models.damper import DamperError, damper_curve
+from mount_models.quantity import ParameterError
 
 POINTS = {'velocity': [0.0, 0.004, 0.1], 'force': [0.0, 0.0, 200.0]}
 
@@ -31,3 +32,49 @@ def test_the_points_of_a_file_are_in_the_settings_so_that_a_session_keeps_them(t
     assert np.array_equal(damper_curve(settings['mount_control']['damper']).table, damper_curve(POINTS).table)
     with pytest.raises(DamperError, match='cannot be read'):
         checked_settings({'mount_control': {'damper': str(file)}})
+
+
+@pytest.mark.parametrize(
+    ('name', 'meant'),
+    [
+        ('mount_sim.seed', ('mount_sim', 'seed')),
+        ('seed', ('mount_sim', 'seed')),
+        ('motorway.gap_depth', ('mount_sim', 'motorway.gap_depth')),
+        ('policy', ('mount_control', 'policy')),
+        ('continuous_viscous.quality', ('mount_control', 'continuous_viscous.quality')),
+        ('sample_rate', ('mount_control', 'sample_rate')),  # each node has one
+        ('left/mount_control.policy', ('left/mount_control', 'policy')),
+        ('mount_sim.mount_left.friction.scale', ('mount_sim', 'mount_left.friction.scale')),
+        ('mount_sim.sede', ('mount_sim', 'sede')),  # refused where the types are known
+    ],
+)
+def test_a_parameter_is_named_with_its_node_or_without(name, meant):
+    assert owned(name) == meant
+
+
+@pytest.mark.parametrize(
+    ('name', 'sentence'),
+    [
+        ('sede', "'sede' is no parameter of any node; did you mean seed"),
+        ('mount_contrl.policy', 'did you mean mount_control.policy'),
+        ('coil.duration', "'coil.duration' is a parameter of a, b: write which, as in a.coil.duration"),
+    ],
+)
+def test_a_name_that_is_no_ones_or_several_ones_is_refused_with_what_to_write(name, sentence):
+    known = {'a': {'coil.duration': 1.0}, 'b': {'coil.duration': 1.0}} if name.startswith('coil') else None
+    with pytest.raises(ParameterError) as refusal:
+        owned(name, known)
+    assert sentence in str(refusal.value)
+
+
+@pytest.mark.parametrize('option', ['seed', '=1', 'mount_sim.seed'])
+def test_a_setting_without_name_or_value_is_a_wrong_use(option):
+    with pytest.raises(SettingError, match='write NAME=VALUE or NODE'):
+        settings_of_options([option])
+
+
+def test_a_node_that_is_misspelt_is_refused_with_the_right_name():
+    with pytest.raises(
+        ParameterError, match="'left/mount_contrl' is no node of the graph; did you mean mount_c"
+    ):
+        checked_settings(settings_of_options(['left/mount_contrl.policy=x']))

@@ -1,7 +1,9 @@
 """The `engine-mount` command."""
 
 import sys
+from collections.abc import Callable
 from itertools import product
+from typing import Annotated
 
 import typer
 
@@ -17,20 +19,32 @@ from mount_cli.commands import (
     experiment,
     faults,
     identify,
+    ls,
     merge,
     record,
     recover,
     replay,
     report,
+    version,
     view,
 )
 from mount_cli.commands.identify_arguments import with_repeated_options
+from mount_cli.help import Command, Group
 from mount_cli.terminal import refuse, terminal
 from mount_ros.environment import prepare_environment
 
+_DRIVE = 'Drive and watch'
+_RECORDINGS = 'Recordings'
+_CHANGE = 'Change recordings'
+_MOUNT = 'Mount and paper'
+_PROJECT = 'This project on this machine'
+
 app = typer.Typer(
+    cls=Group,
     name='engine-mount',
     help='Semi-active engine mount with dry friction: drive, record, look at what happened.',
+    epilog="""Begin with `engine-mount drive`, then `engine-mount report` and `engine-mount replay`.
+`engine-mount COMMAND --help` tells options, exit codes and examples.""",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode='markdown',
@@ -38,14 +52,17 @@ app = typer.Typer(
 
 
 @app.callback()
-def _top() -> None:
-    """Keep sub-commands even while there is only one."""
+def _top(
+    show_version: Annotated[
+        bool,
+        typer.Option(
+            '--version', is_eager=True, callback=version.tell, help='Tell what this is, and what it runs on.'
+        ),
+    ] = False,
+) -> None:
+    pass
 
 
-app.command(name='drive', epilog=drive.EPILOG)(drive.drive)
-
-
-@app.command()
 def prepare() -> None:
     """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""
     from mount_control.policy.registry import POLICIES
@@ -58,23 +75,33 @@ def prepare() -> None:
             run_core({'mount_sim': sim, 'mount_control': {'policy': policy}}, lambda *_: None)
 
 
-app.command(name='bench', epilog=bench.EPILOG)(bench.bench)
-app.command(name='audit', epilog=audit.EPILOG)(audit.audit)
-app.command(name='record', epilog=record.EPILOG)(record.record)
-app.command(name='recover', epilog=recover.EPILOG)(recover.recover)
-app.command(name='replay', epilog=replay.EPILOG)(replay.replay)
-app.command(name='compare', epilog=compare.EPILOG)(compare.compare)
-app.command(name='report', epilog=report.EPILOG)(report.report)
-app.command(name='view', epilog=view.EPILOG)(view.view)
-app.command(name='status', epilog=view.STATUS_EPILOG)(view.status)
-app.command(name='cut', epilog=cut.EPILOG)(cut.cut)
-app.command(name='merge', epilog=merge.EPILOG)(merge.merge)
-app.command(name='experiment', epilog=experiment.EPILOG)(experiment.experiment)
-app.command(name='check', epilog=check.EPILOG)(check.check)
-app.command(name='faults', epilog=faults.EPILOG)(faults.faults)
-app.add_typer(identify.app, name='identify')
-app.command(name='accept', epilog=accept.EPILOG)(accept.accept)
-app.add_typer(calibrate.app)
+_COMMANDS: tuple[tuple[str, str, Callable[..., None], str | None], ...] = (
+    (_DRIVE, 'drive', drive.drive, drive.EPILOG),
+    (_DRIVE, 'view', view.view, view.EPILOG),
+    (_DRIVE, 'status', view.status, view.STATUS_EPILOG),
+    (_DRIVE, 'record', record.record, record.EPILOG),
+    (_RECORDINGS, 'ls', ls.ls, ls.EPILOG),
+    (_RECORDINGS, 'info', ls.info, ls.INFO_EPILOG),
+    (_RECORDINGS, 'report', report.report, report.EPILOG),
+    (_RECORDINGS, 'replay', replay.replay, replay.EPILOG),
+    (_RECORDINGS, 'compare', compare.compare, compare.EPILOG),
+    (_RECORDINGS, 'audit', audit.audit, audit.EPILOG),
+    (_CHANGE, 'cut', cut.cut, cut.EPILOG),
+    (_CHANGE, 'merge', merge.merge, merge.EPILOG),
+    (_CHANGE, 'recover', recover.recover, recover.EPILOG),
+    (_MOUNT, 'experiment', experiment.experiment, experiment.EPILOG),
+    (_PROJECT, 'check', check.check, check.EPILOG),
+    (_PROJECT, 'faults', faults.faults, faults.EPILOG),
+    (_PROJECT, 'bench', bench.bench, bench.EPILOG),
+    (_PROJECT, 'accept', accept.accept, accept.EPILOG),
+    (_PROJECT, 'prepare', prepare, None),
+)
+"""Panel of the help, name, function and epilog of each sub-command."""
+
+for _panel, _name, _function, _epilog in _COMMANDS:
+    app.command(name=_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
+app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
+app.add_typer(identify.app, rich_help_panel=_MOUNT)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -10,6 +10,11 @@ from mount_bringup.graph.errors import INTERRUPTED
 def main() -> None:
     """Load the command and run it."""
     signal.signal(signal.SIGINT, _leave)
+    if os.environ.get('_ENGINE_MOUNT_COMPLETE') == 'complete_bash':
+        from mount_cli.command import app
+        from mount_cli.completion.bash import complete_in_bash
+
+        complete_in_bash(app)
     from mount_cli.command import main as run
 
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,5 +1,6 @@
 """What the command prints is text as it stands, whatever brackets a path or the name of a column holds."""
 
+import contextlib
 import io
 from pathlib import Path
 
@@ -43,10 +44,15 @@ def test_nothing_that_is_printed_is_markup(capsys):
     screen.table(Table(TEXT, 'l', [[TEXT]], [TEXT], TEXT))
     screen.say(TEXT)
     screen.note(TEXT)
-    with screen.bar(TEXT):
-        pass
-    assert file.getvalue().count(TEXT) == 7
+    assert file.getvalue().count(TEXT) == 6
     assert file.getvalue().count(f'note {TEXT}\n') == 1
+    drawn = io.StringIO()
+    screen = TerminalScreen(terminal(file=drawn, width=200, force_terminal=True, color_system=None))
+    with contextlib.suppress(KeyboardInterrupt), screen.bar(TEXT) as show:
+        show(0.5, detail=f'detail {TEXT}')
+        raise KeyboardInterrupt
+    assert f'detail {TEXT}' in drawn.getvalue()
+    assert drawn.getvalue().count(TEXT) > drawn.getvalue().count(f'detail {TEXT}')
     refuse(TEXT)
     assert capsys.readouterr().err == f'engine-mount: {TEXT}\n'
 
@@ -73,6 +79,8 @@ REFUSED = {
     'cut': (MISSING, '--from', '1s', '--to', '2s', '--out', MISSING),
     'drive': ('--core', '--scenario', 'recorded', '--file', MISSING),
     'identify drift': (MISSING, MISSING),
+    'info': (MISSING,),
+    'ls': (MISSING,),
     'identify friction': ('--train', MISSING),
     'merge': (MISSING, '--out', MISSING),
     'recover': (MISSING,),

@@ -24,7 +24,7 @@ def orders(experiments: list[Experiment], options: list[str], out: Path | None, 
     known: dict[str, dict[str, Any]] = {}
     for experiment in experiments:
         known |= experiment.known_settings() | (defaults_of_nodes() if experiment.closed_loop else {})
-    settings = checked_settings(settings_of_options(options), known, 'owner of parameters here')
+    settings = checked_settings(settings_of_options(options, known), known, 'owner of parameters here')
     for experiment in experiments:
         with_flattened(experiment.defaults, settings.get(experiment.name, {}))  # refuses what is out of range
     place = out or new_place(experiments[0].name if len(experiments) == 1 else 'experiments')

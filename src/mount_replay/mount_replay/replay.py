@@ -18,7 +18,7 @@ from mount_bringup.chosen import (
     chosen_specimen,
     control_parameters,
 )
-from mount_bringup.settings import checked_settings, defaults_of_nodes
+from mount_bringup.settings import checked_settings, defaults_of_nodes, owned
 from mount_control.controller import load_compiled_law
 from mount_control.policy.registry import DEFAULT
 from mount_control.settings import check_effect
@@ -141,23 +141,19 @@ def check_parameters(parameters: Parameters) -> None:
 
 
 def parsed_changes(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of {`name` or `node.name`: value}; raises `ParameterError`.
+    """Return {node: {parameter: value}} of {`name` or `node.name`: value}, in the types of the nodes.
 
-    A name without its node is one of mount_control.
+    Raises `ParameterError`, also for a node that takes no part in a replay.
     """
     changes: dict[str, dict[str, Any]] = {}
     for name, value in settings.items():
-        node, dot, rest = name.partition('.')
-        known = node in defaults_of_nodes()
-        if known and node not in REPLAYED_NODES:
+        node, parameter = owned(name)
+        if node in defaults_of_nodes() and node not in REPLAYED_NODES:
             raise ParameterError(
                 f'{node} takes no part in a replay; what can be changed are parameters of '
                 f'{" and ".join(REPLAYED_NODES)}'
             )
-        if known and dot:
-            changes.setdefault(node, {})[rest] = value
-        else:
-            changes.setdefault('mount_control', {})[name] = value
+        changes.setdefault(node, {})[parameter] = value
     return checked_settings(changes)
 
 

@@ -1,6 +1,7 @@
 """What a drive says of its recorder, without the graph."""
 
 import io
+from types import SimpleNamespace
 
 import pytest
 
@@ -20,6 +21,7 @@ class Graph:
 
     def __init__(self, *_):
         self.notes, self.restarts, self.nodes = [], [], (CONTROL,)
+        self.verdicts = SimpleNamespace()
 
     def start(self, session, status):
         pass

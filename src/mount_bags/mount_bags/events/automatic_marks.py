@@ -41,7 +41,7 @@ class AutomaticMarks:
         self.sent = 0
         self._send = send
         self._clock = clock
-        self._rations = {kind: _Ration(clock()) for kind in kinds}
+        self._rations = {kind: Ration(clock()) for kind in kinds}
 
     def mark(self, kind: MarkKind, stamp: int, text: str) -> None:
         """Mark what happened at `stamp` (ns), if that kind is wanted and its ration not used up."""
@@ -130,7 +130,7 @@ def mark_kinds(words: str) -> tuple[MarkKind, ...]:
         ) from None
 
 
-class _Ration:
+class Ration:
     """Lets `BURST` through at once and one more per `REFILL`; counts what it holds back."""
 
     def __init__(self, now: float):

@@ -25,9 +25,12 @@ class Table:
 
 
 class Bar(Protocol):
-    """Takes the share that is done (0..1) and, where it has changed, what is being done."""
+    """Takes the share that is done (0..1) and, where it has changed, what is being done.
 
-    def __call__(self, share: float, what: str = '') -> None: ...
+    `detail` is a sentence about this moment.
+    """
+
+    def __call__(self, share: float, what: str = '', detail: str = '') -> None: ...
 
 
 class Line(Protocol):
@@ -66,7 +69,7 @@ class Screen:
     @contextlib.contextmanager
     def bar(self, what: str, *, transient: bool = False) -> Iterator[Bar]:
         """Show how far work has come while the context lasts; a `transient` bar is gone afterwards."""
-        yield lambda share, what='': None
+        yield lambda share, what='', detail='': None
 
     @contextlib.contextmanager
     def line(self, text: str) -> Iterator[Line]:

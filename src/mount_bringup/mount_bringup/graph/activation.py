@@ -105,6 +105,8 @@ class Activation:
     def activate_all(self, nodes: Sequence[GraphNode], say: Callable[[str], None]) -> None:
         """Activate one node, or those of all mounts at the same time; one that refuses is asked by itself."""
         say(f'activating {", ".join(node.full_name for node in nodes)}')
+        for node in nodes:
+            self._graph.verdicts.witness.state(node, 'activating')
         if len(nodes) == 1:
             self.activate(nodes[0], say)
             return

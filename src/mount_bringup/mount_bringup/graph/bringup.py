@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import groupby, zip_longest
 from typing import Any
 
@@ -37,11 +38,12 @@ from mount_bringup.graph.reinitialisation import initialise_anew, offer
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
+from mount_ros.messages.event import read_mark
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.leaving import leave_middleware
 from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_ros.qos import publisher_qos, recording_qos
-from mount_ros.topics import DIAGNOSTICS, SESSION
+from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION
 from mount_sim.diagnosis import FINISHED
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
@@ -95,6 +97,9 @@ class Bringup:
         self._node.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self.verdicts.take, recording_qos(DIAGNOSTICS)
         )
+        for mount in self._mounts:
+            name, take = f'{mount}/{EVENT.name}'.lstrip('/'), partial(self._take_event, mount)
+            self._node.create_subscription(String, name, take, recording_qos(EVENT))
         qos = publisher_qos(SESSION)
         publishers = {
             mount: self._node.create_publisher(String, f'{mount}/{SESSION.name}'.lstrip('/'), qos)
@@ -206,6 +211,9 @@ class Bringup:
             self._makes_good = True
             self.verdicts.liveliness.pause()
 
+    def _take_event(self, mount: str, message: String) -> None:
+        self.verdicts.witness.mark(mount, read_mark(message.data, 0))
+
     def mark_setter(self, say: Callable[[str], None]) -> Callable[[], None]:
         """Return the function that asks the recorder to mark this moment; `say` takes its answer."""
         client = self._node.create_client(Trigger, f'{RECORDER.name}/mark')
@@ -236,6 +244,8 @@ class Bringup:
         self._node.destroy_client(client)
         if not answer.result().success:
             raise self.refusal(node, label)
+        if transition == _CONFIGURE:
+            self.verdicts.witness.state(node, 'configured')
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""

@@ -1,15 +1,29 @@
 """What the nodes of a graph say of themselves on `/diagnostics`."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray
 
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.liveliness import Liveliness
 from mount_bringup.graph.nodes import CONTROL, DRIVER, GraphNode
+from mount_ros.messages.event import Mark
 from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.nodes.diagnostics import Level
+
+
+class Witness:
+    """Is told what happens in a graph while it happens; this one takes no note of it."""
+
+    def state(self, node: GraphNode, state: str) -> None:
+        """Take that a node is `configured`, `activating` or `active` from now on."""
+
+    def told(self, name: str, figures: Mapping[str, str]) -> None:
+        """Take what a node of this name tells: its figures, `level` and `sentence`."""
+
+    def mark(self, mount: str, mark: Mark) -> None:
+        """Take a mark on the topic `event` of a mount."""
 
 
 class Verdicts:
@@ -17,6 +31,7 @@ class Verdicts:
 
     def __init__(self, nodes: Sequence[GraphNode], namespace: str):
         self.liveliness = Liveliness()
+        self.witness = Witness()
         self._nodes = nodes
         self._names = {node.full_name for node in nodes}
         self._space = f'{namespace.strip("/")}/'.lstrip('/')
@@ -38,6 +53,8 @@ class Verdicts:
                 'level': str(told.level),
                 'sentence': told.sentence,
             }
+            if name in self._names:
+                self.witness.told(name, self._figures[name])
 
     def figures(self, node: GraphNode) -> dict[str, str]:
         """Return what a node told last: its figures, `level` and `sentence`; empty if nothing came."""
@@ -46,6 +63,7 @@ class Verdicts:
     def note_active(self, node: GraphNode) -> None:
         """Note that a node was activated, which it tells only with its next diagnostics."""
         self._figures.setdefault(node.full_name, {'level': '0', 'sentence': ''})['state'] = 'active'
+        self.witness.state(node, 'active')
 
     def forget(self, node: GraphNode) -> None:
         """Forget what a node has told: it holds no more."""

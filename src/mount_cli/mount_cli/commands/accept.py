@@ -5,9 +5,12 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings, references
 from mount_cli.terminal import terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the reference is made, 1 when it was refused, with the reason.
+
+Examples:
 
 `engine-mount drive --core --scenario bench --duration 3 --out bags/new`
 
@@ -16,8 +19,15 @@ EPILOG = """Examples:
 
 
 def accept(
-    run: Annotated[Path, typer.Argument(help='folder of a run, a recording, or a replay of the reference')],
-    reference: Annotated[str, typer.Option(metavar='NAME', help='name of the reference')],
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help='folder of a run, a recording, or a replay of the reference', autocompletion=recordings
+        ),
+    ],
+    reference: Annotated[
+        str, typer.Option(metavar='NAME', help='name of the reference', autocompletion=references)
+    ],
     reason: Annotated[str, typer.Option(metavar='TEXT', help='why its setpoints may change')],
     folder: Annotated[Path, typer.Option(help='folder of the references')] = Path('bags/reference'),
 ) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import JsonFile
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
@@ -26,7 +27,12 @@ The JSON holds them, and below `topics` for each topic `expected`, `present`, `l
 
 
 def audit(
-    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            help='folder of a run or of a recording, or one of its files', autocompletion=recordings
+        ),
+    ],
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""

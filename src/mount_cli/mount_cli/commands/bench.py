@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import Domain, JsonFile
+from mount_cli.completion.values import named
 from mount_cli.terminal import terminal
 
 EPILOG = """Groups: `calls` (what one call costs), `storage` (recordings), `lockstep`, `graph` (latency,
@@ -22,7 +23,10 @@ Examples:
 
 def bench(
     only: Annotated[
-        list[str] | None, typer.Option(metavar='GROUP', help='measure this group alone; may be repeated')
+        list[str] | None,
+        typer.Option(
+            metavar='GROUP', help='measure this group alone; may be repeated', autocompletion=named('group')
+        ),
     ] = None,
     rounds: Annotated[int, typer.Option(min=1, help='of each run of the graph; the median is told')] = 5,
     seconds: Annotated[float, typer.Option(min=1.0, help='length of a run in real time')] = 5.0,

@@ -8,19 +8,23 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from mount_cli.help import Command, Group
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_models.specimen import Specimen
 
 app = typer.Typer(
+    cls=Group,
     name='calibrate',
     help='Calibrate an actuator from rack recordings: force law, gap curves, their files.',
     no_args_is_help=True,
     rich_markup_mode='markdown',
 )
 
-_ACTUATOR_EPILOG = """Examples:
+_ACTUATOR_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount calibrate actuator force.csv --name left --out left.yaml`
 
@@ -32,7 +36,9 @@ _ACTUATOR_EPILOG = """Examples:
 
 CSV columns are `gap_um`, `current_a`, `force_n`, or the same with another unit (mm, m, ma, kn).
 """
-_INDUCTANCE_EPILOG = """Examples:
+_INDUCTANCE_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount calibrate inductance ripple_*um.csv --coil-temperature 20 --base left.yaml --out left.yaml`
 
@@ -44,7 +50,9 @@ CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a
 `flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
 tells them.
 """
-_RACK_EPILOG = """Example:
+_RACK_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Example:
 
 `engine-mount calibrate rack --out rack --celsius 20 --celsius 80` - then `calibrate actuator rack/force.csv`,
 `calibrate inductance rack/ripple_*.csv`, `identify friction --train rack/friction_*.csv`
@@ -69,7 +77,7 @@ JsonFile = Annotated[
 Figure = Annotated[Path | None, typer.Option(metavar='FILE', help='draw measurement and result (PNG)')]
 
 
-@app.command(epilog=_ACTUATOR_EPILOG)
+@app.command(cls=Command, epilog=_ACTUATOR_EPILOG)
 def actuator(
     files: Files,
     orders: Annotated[
@@ -152,7 +160,7 @@ def actuator(
     _write(console, specimen, figures, json_file, out)
 
 
-@app.command(epilog=_INDUCTANCE_EPILOG)
+@app.command(cls=Command, epilog=_INDUCTANCE_EPILOG)
 def inductance(
     files: Files,
     gaps: Gaps = None,
@@ -234,7 +242,7 @@ def inductance(
     _write(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)
 
 
-@app.command(epilog=_RACK_EPILOG)
+@app.command(cls=Command, epilog=_RACK_EPILOG)
 def rack(
     out: Annotated[Path, typer.Option(metavar='FOLDER', help='folder for the recordings')],
     seed: Annotated[int, typer.Option(help='seed of the noise, and of the actuator with --drawn')] = 0,

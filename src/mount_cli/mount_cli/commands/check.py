@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.commands.options import Domain, JsonFile, NewFolder
+from mount_cli.commands.options import Domain, JsonFile, NewFolder, Settings
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when every manoeuvre stayed within its limits; 1 when a limit was exceeded; 2 for a
@@ -15,7 +15,7 @@ Examples:
 
 `engine-mount check` - the shipped suite, without middleware
 
-`engine-mount check --set mount_control.continuous_viscous.damping_coefficient=3200` - with a change
+`engine-mount check --set continuous_viscous.damping_coefficient=3200` - with a change
 
 `engine-mount check --only gap_20mm,rack --through lockstep` - two manoeuvres through the nodes
 
@@ -32,10 +32,7 @@ def check(
     through: Annotated[
         str, typer.Option(metavar='WORD', help='core, lockstep, or graph (in real time)')
     ] = 'core',
-    settings: Annotated[
-        list[str] | None,
-        typer.Option('--set', metavar='NODE.NAME=VALUE', help='any parameter of any node; may be repeated'),
-    ] = None,
+    settings: Settings = None,
     policy: Annotated[str, typer.Option(help='of the controller: mount_control.policy')] = '',
     mount: Annotated[str, typer.Option(help='in the seat: mount_sim.mount')] = '',
     jobs: Annotated[int, typer.Option(min=0, help='core: manoeuvres at a time; 0: one per core')] = 0,

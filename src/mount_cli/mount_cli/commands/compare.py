@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import JsonFile
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, refuse, terminal
 
 EPILOG = """Examples:
@@ -20,8 +21,13 @@ _NOT_COMPARED = 2
 
 
 def compare(
-    a: Annotated[Path, typer.Argument(metavar='A', help='folder of a recording or run, or an MCAP file')],
-    b: Annotated[Path, typer.Argument(metavar='B', help='the other one')],
+    a: Annotated[
+        Path,
+        typer.Argument(
+            metavar='A', help='folder of a recording or run, or an MCAP file', autocompletion=recordings
+        ),
+    ],
+    b: Annotated[Path, typer.Argument(metavar='B', help='the other one', autocompletion=recordings)],
     tolerances: Annotated[
         list[str] | None,
         typer.Option(

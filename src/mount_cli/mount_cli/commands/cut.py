@@ -5,9 +5,12 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the piece is written and nothing of it was unreadable, 1 when something was.
+
+Examples:
 
 `engine-mount cut RECORDING --from 12s --to 20s`
 
@@ -18,7 +21,9 @@ EPILOG = """Examples:
 
 
 def cut(
-    recording: Annotated[Path, typer.Argument(help='folder of a recording or run, or an MCAP file')],
+    recording: Annotated[
+        Path, typer.Argument(help='folder of a recording or run, or an MCAP file', autocompletion=recordings)
+    ],
     begin: Annotated[
         str, typer.Option('--from', metavar='TIME', help='from the first displacement sample, such as 12s')
     ] = '',

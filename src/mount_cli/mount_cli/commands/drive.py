@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from mount_bringup.graph.nodes import RESTART_LIMIT
-from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Snapshot, Split
+from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Settings, Snapshot, Split
+from mount_cli.completion.values import faults, listed, named
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
@@ -36,13 +37,27 @@ Examples:
 
 
 def drive(
-    scenario: Annotated[str, typer.Option(help='motorway, bench, sweep or recorded')] = 'motorway',
+    scenario: Annotated[
+        str,
+        typer.Option(
+            metavar='NAME', help='motorway, bench, sweep or recorded', autocompletion=named('scenario')
+        ),
+    ] = 'motorway',
     mount: Annotated[
-        str, typer.Option(help='friction, friction_off, friction_always_on, hydro or elastomer')
+        str,
+        typer.Option(
+            metavar='NAME',
+            help='friction, friction_off, friction_always_on, hydro or elastomer; default: friction',
+            autocompletion=named('mount'),
+        ),
     ] = '',
     mounts: Annotated[
         str,
-        typer.Option(help='mounts with electronics under one engine: of left, right, front, rear'),
+        typer.Option(
+            metavar='NAME,...',
+            help='mounts with electronics under one engine: of left, right, front, rear',
+            autocompletion=listed('place'),
+        ),
     ] = '',
     file: Annotated[
         Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
@@ -62,6 +77,7 @@ def drive(
             metavar='NAME@t[:duration]',
             help='a fault from t s after the start of the simulator on, for so many s or for good; '
             'may be repeated; list: what there is',
+            autocompletion=faults,
         ),
     ] = None,
     lockstep: Annotated[
@@ -77,24 +93,27 @@ def drive(
     ] = False,
     core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
     duration: Annotated[
-        float | None, typer.Option(help='length of the excitation in s; default: the recording, or 15 s')
+        float | None,
+        typer.Option(metavar='S', help='length of the excitation, s; default: the recording, or 15 s'),
     ] = None,
     sample_rate: Annotated[
         float | None,
-        typer.Option(help='Hz: how often the electronics measure; default: 1000'),
+        typer.Option(metavar='HZ', help='how often the electronics measure, 500 .. 2000 Hz; default: 1000'),
     ] = None,
     seed: Annotated[int | None, typer.Option(help='seed of noise and road')] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option('--set', metavar='NODE.NAME=VALUE', help='any parameter of any node; may be repeated'),
-    ] = None,
+    settings: Settings = None,
     out: NewFolder = None,
     json_file: JsonFile = None,
     report: Annotated[
         bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
     on_full: Annotated[
-        str, typer.Option(help='full disk: stop the run, or continue without recording')
+        str,
+        typer.Option(
+            metavar='WORD',
+            help='full disk: stop the run, or continue without recording',
+            autocompletion=named('on_full'),
+        ),
     ] = 'stop',
     split: Split = None,
     snapshot: Snapshot = '',
@@ -188,9 +207,9 @@ def drive(
 
 
 def _list_faults() -> None:
+    from mount_bags.run.screen import Table
+    from mount_cli.screen import TerminalScreen
     from mount_sim.electronics.faults.kinds import FAULTS
 
-    console = terminal()
-    width = max(map(len, FAULTS))
-    for name, kind in FAULTS.items():
-        console.print(f'{name:{width}}  {kind.meaning}', soft_wrap=True, markup=False, highlight=False)
+    rows = [(name, kind.meaning) for name, kind in FAULTS.items()]
+    TerminalScreen(terminal()).table(Table('', 'll', rows, ('name', 'fault')))

@@ -5,9 +5,12 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import named, setting
 from mount_cli.terminal import terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when it ran, whatever came out; 1 when the order was refused.
+
+Examples:
 
 `engine-mount experiment --list` - which there are
 
@@ -21,7 +24,10 @@ EPILOG = """Examples:
 
 def experiment(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar='NAME...', help='one, several, or all; see --list')
+        list[str] | None,
+        typer.Argument(
+            metavar='NAME...', help='one, several, or all; see --list', autocompletion=named('experiment')
+        ),
     ] = None,
     show: Annotated[bool, typer.Option('--list', help='tell which experiments there are')] = False,
     out: Annotated[
@@ -36,7 +42,12 @@ def experiment(
     ] = False,
     settings: Annotated[
         list[str] | None,
-        typer.Option('--set', metavar='OWNER.NAME=VALUE', help='a parameter of the experiment or of a node'),
+        typer.Option(
+            '--set',
+            metavar='[OWNER.]NAME=VALUE',
+            help='a parameter of the experiment or of a node; may be repeated',
+            autocompletion=setting(),
+        ),
     ] = None,
     page: Annotated[
         Path | None,
@@ -47,15 +58,16 @@ def experiment(
 
     A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
     """
+    from mount_bags.run.screen import Table
+    from mount_cli.screen import TerminalScreen
     from mount_experiments.registry import experiments_named, listed
 
     console = terminal()
     if show:
-        for name, reference, title in listed():
-            console.print(f'{name:22}{reference:15}{title}', soft_wrap=True)
+        rows = [(name, f'{title} ({reference})') for name, reference, title in listed()]
+        TerminalScreen(console).table(Table('', 'll', rows, ('name', 'what is shown (in the paper)')))
         return
     from mount_bringup.settings import SettingError
-    from mount_cli.screen import TerminalScreen
     from mount_experiments.orders import orders, run_all
     from mount_experiments.page import print_outcome, write_page
     from mount_report.json_file import write_json

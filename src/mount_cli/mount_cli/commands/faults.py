@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import Domain
+from mount_cli.completion.values import listed
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.
@@ -27,7 +28,9 @@ _DRIVE = (sys.executable, '-c', 'from mount_cli.command import main; main()', 'd
 
 
 def faults(
-    only: Annotated[str, typer.Option(metavar='NAME,...', help='these faults only')] = '',
+    only: Annotated[
+        str, typer.Option(metavar='NAME,...', help='these faults only', autocompletion=listed('case'))
+    ] = '',
     show: Annotated[bool, typer.Option('--list', help='tell which faults there are')] = False,
     third: Annotated[bool, typer.Option('--third', help='a representative third of them')] = False,
     out: Annotated[
@@ -45,6 +48,7 @@ def faults(
 ) -> None:
     """Bring every fault into the real graph and tell what the graph does about it."""
     from mount_bags.run.folder import make_run_folder
+    from mount_bags.run.screen import Table
     from mount_bringup.graph.domain import chosen_domain
     from mount_cli.screen import TerminalScreen
     from mount_replay.faults.graph import Place
@@ -63,8 +67,8 @@ def faults(
         if (not only or case.name in only.split(',')) and (not third or case.third)
     ]
     if show:
-        for case in chosen:
-            console.print(f'{case.name:26}{case.meaning}: {case.reaction.value}', soft_wrap=True)
+        rows = [(case.name, f'{case.meaning}: {case.reaction.value}') for case in chosen]
+        TerminalScreen(console).table(Table('', 'll', rows, ('name', 'fault: what is required')))
         return
     folder = make_run_folder(out, 'faults').path.absolute()
     screen = TerminalScreen(console)
@@ -73,12 +77,12 @@ def faults(
         outcomes = run_faults(
             chosen, place, bar, lambda case, outcome: screen.say(f'{case.name}: {outcome.wrong or "ok"}')
         )
-    rows = {MATRIX[name]: outcome for name, outcome in outcomes.items()}
-    screen.table(table(rows))
+    told = {MATRIX[name]: outcome for name, outcome in outcomes.items()}
+    screen.table(table(told))
     if json_file is not None:
         write_json({name: outcome.as_json() for name, outcome in outcomes.items()}, json_file)
     if page is not None:
-        write_page(rows, page)
+        write_page(told, page)
         console.print(f'page       {page}', soft_wrap=True)
     wrong = {name: outcome for name, outcome in outcomes.items() if not outcome.ok}
     for name, outcome in wrong.items():

@@ -7,19 +7,24 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from mount_cli.completion.values import recordings
+from mount_cli.help import Command, Group
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_identification.friction.identify import Identification
 
 app = typer.Typer(
+    cls=Group,
     name='identify',
     help='Identify parameters from recordings of a rack.',
     no_args_is_help=True,
     rich_markup_mode='markdown',
 )
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount identify friction --train ramp.csv 40N.csv 120N.csv --held-out 80N.csv --base left.yaml
 --name left --out left.yaml` - into the specimen file that init and control load
@@ -35,7 +40,7 @@ def _top() -> None:
     """Keep sub-commands even while there is only one."""
 
 
-@app.command(epilog=EPILOG)
+@app.command(cls=Command, epilog=EPILOG)
 def friction(
     train: Annotated[
         list[Path] | None, typer.Option(metavar='FILE...', help='recordings to fit: CSV, MCAP or JSON')
@@ -108,7 +113,9 @@ def friction(
         note_foreign(console, foreign_parts(specimen), specimen.name)
 
 
-DRIFT_EPILOG = """Examples:
+DRIFT_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
+
+Examples:
 
 `engine-mount identify drift bags/monday bags/tuesday bags/friday --figure wear.png`
 
@@ -116,9 +123,16 @@ DRIFT_EPILOG = """Examples:
 """
 
 
-@app.command(epilog=DRIFT_EPILOG)
+@app.command(cls=Command, epilog=DRIFT_EPILOG)
 def drift(
-    recordings: Annotated[list[Path], typer.Argument(help='runs or recordings with an initialisation')],
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar='RECORDING...',
+            help='runs or recordings with an initialisation',
+            autocompletion=recordings,
+        ),
+    ],
     specimen: Annotated[
         Path | None, typer.Option(help='specimen file of this actuator; default: the shipped one')
     ] = None,

@@ -5,13 +5,24 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
-EPILOG = 'Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`'
+EPILOG = """Exit code: 0 when all is written, 1 when something of the parts could not be read.
+
+Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/whole`
+"""
 
 
 def merge(
-    recordings: Annotated[list[Path], typer.Argument(help='folders of recordings or runs, or MCAP files')],
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar='RECORDING...',
+            help='folders of recordings or runs, or MCAP files',
+            autocompletion=recordings,
+        ),
+    ],
     out: Annotated[Path, typer.Option(help='folder to create')],
     different_sessions: Annotated[
         bool, typer.Option('--different-sessions', help='merge recordings of different drives, too')

@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 from mount_cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
+from mount_cli.completion.values import named
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
@@ -27,7 +28,10 @@ holds the marks, is always recorded. Times are those of the wall clock.
 
 def record(
     topics: Annotated[
-        list[str] | None, typer.Argument(metavar='[TOPIC]...', help='names of the registry; default: all')
+        list[str] | None,
+        typer.Argument(
+            metavar='[TOPIC]...', help='names of the registry; default: all', autocompletion=named('topic')
+        ),
     ] = None,
     out: NewFolder = None,
     split: Split = None,
@@ -35,9 +39,16 @@ def record(
     snapshot_after: Annotated[
         str, typer.Option(metavar='DURATION', help='snapshot: and with so much after an event')
     ] = '10s',
-    duration: Annotated[float | None, typer.Option(help='length in s; default: until Ctrl-C')] = None,
+    duration: Annotated[
+        float | None, typer.Option(metavar='S', help='length, s; default: until Ctrl-C')
+    ] = None,
     on_full: Annotated[
-        str, typer.Option(help='full disk: stop, or continue without recording until the end is asked for')
+        str,
+        typer.Option(
+            metavar='WORD',
+            help='full disk: stop, or continue without recording until the end is asked for',
+            autocompletion=named('on_full'),
+        ),
     ] = 'stop',
     domain: Domain = None,
     namespace: Namespace = '',

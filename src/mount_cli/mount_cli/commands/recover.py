@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
 INCOMPLETE = 3
@@ -25,7 +26,12 @@ recorder says of its own losses. A last chunk that was cut off is lost. The orig
 
 
 def recover(
-    recording: Annotated[Path, typer.Argument(help='folder of a run or of a recording, or one of its files')],
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            help='folder of a run or of a recording, or one of its files', autocompletion=recordings
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(help='folder of the new recording; default: beside it, `..._recovered`')
     ] = None,

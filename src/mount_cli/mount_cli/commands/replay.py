@@ -7,9 +7,13 @@ import typer
 from rich.console import Console
 
 from mount_cli.commands.options import Domain, JsonFile, NewFolder
+from mount_cli.completion.values import listed, named, recordings, setting
 from mount_cli.terminal import terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the setpoints are those recorded, or something was changed on purpose; 1 when
+they are not, or the order was refused.
+
+Examples:
 
 `engine-mount replay bags/2026-11-20_18-03-11_motorway/recording` - equal to what was recorded?
 
@@ -25,7 +29,11 @@ EPILOG = """Examples:
 
 def replay(
     recording: Annotated[
-        Path, typer.Argument(help='folder of a recording, or MCAP file; with --map CSV, NPY and JSON too')
+        Path,
+        typer.Argument(
+            help='folder of a run or recording, or MCAP file; with --map CSV, NPY and JSON too',
+            autocompletion=recordings,
+        ),
     ],
     core: Annotated[
         bool, typer.Option('--core', help='through the controller as function calls; the default')
@@ -40,8 +48,9 @@ def replay(
         list[str] | None,
         typer.Option(
             '--set',
-            metavar='NAME=VALUE',
-            help='a parameter other than recorded, of mount_control, or NODE.NAME; may be repeated',
+            metavar='[NODE.]NAME=VALUE',
+            help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
+            autocompletion=setting('mount_control', 'mount_init'),
         ),
     ] = None,
     table: Annotated[
@@ -57,15 +66,27 @@ def replay(
     ] = None,
     scale: Annotated[float, typer.Option(help='foreign recording: factor to m, engine minus chassis')] = 1.0,
     offset: Annotated[
-        str, typer.Option(help='foreign recording: what is subtracted after --scale, in m, or mean')
+        str,
+        typer.Option(metavar='M', help='foreign recording: what is subtracted after --scale, in m, or mean'),
     ] = 'mean',
     out: NewFolder = None,
     json_file: JsonFile = None,
-    mount: Annotated[str, typer.Option(help='which of several mounts, such as left')] = '',
+    mount: Annotated[
+        str,
+        typer.Option(
+            metavar='NAME', help='which of several mounts, such as left', autocompletion=named('place')
+        ),
+    ] = '',
     rate: Annotated[float, typer.Option(help='live: factor on the speed of time')] = 1.0,
-    start: Annotated[float, typer.Option('--from', help='live: where to begin, s')] = 0.0,
+    start: Annotated[float, typer.Option('--from', metavar='S', help='live: where to begin, s')] = 0.0,
     topic_names: Annotated[
-        str, typer.Option('--topics', help='live: names separated by commas, or all')
+        str,
+        typer.Option(
+            '--topics',
+            metavar='NAME,...',
+            help='live: names, or all',
+            autocompletion=listed('topic'),
+        ),
     ] = '',
     with_control: Annotated[
         bool,
@@ -76,7 +97,7 @@ def replay(
 ) -> None:
     """Replay a recorded displacement through the same controller and tell whether its answers are the same.
 
-    Exit code 1 if nothing was changed and the setpoints are not equal to the recorded ones to the last bit.
+    Equal is to the last bit; parameters and tables can be other than recorded.
     """
     from mount_bringup.graph.domain import chosen_domain
 
@@ -146,16 +167,13 @@ def _foreign(maps: list[str], scale: float, offset: str) -> Any:
 
 
 def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
-    from mount_bringup.settings import SettingError, setting_value
+    from mount_bringup.settings import SettingError, settings_of_options
     from mount_replay.replay import parsed_changes
 
-    values = {}
-    for setting in settings:
-        name, equals, text = setting.partition('=')
-        if not (equals and name):
-            raise typer.BadParameter(f'--set {setting}: write NAME=VALUE, as in highest_current=2')
-        try:
-            values[name] = setting_value(setting, text)
-        except SettingError as error:
-            raise typer.BadParameter(str(error)) from None
-    return parsed_changes(values)
+    try:
+        given = settings_of_options(settings)
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
+    return parsed_changes(
+        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
+    )

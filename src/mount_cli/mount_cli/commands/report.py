@@ -6,9 +6,13 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import note, terminal
 
-EPILOG = """Examples:
+EPILOG = """Exit code: 0 when the page is written, also about a damaged recording; 1 when nothing can be read
+or written.
+
+Examples:
 
 `engine-mount report bags/2026-11-20_18-03-11_motorway` - beside the recording, in its run folder
 
@@ -21,12 +25,19 @@ EPILOG = """Examples:
 def report(
     recordings: Annotated[
         list[Path],
-        typer.Argument(metavar='RECORDING...', help='folders of recordings or runs, or MCAP files'),
+        typer.Argument(
+            metavar='RECORDING...',
+            help='folders of recordings or runs, or MCAP files',
+            autocompletion=recordings,
+        ),
     ],
     other: Annotated[
         Path | None,
         typer.Option(
-            '--compare', metavar='OTHER', help='draw this one too and tell how it differs from the first'
+            '--compare',
+            metavar='OTHER',
+            autocompletion=recordings,
+            help='draw this one too and tell how it differs from the first',
         ),
     ] = None,
     out: Annotated[

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import Domain, JsonFile, Namespace
+from mount_cli.completion.values import recordings
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 after Ctrl-C; 1 when there is nothing to look at or a port is taken, with the reason.
@@ -37,7 +38,10 @@ _REFRESHES = 4  # a second, chosen
 
 def view(
     recording: Annotated[
-        Path | None, typer.Argument(help='folder of a run or of a recording; without: the running graph')
+        Path | None,
+        typer.Argument(
+            help='folder of a run or of a recording; without: the running graph', autocompletion=recordings
+        ),
     ] = None,
     rate: Annotated[float, typer.Option(help='recording: speed against the clock')] = 1.0,
     begin: Annotated[float, typer.Option('--from', metavar='S', help='recording: where to begin')] = 0.0,

@@ -24,13 +24,16 @@ from mount_bringup.graph.nodes import (
     of_mounts,
 )
 from mount_bringup.graph.supervisor import Supervisor
+from mount_bringup.graph.verdicts import Witness
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
+from mount_replay.drive.happenings import Happenings, line
 from mount_replay.drive.preflight import preflight
+from mount_replay.drive.progress import DriveProgress
 from mount_replay.loop.recording import record_car, record_core
 from mount_sim.diagnosis import FINISHED, beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
@@ -93,21 +96,25 @@ def _drive_graph(
     )
     supervisor = Supervisor(of_mounts(SIMULATED, order.mounts), settings, folder.logs)
     supervisor.tell_loss = screen.note
+    happenings = Happenings(supervisor.nodes, screen.say)
+    supervisor.verdicts.witness = happenings
     with domain_locks(order.domain, order.namespace, order.mounts), ending_signals(supervisor.interrupt):
         try:
-            with screen.line('starting') as show:
+            happenings.begin()
+            with screen.line(happenings.states) as show:
                 supervisor.start(
                     lambda all_parameters: _session(order, all_parameters),
-                    show,
+                    lambda text: show(happenings.states),
                 )
             duration = excitation.start + excitation.duration
             limit = math.inf if order.mode == 'lock-step' else duration + _SLACK
-            _watch_drive(order, supervisor, limit, screen)
+            _watch_drive(order, supervisor, happenings, limit, screen)
             figures = supervisor.figures(SIM)
             complaints += _beyond_range(int(figures['beyond_range']), float(figures['first_beyond_range_s']))
             controls = (supervisor.figures(node) for node in supervisor.nodes if node.is_a(CONTROL))
             complaints += _control_faults(sum(int(told.get('faults', 0)) for told in controls))
         finally:
+            supervisor.verdicts.witness = Witness()  # of the end the supervisor tells
             recorder = supervisor.figures(RECORDER)
             if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
                 supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
@@ -127,24 +134,35 @@ def _drive_graph(
     }
 
 
-def _watch_drive(order: DriveOrder, supervisor: Supervisor, limit: float, screen: Screen) -> None:
+def _watch_drive(
+    order: DriveOrder, supervisor: Supervisor, happenings: Happenings, limit: float, screen: Screen
+) -> None:
     # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
     keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
     with keyboard as keys, screen.bar(f'driving ({order.scenario})') as show:
         set_mark = supervisor.mark_setter(screen.say)
-        hint = '; m or space: mark' if keys is not None and keys.present else ''
-        show(0.0, f'driving ({order.scenario}{hint})')
+        if order.mode == 'real time':
+            _tell_where_to_look(order, screen, marks=keys is not None and keys.present)
+        progress = DriveProgress(supervisor.figures(SIM), real_time=order.mode == 'real time')
 
         def finished() -> bool:
             figures = supervisor.figures(SIM)
-            share = int(figures.get('samples', 0)) / int(figures.get('samples_of_run', 1))
-            show(share)
+            show(progress.share(figures), detail=happenings.present)
             for key in keys.wait(0.0) if keys is not None else ():
                 if key in MARK_KEYS:
                     set_mark()
             return figures.get('sentence') == FINISHED
 
         supervisor.wait_until(finished, limit, 'the end of the drive')
+
+
+def _tell_where_to_look(order: DriveOrder, screen: Screen, *, marks: bool) -> None:
+    where = f' --domain {order.domain}' if order.domain else ''
+    where += f' --namespace {order.namespace}' if order.namespace else ''
+    page = f'engine-mount view{where}, then http://127.0.0.1:8137'
+    screen.say(line('look', f'in another terminal: {page}'))
+    if marks:
+        screen.say(line('mark', 'm or space'))
 
 
 def _drive_in_core(

@@ -80,9 +80,10 @@ def _tell_mount(
     report: bool,
 ) -> dict[str, Any]:
     """Print the figures of one mount and draw its picture; return them, add to `told` what is wrong."""
-    drive = load_drive(recording)
-    audits = audit(recording)
-    found = losses(recording, audits)
+    with screen.line('evaluating the recording'):
+        drive = load_drive(recording)
+        audits = audit(recording)
+        found = losses(recording, audits)
     mount = f'{recording.mount}: ' if recording.mount else ''
     complaints = [*found.complaints(), *samples_at_the_ends(recording, audits, run['samples'])]
     told.complaints += [f'{mount}{words}' for words in complaints]
@@ -93,9 +94,10 @@ def _tell_mount(
         figure = folder.figure
         if recording.mount:
             figure = figure.with_name(f'{figure.stem}_{recording.mount}{figure.suffix}')
-        told.complaints += _complaint(
-            figure, lambda: _draw(figure, parameters, drive, figures, _undamped(recording, parameters))
-        )
+        with screen.line(f'simulating the undamped mount, drawing {figure.name}'):
+            told.complaints += _complaint(
+                figure, lambda: _draw(figure, parameters, drive, figures, _undamped(recording, parameters))
+            )
         told.pictures += [figure] if figure.exists() else []
     return figures
 

@@ -1,0 +1,154 @@
+"""`engine-mount ls` and `info`: which recordings there are, and what one of them is."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from mount_cli.commands.options import JsonFile
+from mount_cli.completion.values import recordings
+from mount_cli.terminal import note, terminal
+
+if TYPE_CHECKING:
+    from mount_report.listing import Listed
+    from mount_report.recording_facts import RecordingFacts
+
+EPILOG = """Exit code: 0, also where a recording is damaged, which its line tells; 1 when a folder is
+not there.
+
+Examples:
+
+`engine-mount ls` - the recordings in bags, the newest first
+
+`engine-mount ls bags /data/drives --json recordings.json` - of several folders
+
+The verdict is that of the run's summary: what `drive` printed. A recording without one is `whole` when
+nothing of its files is missing; `engine-mount audit` tells more.
+"""
+
+INFO_EPILOG = """Exit code: 0 when the recording could be read, whatever it holds; 1 when not.
+
+Examples:
+
+`engine-mount info bags/2026-11-20_18-03-11_motorway`
+
+`engine-mount info RECORDING --json info.json`
+
+Parameters that a run sets by itself (bus, folder, lock-step) are left out. Whether a loss is an error is told
+by the exit code of `engine-mount audit`.
+"""
+
+
+def ls(
+    folders: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar='[FOLDER]...', help='folders of runs, or runs; default: bags'),
+    ] = None,
+    json_file: JsonFile = None,
+) -> None:
+    """List recordings: when, how long, what was driven, and whether anything was lost or went wrong."""
+    from mount_report.json_file import write_json
+    from mount_report.listing import listed
+
+    console = terminal()
+    places = folders or [Path('bags')]
+    missing = [str(place) for place in places if not place.exists()]
+    if missing:
+        raise ValueError(f'{", ".join(missing)}: no such folder; engine-mount drive makes bags')
+    found = listed(places)
+    if json_file is not None:
+        write_json({'recordings': [one.as_json() for one in found]}, json_file)
+    if not found:
+        console.print(f'no recordings in {", ".join(map(str, places))}', soft_wrap=True)
+    _print_listed(found, console)
+
+
+def _print_listed(found: 'list[Listed]', console: Console) -> None:
+    """Print two lines for each, so that paths stay whole in 80 columns."""
+    rows = [
+        (
+            f'{one.started:%Y-%m-%d %H:%M}' if one.started else '',
+            '' if one.duration is None else f'{one.duration:.1f} s',
+            one.scenario,
+            one.mode,
+            one.mount,
+            one.policy,
+        )
+        for one in found
+    ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for one, row in zip(found, rows, strict=True):
+        style = 'yellow' if one.sound is False else None
+        console.print(f'{one.path}: {one.verdict}', style=style, soft_wrap=True)
+        cells = [
+            text.rjust(width) if place == 1 else text.ljust(width)
+            for place, (text, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        console.print('  ' + '  '.join(cells).strip(), soft_wrap=True)
+
+
+def info(
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            help='folder of a run or of a recording, or one of its files', autocompletion=recordings
+        ),
+    ],
+    json_file: JsonFile = None,
+) -> None:
+    """Tell what a recording is and holds: session, versions, parameters, topics, gap, losses."""
+    from mount_bags.run.place import open_run
+    from mount_report.json_file import write_json
+    from mount_report.recording_facts import recording_facts
+
+    console = terminal()
+    with console.status('reading'):
+        facts = recording_facts(open_run(recording))
+    _print_facts(facts, console)
+    if json_file is not None:
+        write_json(facts.as_json(), json_file)
+
+
+def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
+    from mount_bags.run.versions import versions, versions_sentence
+    from mount_cli.screen import TerminalScreen
+    from mount_report.listing import duration_of, started_of
+
+    def tell(label: str, text: str) -> None:
+        console.print(f'{label:<20}{text}', soft_wrap=True)
+
+    opened, session = facts.recording, facts.session
+    started, duration = started_of(session, opened), duration_of(session, opened)
+    tell('recording', f'{opened.path}, {"whole" if opened.whole else "not whole"}')
+    tell('started', f'{started:%Y-%m-%d %H:%M:%S}' if started else 'unknown')
+    tell('duration', 'unknown' if duration is None else f'{duration:.3f} s')
+    replay = 'replay of ' if 'replay' in session else ''
+    driven = f'{replay}{session.get("scenario", "")}, {session.get("mode", "")}'
+    tell('session', driven if session else 'none: the recording does not tell what it is')
+    for mount, gap in facts.gaps.items():
+        texts = [f'{name} {_gap_text(gap, f"{name}_gap")}' for name in ('rest', 'contact')]
+        tell(f'gap {mount}'.strip(), ', '.join(texts))
+    if facts.versions:
+        named = ('mount_bringup', 'rclpy', 'python', 'numpy')
+        tell(
+            'versions',
+            ', '.join(f'{name} {facts.versions[name]}' for name in named if name in facts.versions),
+        )
+    if session:
+        console.print(versions_sentence(facts.others, versions()), soft_wrap=True)
+    marks = ', '.join(f'{kind}: {count}' for kind, count in facts.marks.items())
+    tell('marks', marks or 'none')
+    for label, text in facts.losses.rows():
+        tell(label, text.replace('\n', ' '))
+    screen = TerminalScreen(console)
+    if facts.changed:
+        screen.table(facts.parameters_table())
+    screen.table(facts.topics_table())
+    for warning in opened.warnings:
+        note(console, warning)
+
+
+def _gap_text(gap: dict[str, float], name: str) -> str:
+    value, std = (1e6 * gap.get(key, float('nan')) for key in (name, f'{name}_std'))
+    return f'{value:.1f} ± {std:.1f} µm'

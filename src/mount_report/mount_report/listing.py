@@ -1,0 +1,172 @@
+"""What recordings are, from what stands at the ends of their files: no message but the session is read."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from mount_bags.bag.metadata import METADATA_NAME
+from mount_bags.bag.recording import ReadingError, Recording
+from mount_bags.messages.series import SeriesError
+from mount_bags.run.folder import RunFolder
+from mount_bags.run.place import open_run
+from mount_bags.run.session import (
+    SessionError,
+    recorded_session,
+    recorded_sessions,
+    session_content,
+    session_parameters,
+    session_sample_rate,
+)
+
+_SOUND = 'nothing lost, no faults'
+_COUNTS = {
+    'lost_samples': 'samples lost',
+    'lost_messages': 'messages lost',
+    'unanswered_samples': 'samples unanswered',
+    'misdated_messages': 'messages misdated',
+    'faults': 'faults',
+    'restarts': 'nodes started again',
+}
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One recording; `started` with its zone, `duration` in s of its stamps, empty or None where unknown.
+
+    `sound` is None where no summary of a run tells whether anything was lost or went wrong.
+    """
+
+    path: Path
+    started: datetime | None = None
+    duration: float | None = None
+    scenario: str = ''
+    mode: str = ''
+    mount: str = ''
+    policy: str = ''
+    verdict: str = ''
+    sound: bool | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as JSON knows it: unknown is null."""
+        return {
+            'recording': str(self.path),
+            'started': self.started.isoformat() if self.started else None,
+            'duration_s': self.duration,
+            **{name: getattr(self, name) or None for name in ('scenario', 'mode', 'mount', 'policy')},
+            'verdict': self.verdict,
+            'sound': self.sound,
+        }
+
+
+def listed(folders: Sequence[Path]) -> list[Listed]:
+    """Return the recordings in `folders`, and those that these are themselves, the newest first."""
+    found = [listed_one(place) for folder in folders for place in _places(folder)]
+    return sorted(found, key=lambda one: one.started.timestamp() if one.started else 0.0, reverse=True)
+
+
+def listed_one(path: Path) -> Listed:
+    """Return what is known of the run or recording at `path`, as its verdict where it cannot be read."""
+    try:
+        recording = open_run(path)
+        content = told_session(recording)
+    except (ReadingError, OSError) as error:
+        return Listed(path, verdict=str(error), sound=False)
+    parameters = session_parameters(content)
+    verdict, sound = _verdict(path, recording)
+    return Listed(
+        path,
+        started_of(content, recording),
+        duration_of(content, recording),
+        _scenario(content),
+        str(content.get('mode', '')),
+        _mount(parameters),
+        str(parameters.get('mount_control', {}).get('policy', '')),
+        verdict,
+        sound,
+    )
+
+
+def told_session(recording: Recording) -> dict[str, Any]:
+    """Return the content of the session, of several mounts that of the first, {} where none can be read."""
+    try:
+        text = recorded_session(recording) or next(iter(recorded_sessions(recording).values()), '')
+        return session_content(text)
+    except (SessionError, SeriesError, ReadingError):
+        return {}
+
+
+def started_of(content: Mapping[str, Any], recording: Recording) -> datetime | None:
+    """Return when a run began: as its session tells, else when its first message came."""
+    try:
+        return datetime.fromisoformat(str(content['started'])).astimezone()
+    except (KeyError, ValueError):
+        times = recording.time_range
+    try:
+        return datetime.fromtimestamp(times[0] / 1e9).astimezone() if times else None
+    except (OverflowError, ValueError, OSError):
+        return None
+
+
+def duration_of(content: Mapping[str, Any], recording: Recording) -> float | None:
+    """Return the length in s: of the displacement by its rate, else from the first message to the last."""
+    counts = [recording.topics[f'/{mount}/displacement'.replace('//', '/')] for mount in recording.mounts]
+    samples = max((topic.message_count for topic in counts), default=0)
+    if samples:
+        return samples / session_sample_rate(content)
+    times = recording.time_range
+    return (times[1] - times[0]) / 1e9 if times else None
+
+
+def _places(folder: Path) -> Iterator[Path]:
+    """Return the runs and recordings that `folder` is or holds."""
+    if _is_one(folder) or not folder.is_dir():
+        yield folder
+        return
+    yield from sorted(path for path in folder.iterdir() if _is_one(path))
+
+
+def _is_one(path: Path) -> bool:
+    inside = RunFolder(path).recording
+    if path.is_file():
+        return path.suffix == '.mcap'
+    return any((place / METADATA_NAME).is_file() or any(place.glob('*.mcap')) for place in (path, inside))
+
+
+def _mount(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the simulated mounts: their places, of one its name; empty in a car."""
+    told = parameters.get('mount_sim', {})
+    if not told or told.get('mounts') or told.get('mount'):
+        return str(told.get('mounts') or told.get('mount', ''))
+    from mount_bringup.mount_choice import (
+        seat_of,
+    )  # takes half a second to load, for a run that names no mount
+
+    return seat_of(parameters)
+
+
+def _scenario(content: Mapping[str, Any]) -> str:
+    scenario = str(content.get('scenario', ''))
+    return f'replay of {scenario}'.strip() if 'replay' in content else scenario
+
+
+def _verdict(path: Path, recording: Recording) -> tuple[str, bool | None]:
+    """Return what the summary of the run says, else whether the recording is whole."""
+    if not recording.whole:
+        return 'not whole', False
+    try:
+        figures = json.loads(RunFolder(path).summary.read_text(encoding='utf-8'))
+    except (OSError, ValueError):
+        return 'whole', None
+    parts = list(figures.get('mounts', {}).values()) or [figures] if isinstance(figures, dict) else []
+    if not any('lost_samples' in part for part in parts):
+        return 'whole', None
+    counts = {name: sum(_count(part.get(name)) for part in parts) for name in _COUNTS}
+    wrong = [f'{_COUNTS[name]}: {count}' for name, count in counts.items() if count]
+    return ', '.join(wrong) or _SOUND, not wrong
+
+
+def _count(value: Any) -> int:
+    return len(value) if isinstance(value, list) else value if isinstance(value, int) else 0
