@@ -1,6 +1,6 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
-`python test/docs/parameters_page.py` renews the page; `test_parameters.py` holds it against the code.
+`python test/docs/parameters_page.py` renews the page; `test_generated_pages.py` holds it against the code.
 """
 
 import math

@@ -41,9 +41,8 @@ def test_the_commands_of_a_page_do_what_it_says(page, tmp_path, domain):
         'COLUMNS': '80',
         'NO_COLOR': '1',
     }
-    for command, shown, code in [
-        step for block in blocks(page, *LANGUAGES) for step in steps(block, tmp_path)
-    ]:
+    every = blocks(page, *LANGUAGES)  # one by one: a script without a name is there until the next one
+    for command, shown, code in (step for block in every for step in steps(block, tmp_path)):
         if run_elsewhere(command):
             continue
         ended = subprocess.run(
