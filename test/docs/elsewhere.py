@@ -25,6 +25,7 @@ ELSEWHERE = {
     'ros2 topic hz /mount_right/': _HARDWARE,
     'ros2 topic echo': _HARDWARE,
     'ros2 launch mount_bringup vehicle.launch.py': _LAUNCH,
+    'ros2 launch mount_bringup sim.launch.py': _LAUNCH,
     'ros2 service call /mount_right/mount_recorder/mark': _RECORD,
     'ros2 topic pub --once /mount_right/event': _RECORD,
     'ros2 param set /mount_right/mount_control': _SET,

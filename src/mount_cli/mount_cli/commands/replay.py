@@ -11,7 +11,7 @@ from mount_cli.terminal import terminal
 
 EPILOG = """Examples:
 
-`engine-mount replay bags/2026-11-20_18-03-11_motorway/recording` - equal to what was recorded?
+`engine-mount replay bags/first/recording` - equal to what was recorded?
 
 `engine-mount replay RECORDING --lockstep` - the same through the real nodes over topics
 
