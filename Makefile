@@ -26,7 +26,7 @@ RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test check faults experiments identify bench lint format setup setup-dev clean
+.PHONY: help drive test check faults experiments identify pages bench lint format setup setup-dev clean
 
 help: ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
@@ -57,6 +57,9 @@ identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes
 	@$(BIN)/engine-mount calibrate actuator $(RACK)/force.csv --name default --out $(RACK)/default.yaml
 	@$(BIN)/engine-mount calibrate inductance $(RACK)/ripple_*.csv --base $(RACK)/default.yaml --out $(RACK)/default.yaml
 	@$(BIN)/engine-mount identify friction --step sawtooth --train $(RACK)/friction_ramp.csv $(RACK)/friction_[46]0N.csv $(RACK)/friction_1?0N.csv --held-out $(RACK)/friction_80N.csv --base $(RACK)/default.yaml --out $(SPECIMEN)
+
+pages: $(VENV)/.ready-dev ## write the pages of docs/reference that come from the code, and what the notebooks show
+	@for page in commands_page names_page parameters_page signals_page notebooks; do $(BIN)/python test/docs/$$page.py || exit 1; done
 
 bench: $(VENV)/.ready ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench

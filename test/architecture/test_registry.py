@@ -9,13 +9,11 @@ from pathlib import Path
 
 import pytest
 import typer
-from cantools.database.can import Database
 
 from mount_bringup.graph.nodes import SIMULATED
 from mount_cli.command import app
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
-from mount_driver.codec import DATABASE_FILE
 from mount_models.actuator.closing import ClosingMechanics
 from mount_models.actuator.law import ForceLaw
 from mount_models.actuator.reluctance import ReluctanceActuator
@@ -144,26 +142,6 @@ def test_the_graph_waits_for_registered_topics():
     assert needed <= {topic.name for topic in TOPICS}
 
 
-@pytest.mark.parametrize('message', ['MountMeasurement', 'MountSetpoint', 'MountStatus'])
-def test_interface_lists_the_signals_of_the_dbc(message):
-    database = Database()
-    database.add_dbc_file(DATABASE_FILE)
-    signals = sorted(database.get_message_by_name(message).signals, key=lambda signal: signal.start)
-    listed = [
-        (row['signal'], row['bits'], float(row['step']), row['unit'], row['range']) for row in table(message)
-    ]
-    assert listed == [
-        (
-            signal.name,
-            bits(signal.start, signal.length),
-            float(signal.scale),
-            signal.unit or '1',
-            f'{signal.minimum} .. {signal.maximum}',
-        )
-        for signal in signals
-    ]
-
-
 def test_interface_lists_the_figures_of_a_drive():
     source = ast.parse((SOURCES / 'mount_report/mount_report/drive/summary.py').read_text())
     function = next(
@@ -216,10 +194,6 @@ def table(heading: str, file: str = 'docs/reference/interface.md') -> list[dict[
         if not line.startswith('|---')
     ]
     return [dict(zip(header, row, strict=True)) for row in rows]
-
-
-def bits(start: int, length: int) -> str:
-    return f'{start}' if length == 1 else f'{start}..{start + length - 1}'
 
 
 def names(cell: str) -> set[str]:

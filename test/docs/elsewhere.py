@@ -1,6 +1,7 @@
 """Commands of pages that their test does not run as they stand, and what runs them instead."""
 
 _INSTALLATION = 'on a ROS 2 installation; test/architecture/test_car.py holds what it installs and loads'
+_HARDWARE = 'by nobody: with a CAN FD adapter and the electronics of a mount'
 _LAUNCH = 'on a ROS 2 installation; test/graph/test_drive.py drives the same nodes'
 _RECORD = 'beside a running graph in test/graph/test_recording.py'
 _VIEW = 'with clients of its own in src/mount_view/test'
@@ -17,19 +18,27 @@ ELSEWHERE = {
     'rosdep install': _INSTALLATION,
     'python3 -m pip install': _INSTALLATION,
     'colcon build': _INSTALLATION,
-    'ip link set': _INSTALLATION,
+    'ip link set': _HARDWARE,
+    'ip -details': _HARDWARE,
+    'candump': _HARDWARE,
+    'ros2 run mount_driver': _HARDWARE,
+    'ros2 lifecycle set /mount_right/': _HARDWARE,
+    'ros2 topic hz /mount_right/': _HARDWARE,
+    'ros2 topic echo': _HARDWARE,
     'ros2 launch mount_bringup vehicle.launch.py': _LAUNCH,
+    'ros2 launch mount_bringup sim.launch.py': _LAUNCH,
     'ros2 service call /mount_right/mount_recorder/mark': _RECORD,
     'ros2 topic pub --once /mount_right/event': _RECORD,
     'ros2 param set /mount_right/mount_control': _SET,
     'engine-mount record --': _RECORD,
     'engine-mount view': _VIEW,
     'engine-mount status': _VIEW,
-    'engine-mount identify friction': 'it takes long; src/mount_cli/test/test_identify_friction.py',
+    'engine-mount identify friction --train': 'it takes long; src/mount_cli/test/test_identify_friction.py',
 }
 """{beginning of the commands: where they are run}."""
 
 STAND_INS = {
+    'make drive': 'engine-mount drive --core',
     "make drive DRIVE_OPTIONS='--out bags/first'": 'engine-mount drive --core --out bags/first',
 }
 """{command: what the test of the page runs in its place}."""

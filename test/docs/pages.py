@@ -32,9 +32,9 @@ def name_of(page: Path) -> str:
 
 
 def blocks(page: Path, *languages: str) -> Iterator[Block]:
-    """Return the blocks of a page in these languages, in their order."""
+    """Return the blocks of a page in these languages, or in all where none is named, in their order."""
     for language, text in _BLOCK.findall(page.read_text(encoding='utf-8')):
-        if language in languages:
+        if language in languages or not languages:
             yield Block(language, text)
 
 

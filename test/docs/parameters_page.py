@@ -1,7 +1,7 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
 `python test/docs/parameters_page.py` renews the page, and the names that a shell offers behind Tab, which
-hold them too; `test_parameters.py` holds the page against the code.
+hold them too; `test_generated_pages.py` holds the page against the code.
 """
 
 import math

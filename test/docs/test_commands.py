@@ -22,12 +22,12 @@ from typer.core import TyperCommand, TyperGroup
 
 from mount_cli.command import app
 
-LANGUAGES = ('sh', 'console', 'python', 'yaml', 'dosini', '')
+LANGUAGES = ('sh', 'console', 'python')
 LIMIT = 240.0  # s: only a hang takes so long
 STATUS = 'echo $?'
 COMMAND = re.compile(r'(?:^(?:\$ )?|`)(?:\.venv/bin/)?engine-mount ((?:[^`\n\\]|\\\n)*)', re.MULTILINE)
 WRITTEN = ('docs/explanation/recorded_drive.md',)  # by a command; it needs a recording that is not shipped
-RUN = [page for page in GUIDES if any(blocks(page, 'sh', 'console', 'python'))]
+RUN = [page for page in GUIDES if any(blocks(page, *LANGUAGES))]
 
 
 @pytest.mark.parametrize('page', RUN, ids=name_of)
@@ -41,9 +41,8 @@ def test_the_commands_of_a_page_do_what_it_says(page, tmp_path, domain):
         'COLUMNS': '80',
         'NO_COLOR': '1',
     }
-    for command, shown, code in [
-        step for block in blocks(page, *LANGUAGES) for step in steps(block, tmp_path)
-    ]:
+    every = blocks(page, *LANGUAGES)  # one by one: a script without a name is there until the next one
+    for command, shown, code in (step for block in every for step in steps(block, tmp_path)):
         if run_elsewhere(command):
             continue
         ended = subprocess.run(
@@ -62,10 +61,15 @@ def test_the_commands_of_a_page_do_what_it_says(page, tmp_path, domain):
 
 @pytest.mark.parametrize('page', [page for page in PAGES if name_of(page) not in WRITTEN], ids=name_of)
 def test_no_command_stands_in_a_block_that_is_not_run(page):
-    for block in blocks(page, *LANGUAGES):
-        if block.language in ('', 'yaml'):
+    for block in blocks(page):
+        if block.language not in ('sh', 'console', 'python'):
             commands = re.findall(r'^(?:\$ |make |engine-mount |ros2 ).*', block.text, re.MULTILINE)
             assert commands == [], 'mark the block as sh or console'
+
+
+@pytest.mark.parametrize('page', PAGES, ids=name_of)
+def test_no_page_names_a_folder_by_the_time_at_which_it_was_made(page):
+    assert re.findall(r'\d{4}-\d\d-\d\d_\d\d', page.read_text(encoding='utf-8')) == []
 
 
 @pytest.mark.parametrize('page', PAGES, ids=name_of)

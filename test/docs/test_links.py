@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from notebooks import NOTEBOOKS, read
 from pages import PAGES, REPOSITORY, anchors, name_of, without_blocks
 
 DOCS = REPOSITORY / 'docs'
@@ -12,7 +13,18 @@ LINK = re.compile(r'\[[^\]]*\]\(([^)\s]+)\)')
 
 @pytest.mark.parametrize('page', PAGES, ids=name_of)
 def test_every_link_leads_to_a_file_and_a_heading_of_it(page):
-    for target in LINK.findall(without_blocks(page)):
+    assert_links_lead_somewhere(without_blocks(page), page)
+
+
+@pytest.mark.parametrize('notebook', NOTEBOOKS, ids=name_of)
+def test_every_link_of_a_notebook_does_too(notebook):
+    texts = [cell.source for cell in read(notebook).cells if cell.cell_type == 'markdown']
+    assert LINK.findall('\n'.join(texts))
+    assert_links_lead_somewhere('\n'.join(texts), notebook)
+
+
+def assert_links_lead_somewhere(text, page):
+    for target in LINK.findall(text):
         if target.startswith('https://'):
             continue
         path, _, anchor = target.partition('#')
@@ -28,7 +40,8 @@ def test_every_page_that_is_named_without_a_link_exists(page):
 
 
 def test_every_page_is_of_one_kind_and_stands_in_the_index_once():
-    pages = {page.relative_to(DOCS).as_posix() for page in DOCS.rglob('*.md')} - {'README.md'}
+    files = [*DOCS.rglob('*.md'), *DOCS.rglob('*.ipynb')]
+    pages = {page.relative_to(DOCS).as_posix() for page in files} - {'README.md'}
     assert {page.split('/')[0] for page in pages} == KINDS
     index = [target for target in LINK.findall((DOCS / 'README.md').read_text()) if target[0] != '.']
     assert sorted(index) == sorted(pages)

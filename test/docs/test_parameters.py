@@ -1,15 +1,11 @@
-"""The list of parameters is that of the nodes."""
+"""Every parameter of a node stands in the README of its package."""
 
 import re
 
 from pages import REPOSITORY
-from parameters_page import PAGE, README, page
+from parameters_page import README
 
 from mount_bringup.settings import defaults_of_nodes
-
-
-def test_the_page_of_parameters_is_what_the_code_declares():
-    assert PAGE.read_text(encoding='utf-8') == page(), 'python test/docs/parameters_page.py renews it'
 
 
 def test_every_parameter_stands_in_the_readme_of_its_package_or_in_one_of_a_set():

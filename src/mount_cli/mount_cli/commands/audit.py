@@ -14,7 +14,7 @@ control left samples without a setpoint, on faults, or when nothing can be read.
 
 Examples:
 
-`engine-mount audit bags/2026-11-20_18-03-11_motorway/recording`
+`engine-mount audit bags/first/recording`
 
 `engine-mount audit /data/rosbag2_2024_05_02 --json audit.json` - any rosbag2 recording
 

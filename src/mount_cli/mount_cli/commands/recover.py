@@ -16,7 +16,7 @@ command.
 
 Examples:
 
-`engine-mount recover bags/2026-11-20_18-03-11_motorway/recording`
+`engine-mount recover bags/first/recording`
 
 `engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
 

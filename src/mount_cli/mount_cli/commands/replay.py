@@ -15,7 +15,7 @@ they are not, or the order was refused.
 
 Examples:
 
-`engine-mount replay bags/2026-11-20_18-03-11_motorway/recording` - equal to what was recorded?
+`engine-mount replay bags/first/recording` - equal to what was recorded?
 
 `engine-mount replay RECORDING --lockstep` - the same through the real nodes over topics
 

@@ -14,7 +14,7 @@ or written.
 
 Examples:
 
-`engine-mount report bags/2026-11-20_18-03-11_motorway` - beside the recording, in its run folder
+`engine-mount report bags/first` - beside the recording, in its run folder
 
 `engine-mount report bags/first --compare bags/second --out difference.html` - and what is different
 

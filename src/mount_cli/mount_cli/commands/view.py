@@ -15,7 +15,7 @@ Examples:
 
 `engine-mount view` - beside a running drive: a page at localhost, and a server for Foxglove and Lichtblick
 
-`engine-mount view bags/2026-11-20_18-03-11_motorway --rate 0.2` - a recording, five times slower
+`engine-mount view bags/first --rate 0.2` - a recording, five times slower
 
 `engine-mount view --host 0.0.0.0` - from a phone in the same network: with the token that is printed
 
