@@ -16,6 +16,7 @@ ELSEWHERE = {
     'rosdep install': _INSTALLATION,
     'python3 -m pip install': _INSTALLATION,
     'colcon build': _INSTALLATION,
+    'ros2 run mount_bringup mount_prepare': 'by src/mount_bringup/test/test_prepare.py',
     'ip link set': _INSTALLATION,
     'ros2 launch mount_bringup vehicle.launch.py': _LAUNCH,
     'ros2 service call /mount_right/mount_recorder/mark': _RECORD,

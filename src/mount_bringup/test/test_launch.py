@@ -16,7 +16,7 @@ from mount_bringup.graph.domain import DomainError
 
 PACKAGE = Path(mount_bringup.__file__).parents[1]
 MODULES = ('launch', 'launch.actions', 'launch.event_handlers', 'launch.events', 'launch.events.process',
-           'launch_ros', 'launch_ros.actions')  # fmt: skip
+           'launch.logging', 'launch_ros', 'launch_ros.actions')  # fmt: skip
 
 
 class Launched:

@@ -676,7 +676,7 @@ def test_a_parameter_of_another_policy_is_told_as_a_warning(make_control, monkey
     told = []
     for values in ({'quality': 0.7}, {'continuous_viscous.quality': 0.7}, {'quality': 1.0}):
         control = make_control(policy='continuous_viscous', **values)
-        warned = types.SimpleNamespace(warning=told.append)
+        warned = types.SimpleNamespace(warning=told.append, info=print)
         monkeypatch.setattr(control, 'get_logger', lambda warned=warned: warned)
         assert control.trigger_configure() == SUCCESS
     assert len(told) == 1

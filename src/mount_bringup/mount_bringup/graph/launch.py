@@ -16,6 +16,7 @@ from launch.actions import DeclareLaunchArgument, EmitEvent, LogInfo, OpaqueFunc
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
+from launch.logging import get_logger
 from launch_ros.actions import Node
 
 from mount_bringup.graph.composed import COMPOSED
@@ -25,6 +26,7 @@ from mount_bringup.graph.nodes import GraphNode, groups
 from mount_bringup.graph.order import LaunchArgument, LaunchOrder, launch_order
 from mount_bringup.graph.processes import node_environment, parameter_text
 from mount_bringup.graph.restarts import restartable
+from mount_models.arithmetic.compiled import compilation_told
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
@@ -55,7 +57,8 @@ def _graph(
     nodes: Sequence[GraphNode], arguments: Sequence[LaunchArgument], context: LaunchContext
 ) -> list[LaunchDescriptionEntity]:
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
-    order = launch_order(nodes, arguments, given)
+    with compilation_told(get_logger('mount_bringup').info):  # the checks compute with the laws
+        order = launch_order(nodes, arguments, given)
     inherited = drop_real_time()
     priority = order.settings.priority or inherited
     held = contextlib.ExitStack()  # until the last process has ended
