@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 
 import mount_bringup
+from mount_bringup.graph.arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_bringup.graph.domain import can_port
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.nodes import RECORDER, SIMULATED, VEHICLE
-from mount_bringup.graph.order import SIM_ARGUMENTS, VEHICLE_ARGUMENTS, launch_order
+from mount_bringup.graph.order import launch_order
 from mount_models.quantity import ParameterError
 
 CONFIG = Path(mount_bringup.__file__).parents[1] / 'config'
@@ -118,3 +119,19 @@ def test_a_simulator_is_no_node_of_the_car(tmp_path):
     file.write_text('/**/mount_sim: {ros__parameters: {seed: 2}}')
     with pytest.raises(ParameterError, match='is no node of the graph'):
         vehicle(config=str(file))
+
+
+def test_the_can_bus_of_a_vehicle_stands_in_its_file_and_an_argument_wins(tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text('/**/mount_driver: {ros__parameters: {interface: kvaser, channel: can3}}')
+    driver = vehicle(config=str(file)).settings.parameters['mount_driver']
+    assert (driver['interface'], driver['channel']) == ('kvaser', 'can3')
+    assert vehicle(config=str(file), channel='can4').settings.parameters['mount_driver']['channel'] == 'can4'
+    file.write_text('/**/mount_control: {ros__parameters: {highest_current: 2.0}}')
+    driver = vehicle(config=str(file)).settings.parameters['mount_driver']
+    assert (driver['interface'], driver['channel']) == ('socketcan', 'can0')
+
+
+def test_a_missing_config_file_is_refused(tmp_path):
+    with pytest.raises(ParameterError, match=r'parameter file .*/none.yaml'):
+        sim(config=str(tmp_path / 'none.yaml'))
