@@ -120,3 +120,25 @@ VEHICLE_ARGUMENTS = (
     LaunchArgument('duration', 's after which the graph ends; empty: when it is told to end'),
 )
 """The arguments of the graph in the car, besides `config`."""
+
+_OF_RECORDED = ('policy', 'damper', 'parameters_file', 'specimen')
+_OF_REPLAY = ('record', 'recording', 'priority', 'log_level')
+
+REPLAY_ARGUMENTS = (
+    LaunchArgument('bag', 'recorded drive that is played to the control: its folder; must be given'),
+    LaunchArgument(
+        'config', 'parameter file; what neither it nor an argument sets is as recorded; empty: none'
+    ),
+    LaunchArgument(
+        'namespace',
+        'mount of the recorded drive, and where it is replayed, such as mount_right; empty: its only one',
+    ),
+    LaunchArgument('rate', 'how fast it is played; 1: as fast as it was recorded', default='1'),
+    *(
+        argument._replace(meaning=f'{argument.meaning.partition("; empty:")[0]}; empty: as recorded')
+        for argument in _ANY
+        if argument.name in _OF_RECORDED
+    ),
+    *(argument for argument in _ANY if argument.name in _OF_REPLAY),
+)
+"""The arguments of a replay."""
