@@ -1,6 +1,6 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
-`python test/docs/parameters_page.py` renews the page; `test_parameters.py` holds it against the code.
+`python test/docs/parameters_page.py` renews the page, and the file of `vehicle_file.py`; `test_parameters.py` holds it against the code.
 """
 
 import math
@@ -79,4 +79,7 @@ def row(name: str, default: Any, note: Quantity | None) -> str:
 
 
 if __name__ == '__main__':
+    from vehicle_file import FILE, text  # which is made of the same sets
+
     PAGE.write_text(page(), encoding='utf-8')
+    FILE.write_text(text(), encoding='utf-8')

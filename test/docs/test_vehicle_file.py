@@ -5,7 +5,7 @@ import re
 import pytest
 from vehicle_file import FILE, text
 
-from mount_bringup.graph.arguments import VEHICLE_ARGUMENTS
+from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS
 from mount_bringup.graph.nodes import VEHICLE
 from mount_bringup.graph.order import launch_order
 from mount_bringup.settings import defaults_of_nodes
@@ -24,7 +24,7 @@ def ordered(monkeypatch):
 
 
 def test_the_file_is_what_the_code_declares():
-    assert FILE.read_text(encoding='utf-8') == text(), 'python test/docs/vehicle_file.py renews it'
+    assert FILE.read_text(encoding='utf-8') == text(), 'python test/docs/parameters_page.py renews it'
 
 
 def test_every_line_may_be_set_and_gives_the_default(ordered, tmp_path):

@@ -1,6 +1,6 @@
 """Writes src/mount_bringup/config/vehicle.yaml: every setting of a vehicle, explained, most of them at rest.
 
-`python test/docs/vehicle_file.py` renews the file; `test_vehicle_file.py` holds it against the declarations.
+`python test/docs/parameters_page.py` renews the file; `test_vehicle_file.py` holds it against the declarations.
 """
 
 import math
@@ -75,7 +75,3 @@ def _meaning(name: str, note: Quantity | None) -> str:
         return TEXTS[name]
     limits = f' {note.low:g} .. {note.high:g}' if note.low > -math.inf else ''
     return f'{note.unit}{limits}: {note.meaning}'
-
-
-if __name__ == '__main__':
-    FILE.write_text(text(), encoding='utf-8')

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from mount_bags.bag.recording import open_recording
-from mount_bringup.graph.arguments import REPLAY_ARGUMENTS
+from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.processes import node_environment, parameter_text
 from mount_bringup.graph.replay_order import replay_order

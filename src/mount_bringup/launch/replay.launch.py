@@ -2,8 +2,8 @@
 
 from launch import LaunchDescription
 
-from mount_bringup.graph.arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.launch import launch_description
+from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.replay_order import replay_order
 
 

@@ -2,8 +2,8 @@
 
 from launch import LaunchDescription
 
-from mount_bringup.graph.arguments import SIM_ARGUMENTS
 from mount_bringup.graph.launch import graph_description
+from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS
 from mount_bringup.graph.nodes import SIMULATED
 
 

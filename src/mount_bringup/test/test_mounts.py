@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import mount_bringup
-from mount_bringup.graph.arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
+from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_bringup.graph.matches import unmatched
 from mount_bringup.graph.nodes import (
     CONTROL,

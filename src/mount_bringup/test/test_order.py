@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 import mount_bringup
-from mount_bringup.graph.arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_bringup.graph.domain import can_port
+from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.nodes import RECORDER, SIMULATED, VEHICLE
 from mount_bringup.graph.order import launch_order
@@ -135,3 +135,23 @@ def test_the_can_bus_of_a_vehicle_stands_in_its_file_and_an_argument_wins(tmp_pa
 def test_a_missing_config_file_is_refused(tmp_path):
     with pytest.raises(ParameterError, match=r'parameter file .*/none.yaml'):
         sim(config=str(tmp_path / 'none.yaml'))
+
+
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        (
+            '/**/mount_sim: {ros__parameters: {mount_left.sample_rate: 2000.0}}',
+            "'sample_rate' is common to all mounts: set it without mount_left",
+        ),
+        (
+            '/left/mount_control: {ros__parameters: {sample_rate: 2000.0}}',
+            r'mount_control.sample_rate \(2000 Hz\) must equal mount_driver.sample_rate \(1000 Hz\); set one',
+        ),
+    ],
+)
+def test_a_sample_rate_of_one_mount_alone_is_refused(tmp_path, text, sentence):
+    file = tmp_path / 'own.yaml'
+    file.write_text(text)
+    with pytest.raises(ParameterError, match=sentence):
+        sim(config=str(file), mounts='left,right')

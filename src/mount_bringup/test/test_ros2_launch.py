@@ -13,7 +13,7 @@ import pytest
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
 from mount_bags.bag.recording import open_recording
-from mount_bringup.graph.arguments import REPLAY_ARGUMENTS, SIM_ARGUMENTS, VEHICLE_ARGUMENTS
+from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS, SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_ros.testing import wait_until
 
 LIMIT = 240.0  # s: only a hang takes so long

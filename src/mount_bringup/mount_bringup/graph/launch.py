@@ -19,9 +19,9 @@ from launch.events.process import ProcessExited
 from launch.logging import get_logger
 from launch_ros.actions import Node
 
-from mount_bringup.graph.arguments import LaunchArgument
 from mount_bringup.graph.composed import COMPOSED
 from mount_bringup.graph.domain import domain_locks
+from mount_bringup.graph.launch_arguments import LaunchArgument
 from mount_bringup.graph.launched import SUPERVISOR, arguments_of, exit_error
 from mount_bringup.graph.nodes import GraphNode, groups
 from mount_bringup.graph.order import LaunchOrder, launch_order

@@ -1,4 +1,4 @@
-"""What a launch file takes from the user, and the graph that this makes; `ros2 launch` is not needed here."""
+"""The graph that the arguments of a launch file order; `ros2 launch` is not needed here."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control, control_parameters
-from mount_bringup.graph.arguments import POLICY_OF_DAMPER, LaunchArgument
 from mount_bringup.graph.domain import can_port, chosen_domain
+from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, LaunchArgument
 from mount_bringup.graph.nodes import (
     CONTROL,
     DRIVER,

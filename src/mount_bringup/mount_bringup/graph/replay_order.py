@@ -8,8 +8,8 @@ from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_place
 from mount_bags.run.session import recorded_session, session_content, session_parameters
 from mount_bringup.chosen import chosen_control, with_recorded_policy
-from mount_bringup.graph.arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.domain import chosen_domain
+from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.nodes import CONTROL, RECORDER, REPLAYED, GraphSettings
 from mount_bringup.graph.order import LaunchOrder, check_damper, known_parameters, number_of, of_arguments
 from mount_bringup.graph.player import PLAYED
