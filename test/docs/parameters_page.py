@@ -1,6 +1,7 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
-`python test/docs/parameters_page.py` renews the page, and the file of `vehicle_file.py`; `test_parameters.py` holds it against the code.
+`python test/docs/parameters_page.py` renews the page, and the file of `vehicle_file.py`; tests hold both
+against the code.
 """
 
 import math

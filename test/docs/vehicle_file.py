@@ -1,6 +1,6 @@
 """Writes src/mount_bringup/config/vehicle.yaml: every setting of a vehicle, explained, most of them at rest.
 
-`python test/docs/parameters_page.py` renews the file; `test_vehicle_file.py` holds it against the declarations.
+`python test/docs/parameters_page.py` renews the file; `test_vehicle_file.py` holds it against the code.
 """
 
 import math
