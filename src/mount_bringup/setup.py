@@ -23,6 +23,7 @@ setup(
         'console_scripts': [
             'mount_supervisor = mount_bringup.graph.launched:main',
             'mount_composed = mount_bringup.graph.composed:main',
+            'mount_prepare = mount_bringup.prepare:main',
         ]
     },
 )

@@ -13,11 +13,11 @@ from sources import PACKAGES, REPOSITORY, SOURCES, modules_of
 from mount_bringup.graph.nodes import SIMULATED
 from mount_ros.topics import RACK_TOPICS, TOPICS
 
-LAUNCH_COMMAND = 'ros2launch'
+COMMANDS = {'ros2launch', 'ros2bag', 'rosbag2_storage_mcap'}  # called by their name
 UNSEEN = {  # what is needed without an import that can be seen
     'mount_ros': {topic.type.split('/')[0] for topic in TOPICS + RACK_TOPICS},
     'mount_driver': {'msgpack'},  # of python-can, for frames by multicast
-    'mount_bringup': {LAUNCH_COMMAND} | {node.package for node in SIMULATED},
+    'mount_bringup': COMMANDS | {node.package for node in SIMULATED},
 }
 
 
@@ -68,7 +68,7 @@ def keys(modules: Iterable[str]) -> set[str]:
     """Return the names in package.xml; what rosdep does not know has none."""
     libraries = {module: LIBRARIES[module].key for module in modules if module in LIBRARIES}
     others = set(modules) - set(libraries)
-    unknown = others - ROS - set(PACKAGES) - {LAUNCH_COMMAND}
+    unknown = others - ROS - set(PACKAGES) - COMMANDS
     assert not unknown, f'{unknown}: say in libraries.py where an installation gets them from'
     return others | {key for key in libraries.values() if key}
 

@@ -1,7 +1,7 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
-`python test/docs/parameters_page.py` renews the page, and the names that a shell offers behind Tab, which
-hold them too; `test_generated_pages.py` holds the page against the code.
+`python test/docs/parameters_page.py` renews the page, the file of `vehicle_file.py`, and the names that a shell
+offers behind Tab, which hold them too; tests hold all three against the code.
 """
 
 import math
@@ -80,5 +80,8 @@ def row(name: str, default: Any, note: Quantity) -> str:
 
 
 if __name__ == '__main__':
+    from vehicle_file import FILE, text  # which is made of the same sets
+
     PAGE.write_text(page(), encoding='utf-8')
     NAMES.write_text(collected(), encoding='utf-8')
+    FILE.write_text(text(), encoding='utf-8')

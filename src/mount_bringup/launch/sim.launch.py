@@ -2,10 +2,10 @@
 
 from launch import LaunchDescription
 
-from mount_bringup.graph.launch import launch_description
+from mount_bringup.graph.launch import graph_description
 from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS
 from mount_bringup.graph.nodes import SIMULATED
 
 
 def generate_launch_description() -> LaunchDescription:
-    return launch_description(SIMULATED, SIM_ARGUMENTS, 'sim.yaml')
+    return graph_description(SIMULATED, SIM_ARGUMENTS, 'sim.yaml')

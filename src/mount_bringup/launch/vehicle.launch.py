@@ -2,10 +2,10 @@
 
 from launch import LaunchDescription
 
-from mount_bringup.graph.launch import launch_description
+from mount_bringup.graph.launch import graph_description
 from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS
 from mount_bringup.graph.nodes import VEHICLE
 
 
 def generate_launch_description() -> LaunchDescription:
-    return launch_description(VEHICLE, VEHICLE_ARGUMENTS, 'vehicle.yaml')
+    return graph_description(VEHICLE, VEHICLE_ARGUMENTS, 'vehicle.yaml')

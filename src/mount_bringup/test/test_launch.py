@@ -16,7 +16,7 @@ from mount_bringup.graph.domain import DomainError
 
 PACKAGE = Path(mount_bringup.__file__).parents[1]
 MODULES = ('launch', 'launch.actions', 'launch.event_handlers', 'launch.events', 'launch.events.process',
-           'launch_ros', 'launch_ros.actions')  # fmt: skip
+           'launch.logging', 'launch_ros', 'launch_ros.actions')  # fmt: skip
 
 
 class Launched:
@@ -63,10 +63,22 @@ def launch(monkeypatch):
     sys.modules.pop('mount_bringup.graph.launch')
 
 
-@pytest.mark.parametrize('name', ['sim', 'vehicle'])
-def test_every_argument_has_a_description_and_the_common_ones_are_there(launch, name):
-    launched = Launched(launch, name, recording='bags/first')
+REPLAYED = str(Path(__file__).resolve().parents[3] / 'bags' / 'reference' / 'gap')
+
+
+@pytest.mark.parametrize('given', [{'name': 'sim'}, {'name': 'vehicle'}, {'name': 'replay', 'bag': REPLAYED}])
+def test_every_argument_has_a_description(launch, given):
+    launched = Launched(launch, recording='bags/first', **given)
     assert all(declared['description'] for declared in launched.declared.values())
+    assert {'namespace', 'config', 'record', 'recording', 'policy', 'priority', 'log_level'} < set(
+        launched.declared
+    )
+    launched.end_all()
+
+
+@pytest.mark.parametrize('name', ['sim', 'vehicle'])
+def test_the_graph_takes_the_common_arguments(launch, name):
+    launched = Launched(launch, name, recording='bags/first')
     assert {
         'namespace', 'config', 'record', 'recording', 'policy', 'damper', 'parameters_file', 'specimen',
         'port', 'duration', 'priority', 'composed', 'restarts', 'log_level',
@@ -150,6 +162,22 @@ def test_composed_nodes_share_a_process_with_the_parameters_of_each_until_all_ha
     assert launched.end('mount_composed', -9) is None
     launched.end_all()
     assert not file.exists()
+
+
+@pytest.mark.parametrize('name', ['sim', 'vehicle'])
+def test_a_missing_config_file_is_refused_before_a_process_starts(launch, name):
+    with pytest.raises(ValueError, match=r'parameter file /nowhere/car.yaml'):
+        Launched(launch, name, record='false', config='/nowhere/car.yaml')
+    assert not launch.Node.called
+
+
+def test_a_replay_starts_the_control_and_a_supervisor_that_plays_and_whose_end_is_the_end(launch):
+    launched = Launched(launch, 'replay', bag=REPLAYED, record='false')
+    assert list(launched.processes) == ['mount_control', 'mount_supervisor']
+    assert not launched.processes['mount_control']['respawn']
+    assert f'--bag={REPLAYED}' in launched.processes['mount_supervisor']['arguments']
+    assert launched.end('mount_supervisor', 0) is launch.EmitEvent.return_value
+    launched.end_all()
 
 
 def test_the_end_of_a_drive_ends_launch_as_a_success(launch):

@@ -1,7 +1,10 @@
 """The mounts of a car: what holds for each, nodes in namespaces, launch arguments."""
 
+from pathlib import Path
+
 import pytest
 
+import mount_bringup
 from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_bringup.graph.matches import unmatched
 from mount_bringup.graph.nodes import (
@@ -28,6 +31,8 @@ SETTINGS = {
     'mount_control': {'highest_current': 2.0, 'longest_bridge': 3},
     'left/mount_control': {'highest_current': 1.0},
 }
+
+EXAMPLE = Path(mount_bringup.__file__).parents[1] / 'config' / 'two_mounts.yaml'
 
 
 def names(nodes):
@@ -111,6 +116,17 @@ def test_launch_in_the_car_gives_each_mount_its_channel(tmp_path):
     arguments = given(VEHICLE_ARGUMENTS, tmp_path, channels='can0, can1')
     parameters = launch_order(VEHICLE, VEHICLE_ARGUMENTS, arguments).settings.parameters
     assert [parameters[f'{mount}/mount_driver']['channel'] for mount in MOUNTS] == ['can0', 'can1']
-    for channels in ('', 'can0', 'can0,can0'):
+    with pytest.raises(ValueError, match='the mounts left and right have one CAN bus, can0'):
+        launch_order(VEHICLE, VEHICLE_ARGUMENTS, given(VEHICLE_ARGUMENTS, tmp_path))
+    for channels in ('can0', 'can0,can0'):
         with pytest.raises(ValueError, match='must name a channel for each of the mounts'):
             launch_order(VEHICLE, VEHICLE_ARGUMENTS, given(VEHICLE_ARGUMENTS, tmp_path, channels=channels))
+
+
+def test_a_file_gives_each_mount_in_the_car_its_channel_and_one_of_them_its_own_friction(tmp_path):
+    arguments = {**given(VEHICLE_ARGUMENTS, tmp_path), 'config': str(EXAMPLE)}
+    parameters = launch_order(VEHICLE, VEHICLE_ARGUMENTS, arguments).settings.parameters
+    assert [parameters[f'{mount}/mount_driver']['channel'] for mount in ('left', 'right')] == ['can0', 'can1']
+    assert 'friction.scale' not in parameters['left/mount_control']
+    assert parameters['right/mount_control']['friction.scale'] == 0.9
+    assert parameters['mount_recorder']['on_full'] == 'continue'

@@ -121,6 +121,22 @@ def test_a_simulator_is_no_node_of_the_car(tmp_path):
         vehicle(config=str(file))
 
 
+def test_the_can_bus_of_a_vehicle_stands_in_its_file_and_an_argument_wins(tmp_path):
+    file = tmp_path / 'own.yaml'
+    file.write_text('/**/mount_driver: {ros__parameters: {interface: kvaser, channel: can3}}')
+    driver = vehicle(config=str(file)).settings.parameters['mount_driver']
+    assert (driver['interface'], driver['channel']) == ('kvaser', 'can3')
+    assert vehicle(config=str(file), channel='can4').settings.parameters['mount_driver']['channel'] == 'can4'
+    file.write_text('/**/mount_control: {ros__parameters: {highest_current: 2.0}}')
+    driver = vehicle(config=str(file)).settings.parameters['mount_driver']
+    assert (driver['interface'], driver['channel']) == ('socketcan', 'can0')
+
+
+def test_a_missing_config_file_is_refused(tmp_path):
+    with pytest.raises(ParameterError, match=r'parameter file .*/none.yaml'):
+        sim(config=str(tmp_path / 'none.yaml'))
+
+
 @pytest.mark.parametrize(
     ('text', 'sentence'),
     [

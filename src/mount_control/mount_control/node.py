@@ -27,6 +27,7 @@ from mount_control.settings import (
     run_time_parameters,
     without_effect,
 )
+from mount_models.arithmetic.compiled import compilation_told
 from mount_models.damper import DamperError, damper_text
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
@@ -89,7 +90,8 @@ class MountControl(SafeLifecycleNode):
         self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
         self._trace = ScalarsLayout(self.trace_topic)
         self._gap_layout = ScalarsLayout(topics.AIR_GAP)
-        load_compiled_law(self._settings)
+        with compilation_told(self.get_logger().info):
+            load_compiled_law(self._settings)
         self.answering.watch.measured_before = bool(self.get_parameter(_MEASURED_BEFORE[0]).value)
         path = self.open_data_path()
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)

@@ -10,6 +10,7 @@ from mount_init.driver_report import DriverReport
 from mount_init.errors import DriverRefusalError, InitialisationError
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
+from mount_models.arithmetic.compiled import compilation_told
 from mount_models.specimen import chosen_specimen
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros import topics
@@ -44,7 +45,8 @@ class MountInit(SafeLifecycleNode):
             str(self.get_parameter('parameters_file').value), str(self.get_parameter('specimen').value)
         )
         Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
-        load_compiled_laws(self._specimen)
+        with compilation_told(self.get_logger().info):
+            load_compiled_laws(self._specimen)
         self._malformed, self._malformed_reason = 0, ''
         self._malformed_before = SlidingWindow(0)
         self._temperatures = TemperatureReadings()

@@ -46,6 +46,22 @@ def test_a_function_is_compiled_with_names_bound_anew_and_cached_by_its_name(tmp
     assert cached == {'test_compiled.by_2.scaled', 'test_compiled.by_3.scaled'}
 
 
+def test_a_compilation_is_told_once_and_not_where_its_result_is_on_disk(tmp_path, monkeypatch):
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
+
+    def told():
+        sentences = []
+        first, second = (compiled.specialised(scaled, name, {'FACTOR': 2.0}) for name in ('first', 'second'))
+        with compiled.compilation_told(sentences.append):
+            first(5.0)
+            second(5.0)
+        return sentences
+
+    [sentence] = told()
+    assert sentence.startswith('compiling laws for this machine')
+    assert told() == []
+
+
 FACTOR = 1.0
 
 

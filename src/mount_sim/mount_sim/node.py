@@ -15,6 +15,7 @@ from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
 from mount_driver.parameters import DriverParameters
+from mount_models.arithmetic.compiled import compilation_told
 from mount_models.quantity import ParameterError, flattened
 from mount_ros import topics
 from mount_ros.data_path import DataPath
@@ -70,12 +71,13 @@ class MountSim(SafeLifecycleNode):
         for name in ('channel', 'port', *self._own):
             self._values[name] = self.get_parameter(name).value
         self._names = mount_names(self._settings.mounts) or (_ALONE,)
-        self._excitation = build_excitation(self._settings)
+        with compilation_told(self.get_logger().info):
+            self._excitation = build_excitation(self._settings)
+            self._prepare_mounts()
         path = self.open_data_path()
         self._instruments = {name: _Instruments(path, name) for name in self._names}
         path.start()
         self._path = path
-        self._prepare_mounts()
 
     def activate(self) -> None:
         interface = self.get_parameter('interface').value

@@ -114,7 +114,9 @@ class Bringup:
             publisher.publish(String(data=session(settings_of_mount(self.parameters, mount))))
         self.wait_for_matches()
         for _, side_by_side in groupby(self.nodes, lambda node: node.name):
-            self._activation.activate_all(list(side_by_side), say)
+            nodes = list(side_by_side)
+            self.await_inputs(nodes, say)
+            self._activation.activate_all(nodes, say)
         self._makes_good = not any(values.get('lockstep') for values in self.parameters.values())
         self.verdicts.liveliness.pause()
 
@@ -126,6 +128,14 @@ class Bringup:
 
     def check_processes(self) -> None:
         """Raise `NodesLostError` if a process is no more what it was."""
+
+    def await_inputs(self, nodes: Sequence[GraphNode], say: Callable[[str], None]) -> None:
+        """Return when what `nodes` need to be activated is there; in a graph it is."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the drive is over; the simulator tells it."""
+        return self.figures(SIM).get('sentence') == FINISHED
 
     def _configure(self) -> None:
         """Configure the processes' nodes, those of one process in their order.
@@ -193,7 +203,7 @@ class Bringup:
         try:
             self._recovery.make_good(loss)
         except GraphError as error:
-            if self.figures(SIM).get('sentence') != FINISHED:
+            if not self.finished:
                 raise
             self.notes.append(f'{error}, at the end of the drive')
         finally:

@@ -5,7 +5,7 @@ Needs the `launch_ros` of a ROS 2 installation; where there is none, `mount_brin
 
 import contextlib
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from launch.actions import DeclareLaunchArgument, EmitEvent, LogInfo, OpaqueFunc
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
+from launch.logging import get_logger
 from launch_ros.actions import Node
 
 from mount_bringup.graph.composed import COMPOSED
@@ -26,6 +27,7 @@ from mount_bringup.graph.nodes import GraphNode, groups
 from mount_bringup.graph.order import LaunchOrder, launch_order
 from mount_bringup.graph.processes import node_environment, parameter_text
 from mount_bringup.graph.restarts import restartable
+from mount_models.arithmetic.compiled import compilation_told
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
@@ -33,13 +35,20 @@ _PATIENCE = '10'  # s, chosen: until a node that was asked to end is terminated
 _RESPAWN_DELAY = 0.2  # s, chosen: a node that dies at once must not keep the machine busy
 
 
-def launch_description(
+def graph_description(
     nodes: Sequence[GraphNode], arguments: Sequence[LaunchArgument], config: str
 ) -> LaunchDescription:
-    """Return the launch file of `nodes`; `config` is the name of the shipped parameter file."""
-    prepare_environment()  # discovery on this machine only, unless the user has chosen otherwise
+    """Return the launch file of the graph of `nodes`; `config` is the name of the shipped parameter file."""
     file = Path(get_package_share_directory('mount_bringup')) / 'config' / config
     every = (LaunchArgument('config', 'parameter file of all nodes', default=str(file)), *arguments)
+    return launch_description(every, partial(launch_order, nodes, arguments))
+
+
+def launch_description(
+    arguments: Sequence[LaunchArgument], order_of: Callable[[Mapping[str, str]], LaunchOrder]
+) -> LaunchDescription:
+    """Return the launch file that takes `arguments` and starts what `order_of` makes of their texts."""
+    prepare_environment()  # discovery on this machine only, unless the user has chosen otherwise
     declared = [
         DeclareLaunchArgument(
             argument.name,
@@ -47,16 +56,19 @@ def launch_description(
             description=argument.description,
             choices=list(argument.choices) or None,
         )
-        for argument in every
+        for argument in arguments
     ]
-    return LaunchDescription([*declared, OpaqueFunction(function=partial(_graph, nodes, every))])
+    return LaunchDescription([*declared, OpaqueFunction(function=partial(_graph, arguments, order_of))])
 
 
 def _graph(
-    nodes: Sequence[GraphNode], arguments: Sequence[LaunchArgument], context: LaunchContext
+    arguments: Sequence[LaunchArgument],
+    order_of: Callable[[Mapping[str, str]], LaunchOrder],
+    context: LaunchContext,
 ) -> list[LaunchDescriptionEntity]:
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
-    order = launch_order(nodes, arguments, given)
+    with compilation_told(get_logger('mount_bringup').info):  # the checks compute with the laws
+        order = order_of(given)
     inherited = drop_real_time()
     priority = order.settings.priority or inherited
     held = contextlib.ExitStack()  # until the last process has ended

@@ -1,4 +1,4 @@
-"""What a launch file takes from the user; `ros2 launch` is not needed here."""
+"""The arguments of the launch files: what `ros2 launch ... --show-args` tells."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -28,9 +28,7 @@ class LaunchArgument(NamedTuple):
         return self.meaning if told else f'{self.meaning}; empty: as in the config file'
 
 
-POLICY_OF_DAMPER = 'switched_viscous'
-"""The others compute their force without a given damper."""
-
+POLICY_OF_DAMPER = 'switched_viscous'  # the others compute their force without a given damper
 _ANY = (
     LaunchArgument('namespace', 'where the graph lives, such as mount_right; empty: /'),
     LaunchArgument('mounts', 'mounts with electronics, such as left,right; empty: one, in this namespace'),
@@ -105,10 +103,42 @@ SIM_ARGUMENTS = (
 VEHICLE_ARGUMENTS = (
     *_ANY,
     _sample_rate(VEHICLE),
-    LaunchArgument('interface', 'interface of python-can', ('mount_driver.interface',), default='socketcan'),
-    LaunchArgument('channel', 'channel of the interface', ('mount_driver.channel',), default='can0'),
-    LaunchArgument('channels', 'channel of each of several mounts, such as can0,can1'),
+    LaunchArgument(
+        'interface',
+        'interface of python-can; empty: as in the config file, else socketcan',
+        ('mount_driver.interface',),
+    ),
+    LaunchArgument(
+        'channel',
+        'channel of the interface; empty: as in the config file, else can0',
+        ('mount_driver.channel',),
+    ),
+    LaunchArgument(
+        'channels', 'channel of each of several mounts, such as can0,can1; empty: as in the config file'
+    ),
     LaunchArgument('port', f'{_PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
     LaunchArgument('duration', 's after which the graph ends; empty: when it is told to end'),
 )
 """The arguments of the graph in the car, besides `config`."""
+
+_OF_RECORDED = ('policy', 'damper', 'parameters_file', 'specimen')
+_OF_REPLAY = ('record', 'recording', 'priority', 'log_level')
+
+REPLAY_ARGUMENTS = (
+    LaunchArgument('bag', 'recorded drive that is played to the control: its folder; must be given'),
+    LaunchArgument(
+        'config', 'parameter file; what neither it nor an argument sets is as recorded; empty: none'
+    ),
+    LaunchArgument(
+        'namespace',
+        'mount of the recorded drive, and where it is replayed, such as mount_right; empty: its only one',
+    ),
+    LaunchArgument('rate', 'how fast it is played; 1: as fast as it was recorded', default='1'),
+    *(
+        argument._replace(meaning=f'{argument.meaning.partition("; empty:")[0]}; empty: as recorded')
+        for argument in _ANY
+        if argument.name in _OF_RECORDED
+    ),
+    *(argument for argument in _ANY if argument.name in _OF_REPLAY),
+)
+"""The arguments of a replay."""

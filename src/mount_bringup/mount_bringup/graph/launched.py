@@ -3,23 +3,27 @@
 import argparse
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from rclpy.logging import get_logger
+from std_msgs.msg import Float64MultiArray
 
 from mount_bags.run.session import new_session, session_text
 from mount_bringup.graph.bringup import Bringup
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.errors import GraphError, Interrupted
-from mount_bringup.graph.nodes import SIM, SIMULATED, GraphNode, GraphSettings, Grouping
+from mount_bringup.graph.nodes import CONTROL, SIMULATED, GraphNode, GraphSettings, Grouping
 from mount_bringup.graph.order import LaunchOrder
+from mount_bringup.graph.player import Player
 from mount_bringup.graph.restarts import Loss, NodesLostError
 from mount_bringup.graph.siblings import Sibling, sibling_of
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process
 from mount_ros.nodes.starter import Starter
-from mount_sim.diagnosis import FINISHED
+from mount_ros.qos import recording_qos
+from mount_ros.topics import CURRENT_FORCE_TABLE
 
 SUPERVISOR = 'mount_supervisor'
 _RESPAWN_LIMIT = 10.0  # s, chosen
@@ -27,10 +31,14 @@ _LOOK_PERIOD = 0.1  # s, chosen
 
 
 class LaunchedGraph(Bringup):
-    """The nodes of a launch file, whose processes launch starts again; without launch this one ends too."""
+    """The nodes of a launch file, whose processes launch starts again; without launch this one ends too.
 
-    def __init__(self, nodes: tuple[GraphNode, ...], settings: GraphSettings):
+    With a `player` their inputs are a recording's: it begins when the control is to be activated.
+    """
+
+    def __init__(self, nodes: tuple[GraphNode, ...], settings: GraphSettings, player: Player | None = None):
         super().__init__(nodes, settings)
+        self._player = player
         self._starter = Starter()
         self._processes: list[Sibling] = []
 
@@ -46,6 +54,28 @@ class LaunchedGraph(Bringup):
             if process.ended:
                 names = ' + '.join(node.name for node in process.nodes)
                 raise NodesLostError(Loss(process.nodes, f'{names} has ended (process {process.pid})'))
+
+    def await_inputs(self, nodes: Sequence[GraphNode], say: Callable[[str], None]) -> None:
+        if self._player is None or not any(node.is_a(CONTROL) for node in nodes):
+            return
+        say('playing the recording up to its force table')
+        tables: list[Float64MultiArray] = []
+        kind, qos = Float64MultiArray, recording_qos(CURRENT_FORCE_TABLE)
+        table = self._node.create_subscription(kind, CURRENT_FORCE_TABLE.name, tables.append, qos)
+        self._player.begin()
+        self.wait_until(lambda: bool(tables) or self.finished, float('inf'), 'the force table')
+        self._node.destroy_subscription(table)
+        if not tables:
+            raise GraphError('the recording has ended, and no current_force_table came of it')
+
+    @property
+    def finished(self) -> bool:
+        return super().finished if self._player is None else self._player.finished
+
+    def leave(self) -> list[str]:
+        if self._player is not None:
+            self._player.end()
+        return super().leave()
 
     def start_again(self, nodes: Sequence[GraphNode]) -> None:
         """Let launch respawn the processes of `nodes`, which it does when they end."""
@@ -72,7 +102,9 @@ class LaunchedGraph(Bringup):
 
 def arguments_of(order: LaunchOrder) -> list[str]:
     """Return the command line by which `main` supervises the graph of `order`."""
+    played = [f'--bag={order.bag}', f'--rate={order.rate}'] if order.bag else []
     return [
+        *played,
         *(f'--node={node.full_name}' for node in order.nodes),
         f'--namespace={order.settings.namespace}',
         f'--domain={order.settings.domain}',
@@ -114,15 +146,21 @@ def main() -> None:
     parser.add_argument('--duration', type=float, required=True, help='s; inf: until a signal')
     parser.add_argument('--grouping', choices=[entry.name for entry in Grouping], required=True)
     parser.add_argument('--restart-limit', type=int, required=True)
+    parser.add_argument('--bag', type=Path, help='recording that is played to the control')
+    parser.add_argument('--rate', type=float, default=1.0)
     chosen, _ = parser.parse_known_args()  # the rest is of ROS
     nodes = tuple(chosen.node)
+    player = None
+    if chosen.bag is not None:
+        player = Player(chosen.bag, chosen.namespace, chosen.rate)
+        nodes = tuple(replace(node, needs=()) for node in nodes)  # they come with the player
     settings = GraphSettings(
         namespace=chosen.namespace,
         domain=chosen.domain,
         grouping=Grouping[chosen.grouping],
         restart_limit=chosen.restart_limit,
     )
-    graph = LaunchedGraph(nodes, settings)
+    graph = LaunchedGraph(nodes, settings, player)
     graph.tell_loss = get_logger(SUPERVISOR).error
     end_process(_supervise(graph, chosen.scenario, chosen.duration))
 
@@ -141,7 +179,7 @@ def _supervise(graph: Bringup, scenario: str, duration: float) -> int:
             logger.info('all nodes are active')
             end = time.monotonic() + duration
             graph.wait_until(
-                lambda: graph.figures(SIM).get('sentence') == FINISHED or time.monotonic() > end,
+                lambda: graph.finished or time.monotonic() > end,
                 float('inf'),
                 'the end',
             )

@@ -59,6 +59,9 @@ SIMULATED: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
 VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""
 
+REPLAYED: tuple[GraphNode, ...] = (RECORDER, CONTROL)
+"""The nodes to which a recording is played."""
+
 
 def of_mounts(nodes: Sequence[GraphNode], mounts: Sequence[str]) -> tuple[GraphNode, ...]:
     """Return `nodes` with those of each of `mounts` in the place of those of one; without any as they are."""

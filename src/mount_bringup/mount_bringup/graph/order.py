@@ -38,15 +38,22 @@ from mount_sim.plant.mounts import seated_mount
 from mount_sim.plant.places import mount_names
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
+_CAN_OF_VEHICLE = {'interface': 'socketcan', 'channel': 'can0'}
+
 
 class LaunchOrder(NamedTuple):
-    """A graph as ordered by the arguments of a launch file; `duration` is in s, inf: until it is ended."""
+    """A graph as ordered by the arguments of a launch file; `duration` is in s, inf: until it is ended.
+
+    In a replay `bag` is played to it, `rate` times as fast as it was recorded.
+    """
 
     nodes: tuple[GraphNode, ...]
     settings: GraphSettings
     scenario: str
     duration: float
     log_level: str
+    bag: Path | None = None
+    rate: float = 1.0
 
 
 def launch_order(
@@ -59,13 +66,15 @@ def launch_order(
     mounts = mount_names(given['mounts'])
     chosen = of_mounts([node for node in nodes if records or node is not RECORDER], mounts)
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
-    known = {name: values for name, values in _known().items() if name in {node.name for node in nodes}}
+    known = {
+        name: values for name, values in known_parameters().items() if name in {node.name for node in nodes}
+    }
     given_to = partial(_given_to, arguments, given, known, domain)
     if mounts:
         settings = _of_mounts(mounts, given, partial(given_to, namespace))
     else:
         settings = with_control_of_mount(checked_settings(given_to(namespace, ''), known))
-        _check_damper(given['damper'], settings)
+        check_damper(given['damper'], settings)
         _check(settings)
     sim = settings.get(SIM.name, {}) if SIM in nodes else {'scenario': 'car'}
     return LaunchOrder(
@@ -75,8 +84,8 @@ def launch_order(
             domain=domain,
             parameters={node.full_name: settings.get(node.full_name, {}) for node in chosen},
             grouping=Grouping.COMPOSED if given['composed'] == 'true' else Grouping.APART,
-            priority=_number('priority', given['priority'], HIGHEST, int),
-            restart_limit=_number('restarts', given['restarts'], 1000, int),
+            priority=number_of('priority', given['priority'], HIGHEST, int),
+            restart_limit=number_of('restarts', given['restarts'], 1000, int),
         ),
         scenario=sim.get('scenario', SimParameters().scenario),
         duration=_duration(nodes, given),
@@ -95,10 +104,10 @@ def _given_to(
     """Return what file and arguments give the nodes of a mount, or of the graph."""
     space = f'{namespace}/{mount}'.strip('/')
     port = {'port': can_port(domain, space)}
-    settings: dict[str, dict[str, Any]] = {
-        node.name: dict(port) for node in (DRIVER, SIM) if node.name in known
-    }
-    for layer in (settings_of_file(Path(given['config']), space, known), _of_arguments(arguments, given)):
+    settings: dict[str, dict[str, Any]] = {DRIVER.name: port | ({} if SIM.name in known else _CAN_OF_VEHICLE)}
+    if SIM.name in known:
+        settings[SIM.name] = dict(port)
+    for layer in (settings_of_file(Path(given['config']), space, known), of_arguments(arguments, given)):
         for name, values in layer.items():
             settings.setdefault(name, {}).update(values)
     return settings
@@ -122,11 +131,13 @@ def _of_mounts(
         if SIM.name in settings:
             settings[SIM.name][f'mount_{mount}.port'] = own[DRIVER.name]['port']
         settings |= {f'{mount}/{name}': own.get(name, {}) for name in OF_EACH}
-    known = _known()
+    if SIM.name not in settings:
+        _check_channels(mounts, settings)
+    known = known_parameters()
     settings = checked_settings(settings, known)
     for mount in mounts:
         whole = with_control_of_mount(settings_of_mount(settings, mount))
-        _check_damper(given['damper'], whole)
+        check_damper(given['damper'], whole)
         _check(whole)
         settings[f'{mount}/{CONTROL.name}'] = whole.get(CONTROL.name, {})
     if SIM.name in settings:
@@ -136,8 +147,8 @@ def _of_mounts(
 
 
 def _channels(mounts: Sequence[str], given: Mapping[str, str]) -> dict[str, dict[str, Any]]:
-    """Return the channel of each mount in the car."""
-    if 'channels' not in given:
+    """Return the channel that the arguments give each mount in the car."""
+    if not given.get('channels'):
         return {}
     names = [name.strip() for name in given['channels'].split(',') if name.strip()]
     if len(names) != len(mounts) or len(set(names)) < len(names):
@@ -148,7 +159,21 @@ def _channels(mounts: Sequence[str], given: Mapping[str, str]) -> dict[str, dict
     return {mount: {'channel': name} for mount, name in zip(mounts, names, strict=True)}
 
 
-def _known() -> dict[str, dict[str, Any]]:
+def _check_channels(mounts: Sequence[str], settings: Mapping[str, Mapping[str, Any]]) -> None:
+    """Raise `SettingError` where two mounts have one CAN bus."""
+    buses: dict[Any, str] = {}
+    for mount in mounts:
+        driver = settings[f'{mount}/{DRIVER.name}']
+        multicast = driver['interface'] == 'udp_multicast'  # there a port of its own tells a bus from another
+        other = buses.setdefault((driver['channel'], driver['port'] if multicast else 0), mount)
+        if other != mount:
+            raise SettingError(
+                f'the mounts {other} and {mount} have one CAN bus, {driver["channel"]}: give each its own, '
+                'as in channels:=can0,can1, or as channel of its mount_driver in the config file'
+            )
+
+
+def known_parameters() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that a parameter file can set."""
     known, driver = defaults_of_nodes(), DriverParameters()
     known[SIM.name] |= {'interface': 'udp_multicast', 'channel': driver.channel, 'port': driver.port}
@@ -156,13 +181,13 @@ def _known() -> dict[str, dict[str, Any]]:
     return known
 
 
-def _of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+def of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     settings: dict[str, dict[str, Any]] = {}
     for argument in arguments:
         text = given[argument.name]
         for target in argument.sets if text else ():
             node, _, name = target.partition('.')
-            value = _value(argument.name, text, _known()[node][name])
+            value = _value(argument.name, text, known_parameters()[node][name])
             settings.setdefault(node, {})[name] = value
     return settings
 
@@ -178,7 +203,7 @@ def _value(name: str, text: str, default: Any) -> Any:
         raise SettingError(f'{name}:={text} {error}') from None
 
 
-def _check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> None:
+def check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> None:
     policy = control_parameters(settings).policy
     if damper and policy != POLICY_OF_DAMPER:
         raise SettingError(
@@ -204,10 +229,10 @@ def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
 def _duration(nodes: Sequence[GraphNode], given: Mapping[str, str]) -> float:
     if SIM in nodes or not given['duration']:
         return float('inf')  # the simulator tells its end
-    return _number('duration', given['duration'], 1e9, float)
+    return number_of('duration', given['duration'], 1e9, float)
 
 
-def _number(name: str, text: str, highest: float, kind: type) -> Any:
+def number_of(name: str, text: str, highest: float, kind: type) -> Any:
     try:
         number = kind(text)
     except ValueError:

@@ -7,18 +7,20 @@ its file imports, and of `mount_models`, which every package may call, so a chan
 new folder.
 """
 
+import contextlib
 import functools
 import hashlib
 import importlib.util
 import os
 import re
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import config as numba_config
+from numba.core import event as numba_event
 
 F = TypeVar('F', bound=Callable[..., Any])
 
@@ -46,6 +48,26 @@ def specialised(function: F, name: str, bound: Mapping[str, Any]) -> F:
         if isinstance(value, types.ModuleType) and value.__file__ is not None:
             packages.update(_packages_behind(Path(value.__file__).resolve()))
     return cast(F, _compiled(clone, tuple(sorted(packages))))
+
+
+@contextlib.contextmanager
+def compilation_told(tell: Callable[[str], object]) -> Iterator[None]:
+    """Call `tell` with a sentence before the first compilation within the block; not where all is on disk."""
+    with numba_event.install_listener('numba:compile', _Teller(tell)):
+        yield
+
+
+class _Teller(numba_event.Listener):
+    def __init__(self, tell: Callable[[str], object]):
+        self._tell, self._told = tell, False
+
+    def on_start(self, event: numba_event.Event) -> None:
+        if not self._told:
+            self._told = True
+            self._tell('compiling laws for this machine, once after a build (up to half a minute)')
+
+    def on_end(self, event: numba_event.Event) -> None:
+        pass
 
 
 def _compiled(function: F, packages: tuple[Path, ...]) -> F:

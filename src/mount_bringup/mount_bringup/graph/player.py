@@ -1,0 +1,81 @@
+"""The process of `ros2 bag play` beside a launched control: it publishes recorded inputs by the wall clock.
+
+The stamps in the messages are the recorded ones, and the control goes by them alone: `/clock` and
+`use_sim_time` are not needed.
+"""
+
+import signal
+import subprocess
+import tempfile
+from pathlib import Path
+
+import yaml
+
+from mount_bringup.graph.errors import GraphError
+from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE, DISPLACEMENT, Delivery, Topic
+
+PLAYED = (DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE)
+"""What is played: what the control hears. Its setpoints are its own, for a topic has one writer."""
+
+_DISCOVERY = 2.0  # s, chosen: until the first message, so that publishers are found before it
+_END_LIMIT = 5.0  # s, chosen: until a player that was told to end is killed
+
+
+class Player:
+    """Plays the inputs of the mount in `namespace` from a recording; `rate` 1: as fast as recorded."""
+
+    def __init__(self, bag: Path, namespace: str, rate: float):
+        self._folder = tempfile.TemporaryDirectory(prefix='mount_replay_')
+        offers = Path(self._folder.name) / 'offers.yaml'
+        offers.write_text(offers_text(namespace))
+        self._command = play_command(bag, namespace, rate, offers)
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def begin(self) -> None:
+        """Start to play."""
+        try:
+            # a session of its own: Ctrl-C is the supervisor's, which ends it
+            self._process = subprocess.Popen(self._command, start_new_session=True)
+        except OSError as error:
+            raise GraphError(f'{self._command[0]} cannot be started: {error}') from None
+
+    @property
+    def finished(self) -> bool:
+        """Whether all was played; raises `GraphError` where the player failed."""
+        code = None if self._process is None else self._process.poll()
+        if code:
+            raise GraphError(
+                f'`{" ".join(self._command)}` ended with code {code}: it needs the packages ros2bag and '
+                'rosbag2_storage_mcap; its own words are above'
+            )
+        return code == 0
+
+    def end(self) -> None:
+        """End the player; safe to call twice."""
+        self._folder.cleanup()
+        if self._process is None or self._process.poll() is not None:
+            return
+        self._process.send_signal(signal.SIGINT)
+        try:
+            self._process.wait(_END_LIMIT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+def play_command(bag: Path, namespace: str, rate: float, offers: Path) -> list[str]:
+    """Return the command that plays what a control in `namespace` hears, with the offers of a file."""
+    return ['ros2', 'bag', 'play', str(bag), '--rate', f'{rate:g}', '--delay', f'{_DISCOVERY:g}',
+            '--disable-keyboard-controls', '--qos-profile-overrides-path', str(offers),
+            '--topics', *(_full_name(topic, namespace) for topic in PLAYED)]  # fmt: skip
+
+
+def offers_text(namespace: str) -> str:
+    """Return the quality of service of the latched topics, which not every recording holds, for rosbag2."""
+    latched = {'reliability': 'reliable', 'durability': 'transient_local', 'history': 'keep_last', 'depth': 1}
+    names = (_full_name(topic, namespace) for topic in PLAYED if topic.delivery is Delivery.LATCHED)
+    return yaml.safe_dump({name: dict(latched) for name in names})
+
+
+def _full_name(topic: Topic, namespace: str) -> str:
+    return f'/{namespace.strip("/")}/{topic.name}'.replace('//', '/')

@@ -1,0 +1,40 @@
+"""What is compiled ahead is what the nodes would compile."""
+
+import subprocess
+import sys
+
+_AFTER = """
+import gc
+from numba.core.dispatcher import Dispatcher
+from mount_bringup.prepare import prepare
+from mount_control.node import MountControl
+from mount_init.node import MountInit
+from mount_ros.nodes.hosting import ros_context, transition
+from mount_sim.node import MountSim
+
+def loaded():
+    found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+    return {(each.__qualname__, str(kinds)) for each in found for kinds in each.overloads}
+
+prepare(scenarios=['motorway'], policies=['continuous_viscous'])
+before = loaded()
+with ros_context({domain}) as context:
+    for kind in (MountSim, MountInit, MountControl):
+        node = kind(context=context)
+        transition(node.trigger_configure, node, 'node')
+        node.close()
+        node.destroy_node()
+print(len(before), sorted(loaded() - before))
+"""
+
+
+def test_a_node_finds_everything_compiled_that_it_needs(domain):
+    run = subprocess.run(
+        [sys.executable, '-c', _AFTER.replace('{domain}', str(domain))],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    count, _, missing = run.stdout.strip().partition(' ')
+    assert int(count) > 0
+    assert missing == '[]'

@@ -1,0 +1,138 @@
+"""The launch files under the real `ros2 launch`, where it is installed: up, down, refused, interrupted.
+
+By the command, for its exit code is what is promised; each run has a ROS domain of its own.
+"""
+
+import importlib.util
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+
+from mount_bags.bag.recording import open_recording
+from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS, SIM_ARGUMENTS, VEHICLE_ARGUMENTS
+from mount_ros.testing import wait_until
+
+LIMIT = 240.0  # s: only a hang takes so long
+REFERENCE = Path(__file__).resolve().parents[3] / 'bags' / 'reference' / 'gap'
+
+
+def _lacking(*modules):
+    """Return what is missing for `ros2 launch` of this package, empty if nothing is."""
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            return f'{module} is not installed here: a ROS 2 installation has it'
+    try:
+        get_package_prefix('mount_bringup')
+    except PackageNotFoundError:
+        return 'mount_bringup is not installed by colcon here'
+    return ''
+
+
+NO_LAUNCH = _lacking('ros2launch')
+NO_BAG = NO_LAUNCH or _lacking('ros2bag')
+pytestmark = pytest.mark.skipif(bool(NO_LAUNCH), reason=NO_LAUNCH)
+
+
+@pytest.fixture
+def launch(tmp_path, domain):
+    """Return the function that starts `ros2 launch` with its output in a file."""
+    started = []
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain), 'ROS_LOG_DIR': str(tmp_path / 'log')}
+
+    def start(name, *arguments):
+        output = tmp_path / 'output.txt'
+        with output.open('w') as file:
+            process = subprocess.Popen(
+                ['ros2', 'launch', 'mount_bringup', f'{name}.launch.py', *arguments],
+                env=environment, cwd=tmp_path, stdout=file, stderr=subprocess.STDOUT,
+            )  # fmt: skip
+        started.append(process)
+        return process, output
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            process.wait(60)
+
+
+@pytest.fixture
+def run(launch):
+    """Return the function that runs `ros2 launch` to its end."""
+
+    def to_its_end(name, *arguments):
+        process, output = launch(name, *arguments)
+        code = process.wait(LIMIT)
+        return code, output.read_text()
+
+    return to_its_end
+
+
+@pytest.mark.parametrize(
+    ('name', 'arguments'),
+    [('sim', SIM_ARGUMENTS), ('vehicle', VEHICLE_ARGUMENTS), ('replay', REPLAY_ARGUMENTS)],
+)
+def test_show_args_tells_every_argument_with_its_meaning(run, name, arguments):
+    code, output = run(name, '--show-args')
+    assert code == 0
+    told = ' '.join(output.split())
+    for argument in arguments:
+        assert f"'{argument.name}': {argument.description}" in told
+
+
+@pytest.mark.parametrize(
+    ('name', 'argument', 'sentence'),
+    [
+        ('sim', 'config:=/nowhere/car.yaml', 'parameter file /nowhere/car.yaml'),
+        ('sim', 'mount:=rubber', 'rubber'),
+        ('vehicle', 'priority:=200', 'priority:=200 must be a number within 0 .. 98'),
+        ('replay', 'bag:=/nowhere', '/nowhere'),
+    ],
+)
+def test_what_cannot_be_is_refused_before_a_process_starts(run, name, argument, sentence):
+    code, output = run(name, 'record:=false', argument)
+    assert code == 1
+    assert sentence in output
+    assert 'process started' not in output
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize('composed', ['false', 'true'])
+def test_a_drive_ends_with_code_0_and_a_closed_recording_that_knows_its_parameters(run, tmp_path, composed):
+    code, output = run(
+        'sim', 'recording:=drive', 'duration:=2', f'composed:={composed}', 'policy:=switched_viscous'
+    )
+    assert code == 0, output
+    recording = open_recording(tmp_path / 'drive')
+    assert recording.warnings == []
+    session = recording.latched('session').data
+    assert 'policy: switched_viscous' in session
+    assert 'versions:' in session
+
+
+@pytest.mark.real_time
+def test_ctrl_c_ends_with_code_0_and_a_closed_recording(launch, tmp_path):
+    process, output = launch('sim', 'recording:=drive', 'duration:=600')
+    wait_until(lambda: 'all nodes are active' in output.read_text(), 'the activation', LIMIT)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(LIMIT) == 0, output.read_text()
+    assert open_recording(tmp_path / 'drive').warnings == []
+
+
+@pytest.mark.real_time
+def test_a_refused_activation_ends_all_with_code_1(run):
+    code, output = run('vehicle', 'record:=false', 'interface:=udp_multicast', 'channel:=239.74.163.2')
+    assert code == 1
+    assert 'refused to activate' in output
+
+
+@pytest.mark.real_time
+@pytest.mark.skipif(bool(NO_BAG), reason=NO_BAG)
+def test_a_replay_ends_with_its_recording(run, tmp_path):
+    code, output = run('replay', f'bag:={REFERENCE}', 'recording:=again')
+    assert code == 0, output
+    assert open_recording(tmp_path / 'again').topics['/current_setpoint'].message_count > 0

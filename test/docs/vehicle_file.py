@@ -1,0 +1,77 @@
+"""Writes src/mount_bringup/config/vehicle.yaml: every setting of a vehicle, explained, most of them at rest.
+
+`python test/docs/parameters_page.py` renews the file; `test_vehicle_file.py` holds it against the code.
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from parameters_page import SETS, notes_of
+
+from mount_bringup.graph.nodes import VEHICLE
+from mount_bringup.settings import defaults_of_nodes
+from mount_control.policy.registry import POLICIES
+from mount_models.quantity import Quantity
+
+FILE = Path(__file__).resolve().parents[2] / 'src' / 'mount_bringup' / 'config' / 'vehicle.yaml'
+
+GIVEN: dict[str, dict[str, Any]] = {
+    'mount_recorder': {'on_full': 'continue'},
+    'mount_driver': {'interface': 'socketcan', 'channel': 'can0'},
+    'mount_init': {'specimen': ''},
+    'mount_control': {'continuous_viscous.eigenfrequency': 8.0},
+}
+"""What this vehicle gives its nodes; all else is there as a comment with the default."""
+
+TEXTS = {
+    'parameters_file': 'specimen file of this actuator; empty: the shipped one; the same for all three nodes',
+    'specimen': 'name that the specimen file must bear; empty: any; the same for all three nodes',
+    'policy': ' or '.join(POLICIES),
+    'switching': 'enabled, never or always: when the policy switched_viscous may damp',
+    'damper': 'of the policy switched_viscous: viscous_2000, progressive, degressive, a table or a CSV file',
+}
+"""The meaning of parameters without a number."""
+
+HEAD = """\
+# The settings of one vehicle, for `ros2 launch mount_bringup vehicle.launch.py config:=FILE`. This is the
+# example, and what is taken without `config`: copy it for each vehicle and change the copy.
+#
+# Every setting is here; behind its value its unit, its range and what it means. A line that begins with #
+# shows a default and sets nothing: take the # away to set it. Arguments of the launch file that are given
+# win over this file. A name that no node has and a value out of range are refused before a process starts.
+#
+# What stands here is for all mounts of the vehicle. Values of one mount: two_mounts.yaml.
+"""
+
+
+def text() -> str:
+    """Return the text of the file."""
+    known = defaults_of_nodes()
+    return (
+        '\n'.join([HEAD, *(line for node in VEHICLE for line in _node(node.name, known[node.name]))]) + '\n'
+    )
+
+
+def _node(node: str, defaults: dict[str, Any]) -> Iterator[str]:
+    notes = {name: note for prefix, given in SETS[node] for name, note in notes_of(given, prefix)}
+    yield from (f'/**/{node}:', '  ros__parameters:')
+    for name, default in defaults.items():
+        given = GIVEN[node].get(name)
+        setting = f'{name}: {_value(default if given is None else given)}'
+        yield f'    {"# " if given is None else ""}{setting}  # {_meaning(name, notes.get(name))}'
+    yield ''
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, str):
+        return f"'{value}'"
+    return '.nan' if isinstance(value, float) and math.isnan(value) else repr(value)
+
+
+def _meaning(name: str, note: Quantity | None) -> str:
+    if note is None:
+        return TEXTS[name]
+    limits = f' {note.low:g} .. {note.high:g}' if note.low > -math.inf else ''
+    return f'{note.unit}{limits}: {note.meaning}'
