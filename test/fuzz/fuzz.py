@@ -42,7 +42,7 @@ def property_of(package: str, module: str, name: str):
 def all_targets() -> Iterator[dict[str, list[Check]]]:
     """Give {kind of input: checks of one number}; files of the readers live in a folder that goes."""
     with tempfile.TemporaryDirectory() as folder:
-        yield {**bytes_targets(), **text_targets(), **file_targets(Path(folder))}
+        yield {**bytes_targets(), **text_targets(), **settings_targets(), **file_targets(Path(folder))}
 
 
 def bytes_targets() -> dict[str, list[Check]]:
@@ -79,6 +79,19 @@ def text_targets() -> dict[str, list[Check]]:
     return {'specimen': checks[:1], 'damper': checks[1:]}
 
 
+def settings_targets() -> dict[str, list[Check]]:
+    """Return the checks of what a user sets: parameter files, options, sessions, changes at run time."""
+    names = (
+        'test_a_changed_parameter_file_is_refused_or_every_value_is_within_its_range',
+        'test_a_changed_option_is_refused_or_within_its_range',
+        'test_a_changed_session_is_refused_or_gives_a_sample_rate_within_its_range',
+        'test_a_changed_value_at_run_time_is_refused_or_leaves_a_sound_controller',
+    )
+    return {
+        'parameters': [plain(property_of('mount_bringup', 'test_foreign_settings', name)) for name in names]
+    }
+
+
 def file_targets(folder: Path) -> dict[str, list[Check]]:
     """Return the checks of recordings: MCAP by four writers and our own, sqlite3, `metadata.yaml`."""
     files = {
@@ -103,8 +116,8 @@ def file_targets(folder: Path) -> dict[str, list[Check]]:
 
 
 def small_drive(module, folder: Path, writer: str):
-    """Return file, bytes and content of a recording of 5 samples as `writer` of the test makes it."""
-    made = module.write_drive(folder / writer.replace(' ', '_'), 5, chunk_size=700)
+    """Return file, bytes and content of a recording of 3 samples as `writer` of the test makes it."""
+    made = module.write_drive(folder / writer.replace(' ', '_'), 3, chunk_size=700)
     (file,) = made.glob('*.mcap')
     if writer != 'ours':
         module.rewritten(file, made / 'other.mcap', module.WRITERS[writer])
