@@ -16,7 +16,7 @@ from mount_bags.bag.writer import BagWriter, RecordingError
 from mount_bags.events.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
 from mount_bags.events.event_marks import present_time
 from mount_bags.recorder.collector import Collector
-from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge, unobserved_sentence
+from mount_bags.recorder.diagnosis import Counted, OnFull, RecorderState, judge, unobserved_sentence
 from mount_bags.recorder.parameters import RecorderParameters, split_of
 from mount_bags.recorder.recorder import Recorder
 from mount_bags.recorder.snapshot import Snapshot, SnapshotRule
@@ -30,6 +30,7 @@ from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import Urgent
+from mount_ros.nodes.sliding_window import SlidingWindow
 from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
 NAME = 'mount_recorder'
@@ -62,6 +63,7 @@ class MountRecorder(SafeLifecycleNode):
         self._event = EVENT.name
         self._announced_failure = ''
         self._announced_malformed: set[str] = set()
+        self._counted = SlidingWindow(Counted())
         self._begun_at = 0.0
         self._mark_service = self.create_service(Trigger, '~/mark', self._on_mark)
 
@@ -105,6 +107,7 @@ class MountRecorder(SafeLifecycleNode):
 
     def activate(self) -> None:
         self._present_recorder().begin()
+        self._counted = SlidingWindow(Counted())
         self._begun_at = time.monotonic()
         self.get_logger().info(f'recording to {self._present_sink().folder}')
 
@@ -152,7 +155,7 @@ class MountRecorder(SafeLifecycleNode):
             recorder.received_on(self._event),
             sink.figures() if isinstance(sink, Snapshot) else None,
         )
-        return judge(state, self._on_full)
+        return judge(state, self._on_full, self._counted.earlier(time.monotonic(), state.counted))
 
     def mark(self, text: str = '', kind: str = BY_HAND) -> Mark:
         """Publish a mark of this moment on `event` and return it; raises `RecordingError` unless active."""

@@ -31,6 +31,7 @@ from mount_bags.recorder.watching import watch_topic
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import BY_HAND, Mark, mark_text, read_mark
 from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS
 
@@ -138,17 +139,22 @@ def status(name, level, message=''):
     return DiagnosticStatus(name=name, level=bytes([level]), message=message)
 
 
+def told(*values):
+    (verdict,) = verdicts_in(DiagnosticArray(status=[status(*values)]))
+    return verdict
+
+
 def test_fault_is_marked_once_until_it_is_over(marks, sent):
     watch = FaultWatch(marks, '/')
     for time, level in enumerate((0, 1, 2, 2, 0, 2)):
-        watch.add(time, status('mount_driver', level, f'silent for {time} s'))
+        watch.add(time, told('mount_driver', level, f'silent for {time} s'))
     assert sent == [Mark(time, 'fault', f'mount_driver: silent for {time} s') for time in (2, 5)]
 
 
 def test_faults_of_other_mounts_are_theirs(marks, sent):
     watch = FaultWatch(marks, '/mount_right')
-    watch.add(0, status('mount_left/mount_driver', 2))
-    watch.add(1, status('mount_right/mount_driver', 2))
+    watch.add(0, told('mount_left/mount_driver', 2))
+    watch.add(1, told('mount_right/mount_driver', 2))
     assert [mark.time for mark in sent] == [1]
 
 

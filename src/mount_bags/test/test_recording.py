@@ -3,6 +3,7 @@
 import itertools
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 from mcap.reader import make_reader
@@ -12,12 +13,14 @@ from small_disk import small_disk
 from mount_bags.bag.statement import read_statement
 from mount_bags.bag.writer import BagWriter, RecordingError
 from mount_bags.container.stored import RECORDER_RECORD
+from mount_bags.messages.stamps import StampWatch
 from mount_bags.recorder import recorder as recording
-from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
-from mount_bags.recorder.recorder import Recorder, Unobserved
+from mount_bags.recorder.diagnosis import Counted, OnFull, RecorderState, judge
+from mount_bags.recorder.recorder import Recorder, RecorderFigures, Unobserved
 from mount_bags.recorder.space import SpaceGuard
 from mount_ros.messages.scalars import stamp_of
-from mount_ros.nodes.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level, Standing
+from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
 from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
@@ -254,6 +257,27 @@ def test_little_space_is_a_warning_with_what_is_left(tmp_path):
     verdict = verdict_of(recorder, free=5_000_000_000, rate=1e8)
     assert verdict.level is Level.WARN
     recorder.end()
+
+
+@pytest.mark.parametrize('kind', ['lost', 'missing', 'misdated', 'unobserved'])
+def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(kind):
+    window, standing, told = SlidingWindow(Counted()), Standing(), []
+    watch, figures = StampWatch(1000.0), RecorderFigures(0, 0, 0, 0, 0, 0, '')
+    unobserved = {}
+    for tenth in range(300):
+        found = 7 * min(max(tenth - 49, 0), 5)
+        figures = replace(figures, received=100 * tenth, lost=found if kind == 'lost' else 0)
+        watch.lost, watch.misdated = (found if kind == name else 0 for name in ('missing', 'misdated'))
+        if kind == 'unobserved' and found:
+            unobserved = {'/displacement': Unobserved(found, 7, 'too short')}
+        state = RecorderState('/data/bag', figures, watches={'/displacement': watch}, unobserved=unobserved)
+        earlier = window.earlier(tenth / 10, state.counted)
+        verdict = standing.keep(judge(state, OnFull.STOP, earlier))
+        told.append((verdict.level, verdict.sentence))
+    warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
+    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
+    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
+    assert len(set(told)) == 2
 
 
 def test_one_warning_does_not_hide_another(tmp_path):

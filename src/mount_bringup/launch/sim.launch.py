@@ -3,8 +3,8 @@
 from launch import LaunchDescription
 
 from mount_bringup.graph.launch import launch_description
+from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS
 from mount_bringup.graph.nodes import SIMULATED
-from mount_bringup.graph.order import SIM_ARGUMENTS
 
 
 def generate_launch_description() -> LaunchDescription:

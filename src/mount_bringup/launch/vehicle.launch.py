@@ -3,8 +3,8 @@
 from launch import LaunchDescription
 
 from mount_bringup.graph.launch import launch_description
+from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS
 from mount_bringup.graph.nodes import VEHICLE
-from mount_bringup.graph.order import VEHICLE_ARGUMENTS
 
 
 def generate_launch_description() -> LaunchDescription:

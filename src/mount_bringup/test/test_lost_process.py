@@ -62,7 +62,10 @@ def test_a_killed_recorder_begins_a_new_recording_and_the_old_one_stays_readable
 def test_a_recorder_that_stands_still_counts_as_dead_after_the_limit(tmp_path, domain):
     with recording_graph(tmp_path, domain) as graph:
         lose(graph, signal.SIGSTOP)
-        assert 'mount_recorder told nothing for 4 s' in graph.restarts[0].sentence
+        told = (
+            'mount_recorder told nothing on /diagnostics for 4 s (limit 4 s, usual is 1 s) and counts as dead'
+        )
+        assert f'{told}: look for' in graph.restarts[0].sentence
 
 
 def test_one_that_stands_still_for_less_goes_on(tmp_path, domain):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_bringup.graph.matches import unmatched
 from mount_bringup.graph.nodes import (
     CONTROL,
@@ -16,7 +17,7 @@ from mount_bringup.graph.nodes import (
     groups,
     of_mounts,
 )
-from mount_bringup.graph.order import SIM_ARGUMENTS, VEHICLE_ARGUMENTS, launch_order
+from mount_bringup.graph.order import launch_order
 from mount_bringup.mounts import mounts_of, settings_of_mount, settings_of_mounts
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError

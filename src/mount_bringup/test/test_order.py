@@ -6,9 +6,10 @@ import pytest
 
 import mount_bringup
 from mount_bringup.graph.domain import can_port
+from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.nodes import RECORDER, SIMULATED, VEHICLE
-from mount_bringup.graph.order import SIM_ARGUMENTS, VEHICLE_ARGUMENTS, launch_order
+from mount_bringup.graph.order import launch_order
 from mount_models.quantity import ParameterError
 
 CONFIG = Path(mount_bringup.__file__).parents[1] / 'config'
@@ -118,3 +119,23 @@ def test_a_simulator_is_no_node_of_the_car(tmp_path):
     file.write_text('/**/mount_sim: {ros__parameters: {seed: 2}}')
     with pytest.raises(ParameterError, match='is no node of the graph'):
         vehicle(config=str(file))
+
+
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        (
+            '/**/mount_sim: {ros__parameters: {mount_left.sample_rate: 2000.0}}',
+            "'sample_rate' is common to all mounts: set it without mount_left",
+        ),
+        (
+            '/left/mount_control: {ros__parameters: {sample_rate: 2000.0}}',
+            r'mount_control.sample_rate \(2000 Hz\) must equal mount_driver.sample_rate \(1000 Hz\); set one',
+        ),
+    ],
+)
+def test_a_sample_rate_of_one_mount_alone_is_refused(tmp_path, text, sentence):
+    file = tmp_path / 'own.yaml'
+    file.write_text(text)
+    with pytest.raises(ParameterError, match=sentence):
+        sim(config=str(file), mounts='left,right')

@@ -12,9 +12,10 @@ from mount_bringup.graph.supervisor import Supervisor
 class Refused(Supervisor):
     """Its nodes refuse so many times; with every attempt pass `samples`, of which `overruns` are late."""
 
-    def __init__(self, folder, refusals, *, timeouts=0, samples=1000, overruns=0):
+    def __init__(self, folder, refusals, *, timeouts=0, samples=1000, overruns=0, sample_rate=None):
         super().__init__((INIT,), GraphSettings(), folder)
         self.refusals, self.asked = refusals, 0
+        self.rate = {} if sample_rate is None else {'sample_rate': str(sample_rate)}
         self.each = {
             DRIVER.name: {'setpoint_timeouts': timeouts},
             SIM.name: {'samples': samples, 'overruns': overruns},
@@ -26,7 +27,8 @@ class Refused(Supervisor):
             raise GraphError('mount_init refused')
 
     def figures(self, node):
-        return {name: str(count * self.asked) for name, count in self.each[node.name].items()}
+        counts = {name: str(count * self.asked) for name, count in self.each[node.name].items()}
+        return {**counts, **self.rate}
 
     def serve_for(self, duration):
         pass
@@ -50,12 +52,15 @@ def test_a_node_that_refuses_in_time_is_given_up(tmp_path, pace):
     assert graph.asked == 2
 
 
-@pytest.mark.parametrize('pace', [{'overruns': 51}, {'timeouts': 1}])
-def test_refusals_of_a_machine_that_was_late_do_not_count(tmp_path, pace):
+@pytest.mark.parametrize(
+    ('pace', 'rate'),
+    [({'overruns': 51}, '1 kHz'), ({'timeouts': 1, 'sample_rate': 2000.0}, '2 kHz')],
+)
+def test_refusals_of_a_machine_that_was_late_do_not_count(tmp_path, pace, rate):
     graph = Refused(tmp_path, 9, **pace)
     graph.activate_init()
     assert graph.asked == 10
-    late = 'mount_init refused (this machine was too late for 1 kHz)'
+    late = f'mount_init refused (this machine was too late for {rate})'
     assert graph.notes == [f'{late}; it was activated again, the last of 9 times']
 
 

@@ -1,11 +1,12 @@
-"""The control node's verdict on itself, from counts alone."""
+"""The control node's verdict on itself, from counts alone: those since the activation, and lately."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from mount_control.plausibility import HOLD
 from mount_control.sample_watch import SampleCounts
-from mount_ros.nodes.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
+from mount_ros.nodes.sliding_window import WINDOW
 
 
 class Unread(NamedTuple):
@@ -20,6 +21,26 @@ class Unread(NamedTuple):
 
 
 _ALL_READ = Unread()
+_LARGEST_BRIDGED = 0.001  # share of samples, chosen
+_LIMIT = f'limit: none in {WINDOW:g} s'
+
+
+class Counted(NamedTuple):
+    """What had been counted at one time, of which a verdict takes what came lately."""
+
+    samples: int = 0
+    bridged: int = 0
+    invalid: int = 0
+    implausible: int = 0
+    unread: int = 0
+
+
+def counted(counts: SampleCounts, unread: Unread) -> Counted:
+    """Return the counts as they are now; `counts` goes on."""
+    return Counted(counts.samples, counts.bridged, counts.invalid, counts.implausible, unread.messages)
+
+
+_NOTHING = Counted()
 
 
 @dataclass(frozen=True)
@@ -45,6 +66,7 @@ class ControlFigures:
     foreign: str = ''  # which other node has sent what only one may, or empty
     writer_doubt: str = ''  # which other node may, at present
     unread: Unread = _ALL_READ
+    earlier: Counted = _NOTHING  # a window ago, or at the activation
 
 
 def verdict(figures: ControlFigures) -> Verdict:
@@ -70,54 +92,70 @@ def verdict(figures: ControlFigures) -> Verdict:
         'messages_malformed': figures.unread.messages,
         'fatal': bool(figures.foreign),  # a supervisor ends the graph
     }
-    level, sentence = _judgement(figures)
-    return Verdict(level, sentence, values)
+    well = 'damping on' if figures.damping_active else 'damping off'
+    return verdict_on(_errors(figures) or _warnings(figures), well, values)
 
 
-def _judgement(figures: ControlFigures) -> tuple[Level, str]:
+def _errors(figures: ControlFigures) -> list[Finding]:
+    """Return the gravest error, none where damping is possible."""
     if figures.foreign:
-        return Level.ERROR, f'0 A: {figures.foreign}, then activate mount_init and mount_control again'
+        sentence = f'0 A: {figures.foreign}, then activate mount_init and mount_control again'
+        return [Finding(Level.ERROR, figures.foreign, sentence)]
     if figures.table_refusal:
-        return Level.ERROR, f'0 A: {figures.table_refusal}'
+        return [Finding(Level.ERROR, figures.table_refusal, f'0 A: {figures.table_refusal}')]
     if figures.writer_doubt:
-        return Level.ERROR, f'0 A while this lasts: {figures.writer_doubt}'
+        return [
+            Finding(Level.ERROR, figures.writer_doubt, f'0 A while this lasts: {figures.writer_doubt}'),
+        ]
     if figures.silence > figures.longest_silence:
-        return Level.ERROR, (
+        sentence = (
             f'0 A: no displacement for {figures.silence:.2f} s (limit {figures.longest_silence:g} s); '
             'is mount_driver active and the electronics powered?'
         )
+        return [Finding(Level.ERROR, 'silence', sentence)]
     if figures.faults:
-        return Level.ERROR, fault_sentence(figures.faults)
+        return [Finding(Level.ERROR, 'spoiled', FAULT_SENTENCE)]
     if figures.doubted:
-        return Level.ERROR, f'0 A until {HOLD:g} s after the last doubt: {figures.doubt}'
-    counts = figures.counts
-    if counts.implausible:
-        return Level.WARN, (
-            f'{counts.implausible} displacement samples were implausible and answered with 0 A; '
+        sentence = f'0 A until {HOLD:g} s after the last doubt: {figures.doubt}'
+        return [Finding(Level.ERROR, figures.doubt, sentence)]
+    return []
+
+
+def _warnings(figures: ControlFigures) -> list[Finding]:
+    """Return what was wrong with samples and messages lately."""
+    now = counted(figures.counts, figures.unread)
+    lately = Counted(*(count - before for count, before in zip(now, figures.earlier, strict=True)))
+    found = []
+    if lately.implausible:
+        sentence = (
+            f'{lately.implausible} displacement samples were implausible and answered with 0 A ({_LIMIT}); '
             f'first of the last ones: {figures.doubt}'
         )
-    if counts.invalid:
-        return Level.WARN, (
-            f'{counts.invalid} of {counts.invalid + counts.samples} displacement samples were invalid '
-            'and answered with 0 A; check the displacement sensor'
+        found.append(Finding(Level.WARN, f'implausible: {figures.doubt}', sentence))
+    if lately.invalid:
+        sentence = (
+            f'{lately.invalid} of {lately.invalid + lately.samples} displacement samples were invalid and '
+            f'answered with 0 A ({_LIMIT}); check the displacement sensor'
         )
-    if counts.bridged > 0.001 * counts.samples:
-        return Level.WARN, (
-            f'{counts.bridged} of {counts.samples} samples were missing and bridged (limit 0.1 %); '
+        found.append(Finding(Level.WARN, 'invalid', sentence))
+    if lately.bridged > _LARGEST_BRIDGED * lately.samples:
+        sentence = (
+            f'{lately.bridged} of {lately.samples} samples were missing and bridged (limit '
+            f'{100 * _LARGEST_BRIDGED:g} % of {WINDOW:g} s); '
             "look at mount_driver's counts of lost frames"
         )
-    if figures.unread.messages:
-        return Level.WARN, (
-            f'{figures.unread.messages} messages could not be read and were not answered (limit: none), the '
-            f'last for {figures.unread.reason:.200}; which node publishes them?'
+        found.append(Finding(Level.WARN, 'bridged', sentence))
+    if lately.unread:
+        sentence = (
+            f'{lately.unread} messages could not be read and were not answered ({_LIMIT}), the last for '
+            f'{figures.unread.reason:.200}; which node publishes them?'
         )
-    return Level.OK, 'damping on' if figures.damping_active else 'damping off'
+        found.append(Finding(Level.WARN, 'unread', sentence))
+    return found
 
 
-def fault_sentence(faults: int) -> str:
-    """Return what is to be told of a controller that found its memory spoiled so many times."""
-    times = 'once' if faults == 1 else f'{faults} times'
-    return (
-        f'the controller held what is no finite number, {times}: damping was ended at 0 A and began afresh; '
-        'set friction.* and contact.* of mount_control closer to their defaults'
-    )
+FAULT_SENTENCE = (
+    'the controller held what is no finite number: damping was ended at 0 A and began afresh; '
+    'set friction.* and contact.* of mount_control closer to their defaults'
+)
+"""What is told of a controller that has found its memory spoiled."""

@@ -4,6 +4,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -13,7 +14,7 @@ from std_msgs.msg import String
 from mount_control.activation import Activation, AirGap
 from mount_control.answering import OFF, Answering
 from mount_control.controller import load_compiled_law
-from mount_control.diagnosis import ControlFigures, Unread, verdict
+from mount_control.diagnosis import ControlFigures, Counted, Unread, counted, verdict
 from mount_control.policy.contract import trace_fields
 from mount_control.sample_watch import Judgement
 from mount_control.settings import (
@@ -38,6 +39,7 @@ from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameter_gate import Change
 from mount_ros.nodes.parameters import SpecimenValues, declare
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.sliding_window import SlidingWindow
 from mount_ros.timing import LatencyHistogram
 
 _MEASURED_BEFORE = (
@@ -94,7 +96,7 @@ class MountControl(SafeLifecycleNode):
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
         self._send_trace = path.sender(topics.CONTROL_TRACE)
         self._send_event = path.sender(topics.EVENT)
-        path.subscribe(topics.DISPLACEMENT, self._on_displacement)
+        path.subscribe(topics.DISPLACEMENT, self._on_displacement, directly=True)
         path.subscribe(topics.AIR_GAP, self._on_air_gap)
         path.subscribe(topics.CURRENT_FORCE_TABLE, self._on_table)
         path.start()
@@ -105,6 +107,7 @@ class MountControl(SafeLifecycleNode):
         self.answering.watch.check_rate(self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
         self._latency = LatencyHistogram()
+        self._counted = SlidingWindow(Counted())
         self._heard = time.monotonic()
         self.answering.begin(self._settings, currents, air_gap.stamp)
         self.tell_writers()
@@ -141,11 +144,14 @@ class MountControl(SafeLifecycleNode):
             self._tell(self.answering.watch.last or self.get_clock().now().nanoseconds, text)
 
     def judge(self) -> Verdict:
-        answering = self.answering
+        answering, now = self.answering, time.monotonic()
+        counts = replace(answering.watch.counts)
+        earlier = self._counted.earlier(now, counted(counts, self._unread))
         return verdict(
             ControlFigures(
-                counts=answering.watch.counts,
-                silence=0.0 if self.lockstep else time.monotonic() - self._heard,
+                counts=counts,
+                earlier=earlier,
+                silence=0.0 if self.lockstep else now - self._heard,
                 longest_silence=self._settings.parameters.longest_bridge,
                 table_refusal=answering.refusal,
                 writer_doubt=answering.watch.writer_doubt,

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from mount_control.diagnosis import ControlFigures, Unread, verdict
+from mount_control.diagnosis import ControlFigures, Counted, Unread, counted, verdict
 from mount_control.sample_watch import SampleCounts
-from mount_ros.nodes.diagnostics import Level
+from mount_ros.nodes.diagnostics import Level, Standing
+from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
 
 GOOD = ControlFigures(
     counts=SampleCounts(samples=10_000),
@@ -49,7 +50,10 @@ def test_silence_is_an_error_with_value_limit_and_remedy():
 def test_invalid_samples_are_a_warning():
     level, sentence = _judged(counts=SampleCounts(samples=90, invalid=10, bridged=50))
     assert level is Level.WARN
-    assert sentence.startswith('10 of 100 displacement samples were invalid and answered with 0 A')
+    assert sentence.startswith(
+        '10 of 100 displacement samples were invalid and answered with 0 A (limit: none in 10 s); check'
+    )
+    assert '50 of 90 samples were missing and bridged' in sentence
 
 
 def test_a_displacement_in_doubt_is_an_error_while_that_lasts_and_a_warning_later():
@@ -69,7 +73,7 @@ def test_more_than_one_bridged_sample_in_a_thousand_is_a_warning(bridged, level)
     judged = _judged(counts=SampleCounts(samples=10_000, bridged=bridged))
     assert judged[0] is level
     if level is Level.WARN:
-        assert judged[1].startswith('11 of 10000 samples were missing and bridged (limit 0.1 %)')
+        assert judged[1].startswith('11 of 10000 samples were missing and bridged (limit 0.1 % of 10 s)')
 
 
 def test_the_figures_hold_the_counts_and_the_last_stamp():
@@ -100,7 +104,7 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
 def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
     judged = verdict(replace(GOOD, faults=2, damping_active=True))
     assert judged.level is Level.ERROR
-    assert judged.sentence.startswith('the controller held what is no finite number, 2 times: damping')
+    assert judged.sentence.startswith('the controller held what is no finite number: damping')
 
 
 def test_another_writer_is_an_error_that_ends_the_graph():
@@ -122,6 +126,23 @@ def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
     judged = verdict(replace(GOOD, unread=unread))
     assert (judged.level, judged.figures['messages_malformed']) == (Level.WARN, 2)
     assert judged.sentence == (
-        '2 messages could not be read and were not answered (limit: none), the last for cut; which node '
-        'publishes them?'
+        '2 messages could not be read and were not answered (limit: none in 10 s), the last for cut; which '
+        'node publishes them?'
     )
+
+
+@pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged', 'unread'])
+def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
+    window, standing, told = SlidingWindow(Counted()), Standing(), []
+    for tenth in range(300):
+        found = 100 * min(max(tenth - 49, 0), 5)
+        unread = Unread(found, 'cut') if count == 'unread' else Unread()
+        counts = SampleCounts(samples=100 * tenth, **{count: found} if count != 'unread' else {})
+        earlier = window.earlier(tenth / 10, counted(counts, unread))
+        figures = replace(GOOD, counts=counts, unread=unread, earlier=earlier, doubt='step')
+        verdict_told = standing.keep(verdict(figures))
+        told.append((verdict_told.level, verdict_told.sentence))
+    warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
+    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
+    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
+    assert len(set(told)) == 2

@@ -250,9 +250,9 @@ def test_a_displacement_that_cannot_be_read_is_counted_and_named(active, around)
     verdict = control.judge()
     assert (verdict.level, verdict.figures['messages_malformed']) == (Level.WARN, 1)
     assert verdict.sentence == (
-        '1 messages could not be read and were not answered (limit: none), the last for displacement: the '
-        "message names ['coil_current'] with 1 positions; needed are ['mount'] with one position each; which "
-        'node publishes them?'
+        '1 messages could not be read and were not answered (limit: none in 10 s), the last for '
+        "displacement: the message names ['coil_current'] with 1 positions; needed are ['mount'] with one "
+        'position each; which node publishes them?'
     )
 
 
@@ -526,7 +526,7 @@ def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(act
     assert (around.traces[-1][1]['damping_active'], around.traces[-1][1]['current']) == (0.0, 0.0)
     verdict = control.judge()
     assert verdict.level is Level.ERROR
-    assert verdict.sentence.startswith('the controller held what is no finite number, once: damping')
+    assert verdict.sentence.startswith('the controller held what is no finite number: damping')
     assert verdict.figures['last_fault'] == ACTIVATION + 401 * MS
     assert not verdict.figures['damping_active']
     # and it works on

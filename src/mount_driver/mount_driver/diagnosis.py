@@ -1,201 +1,121 @@
-"""The verdict on the link, from what was counted now and a second ago."""
+"""The verdict on the link, from what was counted now and some seconds ago.
 
-import math
-from collections import deque
+No sentence holds a number that goes on changing while what it tells of stands; such numbers are figures.
+"""
+
 from typing import NamedTuple
 
-from mount_driver.codec import Status
-from mount_driver.e2e_receiver import Outcome
-from mount_driver.exchange import Exchange
-from mount_driver.link import Arrival, Refusal
 from mount_driver.parameters import DriverParameters
+from mount_driver.snapshot import Snapshot
 from mount_driver.watches.ripple_watch import RippleFigures
 from mount_models.sampling import HIGHEST_CURRENT, SETPOINT_TIMEOUT
-from mount_ros.nodes.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
+from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
 
-_PERIOD = 1.0  # s: rates are taken over this long
-
-
-class Snapshot(NamedTuple):
-    """What is known of the link at one time; counts are since the activation."""
-
-    time: float = 0.0  # s, steady clock
-    frame_age: float = 0.0  # s since the last sound sample, or since the activation
-    samples: int = 0
-    lost: int = 0
-    corrupt: int = 0
-    late: int = 0
-    resent: int = 0
-    repeated: int = 0
-    wrong_sequence: int = 0
-    invalid_displacements: int = 0
-    setpoints: int = 0
-    limited: int = 0
-    refused: int = 0
-    timeouts: int = 0
-    unsent: int = 0
-    unsent_reason: str = ''
-    restarts: int = 0
-    jumps: int = 0
-    gaps: int = 0
-    recoveries: int = 0
-    error_frames: int = 0
-    unreadable: int = 0  # frames and datagrams that no frame could be made of
-    unreadable_reason: str = ''
-    latest_stamp: int = 0  # ns
-    last_refusal: Refusal | None = None
-    driving: bool = False
-    unheard: bool = False  # the electronics report that no setpoint reaches them
-    bus_off: bool = False
-    trouble: str = ''
-    failure: str = ''
-    fault: str = ''  # keeps the coil off until the next activation
-    needs_initialisation: bool = False  # and nothing else
-    other_senders: int = 0  # frames that neither our electronics nor we have sent
-    other_sender_age: float = math.inf  # s, since the last of them
-    celsius: float = math.nan  # degC, the coil by the thermal model
-    current_limit: float = HIGHEST_CURRENT  # A, what it may carry
-    derated: int = 0  # setpoints that were lowered to that
-    held: str = ''  # keeps it at 0 A at present
-    ripple: RippleFigures | None = None
-    ripple_warning: str = ''
-    status: Status | None = None
-    setpoint_errors: int = 0  # statuses that report setpoint frames with a failed check
+_SECOND = 1.0  # s, chosen: what comes at 10 Hz and more has come within it, or does no more
 
 
-def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
-    """Return what `exchange` has counted; `now_ns` and `started_ns` are on the steady clock."""
-    link, latest, guard = exchange.link, exchange.link.latest, exchange.guard
-    seen = guard.other_sender_at
-    return Snapshot(
-        time=now_ns * 1e-9,
-        frame_age=(now_ns - (exchange.last_received or started_ns)) * 1e-9,
-        samples=link.arrivals[Arrival.NEW],
-        lost=link.lost,
-        corrupt=link.arrivals[Arrival.CORRUPT] + link.statuses.corrupt,
-        late=link.arrivals[Arrival.LATE],
-        resent=link.arrivals[Arrival.RESENT],
-        repeated=link.samples.counts[Outcome.REPEATED] + link.statuses.counts[Outcome.REPEATED],
-        wrong_sequence=(
-            link.samples.counts[Outcome.WRONG_SEQUENCE] + link.statuses.counts[Outcome.WRONG_SEQUENCE]
-        ),
-        invalid_displacements=link.invalid_displacements,
-        setpoints=link.setpoints,
-        limited=link.limited,
-        refused=sum(link.refusals.values()),
-        timeouts=link.timeouts,
-        unsent=exchange.unsent,
-        unsent_reason=exchange.unsent_reason,
-        restarts=link.clock.restarts,
-        jumps=link.jumps,
-        gaps=link.clock.gaps,
-        recoveries=exchange.recoveries,
-        error_frames=exchange.error_frames,
-        unreadable=exchange.reception.unreadable,
-        unreadable_reason=exchange.reception.reason,
-        latest_stamp=latest.stamp if latest is not None else 0,
-        last_refusal=link.last_refusal,
-        driving=link.driving,
-        unheard=latest is not None and latest.sample.setpoint_timeout,
-        bus_off=exchange.bus_off,
-        trouble=exchange.trouble,
-        failure=exchange.failure,
-        fault=link.fault,
-        needs_initialisation=link.needs_initialisation,
-        other_senders=guard.other_senders,
-        other_sender_age=math.inf if seen is None else (link.clock.now(now_ns) - seen) * 1e-9,
-        celsius=guard.heat.celsius,
-        current_limit=guard.heat.current_limit,
-        derated=link.derated,
-        held=link.held,
-        ripple=guard.ripple.figures,
-        ripple_warning=guard.ripple.warning,
-        status=link.status,
-        setpoint_errors=link.setpoint_errors,
-    )
+class Past(NamedTuple):
+    """What was known of the link a window ago, and a second ago."""
+
+    window: Snapshot
+    second: Snapshot
 
 
 class LinkWatch:
-    """Keeps the snapshots of the last second."""
+    """Keeps the snapshots of the last seconds."""
 
     def __init__(self) -> None:
-        self._past: deque[Snapshot] = deque()
+        self._window, self._second = SlidingWindow(Snapshot()), SlidingWindow(Snapshot(), _SECOND)
 
-    def earlier(self, now: Snapshot) -> Snapshot:
-        """Note `now` and return the snapshot of about a second ago, or the oldest there is."""
-        self._past.append(now)
-        while len(self._past) > 1 and now.time - self._past[1].time >= _PERIOD:
-            self._past.popleft()
-        return self._past[0]
+    def past(self, now: Snapshot) -> Past:
+        """Note `now` and return what was known earlier, in the beginning nothing."""
+        return Past(self._window.earlier(now.time, now), self._second.earlier(now.time, now))
 
 
-def judge(now: Snapshot, earlier: Snapshot, parameters: DriverParameters, *, lockstep: bool) -> Verdict:
+def judge(now: Snapshot, past: Past, parameters: DriverParameters, *, lockstep: bool) -> Verdict:
     """Return the verdict: the gravest finding speaks, all figures follow."""
-    where = f'{parameters.interface} {parameters.channel}'
-    for level, sentence in (
+    where, earlier = f'{parameters.interface} {parameters.channel}', past.window
+    found = (
         *_bus_findings(now, where, parameters),
         *_safety_findings(now),
         *(() if lockstep else _silence_findings(now, where, parameters)),
-        *_fault_findings(now, earlier, parameters),
+        *_setpoint_findings(now, past.second, parameters),
+        *_status_findings(now, earlier, parameters),
         *_heat_findings(now, parameters),
-        *([(Level.WARN, now.ripple_warning)] if now.ripple_warning else []),
-        *_quality_findings(now, earlier, parameters),
-        *_setpoint_findings(now, earlier, parameters),
-    ):
-        return Verdict(level, sentence, _figures(now, parameters))
-    return Verdict(Level.OK, 'link to the electronics is up', _figures(now, parameters))
+        *_ripple_findings(now),
+        *_sample_findings(now, earlier, parameters),
+        *_frame_findings(now, earlier),
+        *_refusal_findings(now, earlier),
+    )
+    return verdict_on(found, 'link to the electronics is up', _figures(now, earlier, parameters))
 
 
-Findings = list[tuple[Level, str]]
+Findings = list[Finding]
 
 
 def _bus_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Findings:
     if now.failure:
-        return [(Level.ERROR, f'driver has stopped at 0 A: {now.failure}')]
+        return [Finding(Level.ERROR, 'failure', f'driver has stopped at 0 A: {now.failure}')]
     if now.trouble:
         wait = f'trying again for {parameters.recovery_time:g} s'
-        return [(Level.ERROR, f'CAN bus lost: {now.trouble}; setpoints are dropped, {wait}')]
+        text = f'CAN bus lost: {now.trouble}; setpoints are dropped, {wait}'
+        return [Finding(Level.ERROR, 'bus lost', text)]
     if now.bus_off:
         remedy = 'check wiring, termination and bit rates; `ip link set <channel> type can restart-ms 100`'
-        return [(Level.ERROR, f'{where} is bus off: setpoints are dropped; {remedy}')]
+        return [Finding(Level.ERROR, 'bus off', f'{where} is bus off: setpoints are dropped; {remedy}')]
     return []
 
 
 def _safety_findings(now: Snapshot) -> Findings:
     if now.fault:
         again = 'then activate mount_driver, mount_init and mount_control again'
-        return [(Level.ERROR, f'coil switched off: {now.fault}, {again}{_other_sender(now)}')]
-    return [(Level.ERROR, f'coil at 0 A while this lasts: {now.held}')] if now.held else []
+        text = f'{now.fault}, {again}{_other_sender(now)}'
+        return [Finding(Level.ERROR, text, f'coil switched off: {text}')]
+    text = f'coil at 0 A while this lasts: {now.held}'
+    return [Finding(Level.ERROR, now.held, text)] if now.held else []
 
 
 def _other_sender(now: Snapshot) -> str:
     if not now.other_senders:
         return ''
-    return '; it still sends' if now.other_sender_age <= _PERIOD else f'; silent for more than {_PERIOD:g} s'
+    return '; it still sends' if now.other_sender_age <= _SECOND else f'; silent for more than {_SECOND:g} s'
 
 
 def _silence_findings(now: Snapshot, where: str, parameters: DriverParameters) -> Findings:
     if now.frame_age <= parameters.frame_timeout:
         return []
-    # Whole seconds, so that the sentence does not change with every look.
-    age = int(now.frame_age)
-    silent = f'{age} s' if age else f'more than {1e3 * parameters.frame_timeout:g} ms'
+    silent = f'more than {1e3 * parameters.frame_timeout:g} ms'
     remedy = f'are the electronics powered, is {where} up?'
-    return [(Level.ERROR, f'no frames from the electronics for {silent}; {remedy}')]
+    return [Finding(Level.ERROR, 'silence', f'no frames from the electronics for {silent}; {remedy}')]
 
 
-def _fault_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
+def _setpoint_findings(now: Snapshot, before: Snapshot, parameters: DriverParameters) -> Findings:
+    found: Findings = []
+    if now.setpoints and not now.driving:
+        limit = f'{1e3 * parameters.setpoint_timeout:g} ms'
+        text = f'coil at 0 A: no setpoint for {limit}; is mount_control active?'
+        found.append(Finding(Level.WARN, 'no setpoint', text))
+    if now.driving and before.driving and now.unheard and before.unheard:
+        limit = f'{1e3 * SETPOINT_TIMEOUT:g} ms'
+        text = f'the electronics do not take the setpoints: none in time for {limit}, by their status'
+        found.append(Finding(Level.WARN, 'unheard', f'{text}; check the bus'))
+    return found
+
+
+def _status_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
     status = now.status
     if status is None:
         return []
     found: Findings = []
     if now.setpoint_errors > earlier.setpoint_errors:
         text = 'the electronics report setpoint frames that were damaged, repeated or of wrong sequence'
-        found.append((Level.WARN, f'{text}; they do not use them: check the bus, does another node send?'))
+        remedy = 'they do not use them: check the bus, does another node send?'
+        found.append(Finding(Level.WARN, 'setpoint errors', f'{text}; {remedy}'))
     limit = parameters.temperature_warning_celsius
     if status.coil_temperature_celsius > limit:
         text = f'coil temperature ({status.coil_temperature_celsius:.1f} degC) is above {limit:g} degC'
-        found.append((Level.WARN, f'{text}; lower the current or cool the mount'))
+        found.append(Finding(Level.WARN, 'temperature', f'{text}; lower the current or cool the mount'))
     return found
 
 
@@ -203,64 +123,80 @@ def _heat_findings(now: Snapshot, parameters: DriverParameters) -> Findings:
     heating = parameters.heating
     if not now.celsius > heating.derating_celsius:
         return []
-    # Rounded, so that the sentence does not change with every look.
-    text = f'coil at about {now.celsius:.0f} degC by the thermal model: current limited to'
-    limits = f'lowered from {heating.derating_celsius:g} degC on, 0 A at {heating.limit_celsius:g} degC'
-    return [(Level.WARN, f'{text} {now.current_limit:.1f} A ({limits}); damp less or cool the mount')]
+    text = f'coil above {heating.derating_celsius:g} degC by the thermal model: the hotter, the less current'
+    limit = f'it is let, 0 A at {heating.limit_celsius:g} degC'
+    return [Finding(Level.WARN, 'heat', f'{text} {limit}; damp less or cool the mount')]
 
 
-def _quality_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
+def _ripple_findings(now: Snapshot) -> Findings:
+    warning = now.ripple_warning
+    # Its first words say which it is, the value stands in the figures.
+    return [Finding(Level.WARN, ' '.join(warning.split()[:2]), warning)] if warning else []
+
+
+def _sample_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
     samples = now.samples - earlier.samples
     lost, corrupt = now.lost - earlier.lost, now.corrupt - earlier.corrupt
     invalid = now.invalid_displacements - earlier.invalid_displacements
     found: Findings = []
     share = (lost + corrupt) / max(samples + lost + corrupt, 1)
     if share > parameters.loss_warning:
-        text = f'{lost} samples lost and {corrupt} frames corrupt in the last second'
-        limit = f'{100 * share:.2f} %, limit {100 * parameters.loss_warning:g} %'
-        found.append((Level.WARN, f'{text} ({limit}); check wiring, bus load and load of this machine'))
+        text = f'{lost} samples lost and {corrupt} frames corrupt'
+        limit = f'{100 * share:.2f} %, limit {100 * parameters.loss_warning:g} % of {WINDOW:g} s'
+        remedy = 'check wiring, bus load and load of this machine'
+        found.append(Finding(Level.WARN, 'loss', f'{text} ({limit}); {remedy}'))
     if invalid:
-        text = f'displacement not valid in {invalid} samples of the last second'
-        found.append((Level.WARN, f'{text}; check the displacement sensor'))
+        text = f'displacement not valid in {invalid} samples (limit: none in {WINDOW:g} s)'
+        found.append(Finding(Level.WARN, 'invalid', f'{text}; check the displacement sensor'))
     if now.gaps > earlier.gaps:
         text = 'the electronics sent no samples for more than 1 s'
-        found.append((Level.WARN, f'{text}; check their supply and the bus, activate the graph again'))
+        remedy = 'check their supply and the bus, activate the graph again'
+        found.append(Finding(Level.WARN, 'gap', f'{text}; {remedy}'))
+    return found
+
+
+def _frame_findings(now: Snapshot, earlier: Snapshot) -> Findings:
+    """Return what is wrong with single frames; none is the limit."""
+    found: Findings = []
+    limit = f'limit: none in {WINDOW:g} s'
     repeated, disordered = now.repeated - earlier.repeated, now.wrong_sequence - earlier.wrong_sequence
     if repeated or disordered:
-        text = f'{repeated} frames repeated and {disordered} of wrong sequence in the last second, not used'
-        found.append((Level.WARN, f'{text}; did the electronics restart, does another node send theirs?'))
-    if now.unreadable > earlier.unreadable:
-        text = f'{now.unreadable - earlier.unreadable} frames of the last second could not be read'
-        reason = f'the last for {now.unreadable_reason:.100}'
-        found.append((Level.WARN, f'{text} ({reason}), not used; does another program send on this bus?'))
-    if now.unsent > earlier.unsent:
-        text = f'{now.unsent - earlier.unsent} setpoint frames were not taken by the bus in the last second'
-        found.append((Level.WARN, f'{text} ({now.unsent_reason}); does another node acknowledge?'))
+        text = f'{repeated} frames repeated and {disordered} of wrong sequence ({limit}), not used'
+        remedy = 'did the electronics restart, does another node send theirs?'
+        found.append(Finding(Level.WARN, 'sequence', f'{text}; {remedy}'))
+    unreadable = now.unreadable - earlier.unreadable
+    if unreadable:
+        text = f'{unreadable} frames could not be read ({limit}; the last for {now.unreadable_reason:.100})'
+        remedy = 'not used; does another program send on this bus?'
+        found.append(Finding(Level.WARN, 'unreadable', f'{text}, {remedy}'))
+    unsent = now.unsent - earlier.unsent
+    if unsent:
+        text = f'{unsent} setpoint frames were not taken by the bus ({limit}; {now.unsent_reason})'
+        found.append(Finding(Level.WARN, 'unsent', f'{text}; does another node acknowledge?'))
     return found
 
 
-def _setpoint_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> Findings:
+def _refusal_findings(now: Snapshot, earlier: Snapshot) -> Findings:
     found: Findings = []
-    refused = now.refused - earlier.refused
+    limit = f'limit: none in {WINDOW:g} s'
+    refused, limited = now.refused - earlier.refused, now.limited - earlier.limited
     if refused and now.last_refusal is not None:
-        text = f'{refused} setpoints refused in the last second'
-        found.append((Level.WARN, f'{text}, the last because {now.last_refusal.value}'))
-    if now.setpoints and not now.driving:
-        limit = f'{1e3 * parameters.setpoint_timeout:g} ms'
-        found.append((Level.WARN, f'coil at 0 A: no setpoint for {limit}; is mount_control active?'))
-    if now.driving and earlier.driving and now.unheard and earlier.unheard:
-        limit = f'{1e3 * SETPOINT_TIMEOUT:g} ms'
-        text = f'the electronics do not take the setpoints: none in time for {limit}, by their status'
-        found.append((Level.WARN, f'{text}; check the bus'))
-    if now.limited > earlier.limited:
-        text = (
-            f'{now.limited - earlier.limited} setpoints limited to {HIGHEST_CURRENT:g} A in the last second'
-        )
-        found.append((Level.WARN, text))
+        text = f'{refused} setpoints refused ({limit}), the last because {now.last_refusal.value}'
+        found.append(Finding(Level.WARN, 'refused', f'{text}; look at what publishes current_setpoint'))
+    if limited:
+        text = f'{limited} setpoints limited to {HIGHEST_CURRENT:g} A ({limit})'
+        found.append(Finding(Level.WARN, 'limited', f'{text}; look at what publishes current_setpoint'))
     return found
 
 
-def _figures(now: Snapshot, parameters: DriverParameters) -> dict[str, object]:
+_RECENT = (
+    'samples', 'lost', 'corrupt', 'repeated', 'wrong_sequence', 'invalid_displacements', 'refused', 'limited',
+    'unreadable', 'unsent',
+)  # fmt: skip
+"""What is told of the window, too."""
+
+
+def _figures(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> dict[str, object]:
     figures: dict[str, object] = {
         'last_stamp': now.latest_stamp,
         'sample_rate': parameters.sample_rate,
@@ -293,6 +229,7 @@ def _figures(now: Snapshot, parameters: DriverParameters) -> dict[str, object]:
         'coil_model_celsius': round(now.celsius, 1),
         'current_limit': round(now.current_limit, 3),
         'derated': now.derated,
+        **{f'recent.{name}': getattr(now, name) - getattr(earlier, name) for name in _RECENT},
     }
     if now.ripple is not None:
         figures |= _ripple_figures(now.ripple)

@@ -5,10 +5,11 @@ import time
 
 from mount_driver.clock import CounterClock, ElectronicsClock
 from mount_driver.codec import MountCodec
-from mount_driver.diagnosis import LinkWatch, judge, snapshot
+from mount_driver.diagnosis import LinkWatch, judge
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal, Stamped
 from mount_driver.parameters import DriverParameters
+from mount_driver.snapshot import snapshot
 from mount_driver.watches.guard import Fault
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
@@ -59,7 +60,7 @@ class MountDriver(SafeLifecycleNode):
         self._publish_displacement = path.sender(DISPLACEMENT)
         self._publish_ripple = path.sender(COIL_RIPPLE)
         self._publish_temperature = path.sender(COIL_TEMPERATURE)
-        path.subscribe(CURRENT_SETPOINT, self._on_setpoint)
+        path.subscribe(CURRENT_SETPOINT, self._on_setpoint, directly=True)
         path.start()
         self._path = path
 
@@ -114,7 +115,7 @@ class MountDriver(SafeLifecycleNode):
         if exchange is None:
             return Verdict(Level.OK, 'inactive')
         now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
-        return judge(now, self._watch.earlier(now), self._settings, lockstep=self.lockstep)
+        return judge(now, self._watch.past(now), self._settings, lockstep=self.lockstep)
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()

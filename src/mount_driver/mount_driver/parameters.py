@@ -43,7 +43,7 @@ class DriverParameters(NamedTuple):
     ] = 10.0
     loss_warning: Annotated[
         float,
-        Quantity('1', 'share of lost or corrupt samples in a second that is warned of', 0.0, 1.0),
+        Quantity('1', 'share of lost or corrupt samples in 10 s that is warned of', 0.0, 1.0),
     ] = 0.001
     temperature_warning_celsius: Annotated[
         float, Quantity('degC', 'coil temperature that is warned of', -60.0, 250.0)

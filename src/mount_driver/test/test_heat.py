@@ -2,14 +2,14 @@
 
 import itertools
 import math
-import re
 
 import pytest
 from car import MS, Car
 
 from mount_driver.codec import Status
-from mount_driver.diagnosis import judge, snapshot
+from mount_driver.diagnosis import Past, judge
 from mount_driver.parameters import DriverParameters
+from mount_driver.snapshot import snapshot
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_models.coil.heating import CoilHeating
 from mount_ros.nodes.diagnostics import Level
@@ -28,7 +28,7 @@ def car():
 
 def verdict(car):
     now = snapshot(car.exchange, car.now, 0)
-    return judge(now, now, DriverParameters(heating=QUICK), lockstep=False)
+    return judge(now, Past(now, now), DriverParameters(heating=QUICK), lockstep=False)
 
 
 def test_3_ampere_for_long_are_lowered_smoothly_before_the_limit_and_the_coil_is_not_doubted(car):
@@ -44,8 +44,11 @@ def test_3_ampere_for_long_are_lowered_smoothly_before_the_limit_and_the_coil_is
     assert currents[-1] == pytest.approx(1.78, abs=0.01)
     assert car.exchange.link.fault == ''
     found = verdict(car)
-    told = r'about 152 degC by the thermal model: .* 1\.8 A \(lowered from 140 degC on, 0 A at 170 degC\)'
-    assert re.search(told, found.sentence)
+    told = (
+        'coil above 140 degC by the thermal model: the hotter, the less current it is let, 0 A at 170 degC; '
+    )
+    assert found.sentence.startswith(told)
+    assert found.figures['coil_model_celsius'] == pytest.approx(152.0, abs=1.0)
     assert found.level == Level.WARN
     assert found.figures['derated'] > 10_000
 

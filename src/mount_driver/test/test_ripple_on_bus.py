@@ -4,8 +4,9 @@ import pytest
 from car import Car
 from far_end import Status, ripple, sample
 
-from mount_driver.diagnosis import judge, snapshot
+from mount_driver.diagnosis import Past, judge
 from mount_driver.parameters import DriverParameters
+from mount_driver.snapshot import snapshot
 from mount_ros.nodes.diagnostics import Level
 
 BEFORE = 500  # samples in which all is well
@@ -21,7 +22,7 @@ def car():
 
 def verdict(car):
     now = snapshot(car.exchange, car.now, 0)
-    return judge(now, now, DriverParameters(), lockstep=False)
+    return judge(now, Past(now, now), DriverParameters(), lockstep=False)
 
 
 def drive(car, milliseconds, change):

@@ -6,7 +6,8 @@ from typing import NamedTuple
 from mount_init.initialisation import InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.specimen import Specimen
-from mount_ros.nodes.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
+from mount_ros.nodes.sliding_window import WINDOW
 
 _WEAR_RESERVE = 10e-6  # m, chosen: early enough to order pads
 _SKIPPED_SHARE = 0.02  # chosen
@@ -20,12 +21,13 @@ class InitFigures(NamedTuple):
     last_stamp: int
     malformed: int
     malformed_reason: str
+    malformed_lately: int  # of them, within the window
 
 
 def verdict(figures: InitFigures, specimen: Specimen, parameters: InitParameters) -> Verdict:
     """Return level, sentence and figures for an active node, which always has a result."""
     result = figures.result
-    level, sentence = _judge(figures, specimen, parameters)
+    level, sentence = _judge(result, specimen, parameters)
     told = {
         'rest_gap_um': f'{result.rest_gap * 1e6:.2f}',
         'contact_gap_um': f'{result.contact_gap * 1e6:.2f}',
@@ -48,7 +50,11 @@ def verdict(figures: InitFigures, specimen: Specimen, parameters: InitParameters
         'messages_malformed': figures.malformed,
         'last_stamp': figures.last_stamp,
     }
-    return Verdict(level, sentence, told)
+    found = [Finding(level, 'result', sentence)] if level is not Level.OK else []
+    if figures.malformed_lately:
+        malformed = f'{figures.malformed_lately} messages could not be read (limit: none in {WINDOW:g} s)'
+        found.append(Finding(Level.WARN, 'malformed', f'{malformed}; {figures.malformed_reason}'))
+    return verdict_on(found, sentence, told)
 
 
 def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
@@ -57,8 +63,7 @@ def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
     return float(pressed_gap - specimen.force_law.gap_low)
 
 
-def _judge(figures: InitFigures, specimen: Specimen, parameters: InitParameters) -> tuple[Level, str]:
-    result = figures.result
+def _judge(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> tuple[Level, str]:
     reserve = wear_reserve(result, specimen)
     if reserve < _WEAR_RESERVE:
         return Level.WARN, (
@@ -80,8 +85,6 @@ def _judge(figures: InitFigures, specimen: Specimen, parameters: InitParameters)
             f'{result.evidence.skipped} of {total} ripple samples were invalid, more than '
             f'{_SKIPPED_SHARE:.0%}; check the coil ripple measurement'
         )
-    if figures.malformed:
-        return Level.WARN, f'{figures.malformed} messages could not be read; {figures.malformed_reason}'
     gaps = (
         f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
         f'offset current {result.offset_current:.3f} A'

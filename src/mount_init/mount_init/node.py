@@ -1,6 +1,7 @@
 """ROS 2 node of the initialisation: at each activation one current ramp, then gaps and table, latched."""
 
 import math
+import time
 
 from mount_init.coil_temperature import TemperatureReadings
 from mount_init.diagnosis import InitFigures, verdict
@@ -21,6 +22,7 @@ from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
+from mount_ros.nodes.sliding_window import SlidingWindow
 
 _DRIVER_PATIENCE = 0.3  # s, chosen: the driver looks at itself ten times a second
 
@@ -44,6 +46,7 @@ class MountInit(SafeLifecycleNode):
         Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
         load_compiled_laws(self._specimen)
         self._malformed, self._malformed_reason = 0, ''
+        self._malformed_before = SlidingWindow(0)
         self._temperatures = TemperatureReadings()
         self._driver = DriverReport(self.get_namespace())
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
@@ -94,7 +97,9 @@ class MountInit(SafeLifecycleNode):
     def judge(self) -> Verdict:
         assert self._result is not None
         stamp, result = self._result
-        figures = InitFigures(result, stamp, self._malformed, self._malformed_reason)
+        malformed = self._malformed
+        lately = malformed - self._malformed_before.earlier(time.monotonic(), malformed)
+        figures = InitFigures(result, stamp, malformed, self._malformed_reason, lately)
         return verdict(figures, self._specimen, self._init_parameters)
 
     def _ramp(self, dialogue: CoilDialogue, ramp: Initialisation) -> InitialisationResult:
@@ -160,7 +165,7 @@ class MountInit(SafeLifecycleNode):
 
     def _on_verdicts(self, raw: bytes) -> None:
         for told in verdicts_of(raw):
-            self._driver.take(*told)
+            self._driver.take(told.node, told.sentence, told.figures)
 
     def _on_setpoint(self, raw: bytes) -> None:
         try:

@@ -16,8 +16,8 @@ def result(simulated_actuator, specimen, run_initialisation):
     )
 
 
-def judge(result, specimen, malformed=0, reason=''):
-    return verdict(InitFigures(result, 123, malformed, reason), specimen, InitParameters())
+def judge(result, specimen, lately=0, reason=''):
+    return verdict(InitFigures(result, 123, 3, reason, lately), specimen, InitParameters())
 
 
 def test_a_good_result_is_told_with_its_figures(result, specimen):
@@ -53,6 +53,9 @@ def test_many_invalid_samples_are_a_warning(result, specimen):
 
 
 def test_unreadable_messages_are_a_warning(result, specimen):
-    said = judge(result, specimen, 3, 'coil_ripple: the message names nothing')
+    said = judge(result, specimen, 2, 'coil_ripple: the message names nothing')
     assert said.level == Level.WARN
-    assert said.sentence == '3 messages could not be read; coil_ripple: the message names nothing'
+    assert said.sentence == (
+        '2 messages could not be read (limit: none in 10 s); coil_ripple: the message names nothing'
+    )
+    assert said.figures['messages_malformed'] == 3

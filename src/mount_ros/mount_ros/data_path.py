@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from mount_ros.data_thread import DataThread, Work
+from mount_ros.direct import Receiver
 from mount_ros.messages.types import message_class
 from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Delivery, Topic
@@ -49,6 +50,8 @@ class DataPath:
         """Who publishes what this path hears; `on_writers` is called when others begin or cease to."""
         self._serving = False
         self._publishers: list[Publisher] = []
+        self._sent_directly: list[str] = []
+        self._receivers: list[Receiver] = []
         self._works: list[Work] = []
         self._stopped = False
         self.refused = 0
@@ -73,16 +76,25 @@ class DataPath:
         `mount`: the namespace of one of several mounts, within that of the node.
         """
         placed = replace(topic, name=f'{mount}/{topic.name}') if mount else topic
-        return self.publisher(placed).publish
+        publisher = self.publisher(placed)
+        if self.lockstep:
+            return publisher.publish
+        self._sent_directly.append(publisher.topic_name)
+        return self._thread.direct.sender(publisher.topic_name, publisher.publish)
 
-    def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
+    def subscribe(self, topic: Topic, callback: Callable[[bytes], None], *, directly: bool = False) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`.
 
+        `directly`: in the sender's thread, where topic and time (not lock-step) allow it, see `direct`.
         An exception costs the message that it came with, is logged and counted; later ones are served.
         """
         kind, qos = message_class(topic.type), control_qos(topic, lockstep=self.lockstep)
         guarded = self._surviving(f'message of {topic.name} not used', callback)
         events = self._events(topic)
+        if directly and not self.lockstep:
+            receiver = self._thread.direct.receiver(self.node.resolve_topic_name(topic.name), guarded)
+            self._receivers.append(receiver)
+            guarded = receiver.take_published
 
         def create() -> None:
             subscription = self.node.create_subscription(
@@ -141,8 +153,12 @@ class DataPath:
             return
         self._stopped = True
         self.leave_work()
+        for receiver in self._receivers:
+            receiver.end()
         if self._serving:
             self._thread.remove(self.node)
+        for name in self._sent_directly:
+            self._thread.direct.end_sender(name)
         self.writers.end()
         self.node.destroy_node()
 

@@ -13,6 +13,7 @@ from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 
+from mount_ros.direct import DirectDelivery
 from mount_ros.private_rclpy import raw_taker
 
 _SPIN_PERIOD = 0.2  # s: how often the thread looks whether it shall end
@@ -62,6 +63,8 @@ class DataThread:
 
     def __init__(self, context: Context, on_failure: Callable[[str], None] = lambda sentence: None):
         self.failure = ''
+        self.direct = DirectDelivery()
+        """Of the nodes that share this thread."""
         self._context = context
         self._on_failure = on_failure
         self._executor: Executor | None = None

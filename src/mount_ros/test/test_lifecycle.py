@@ -239,6 +239,7 @@ def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(pro
         'state': 'active',
         'unmatched': '/mount_right/displacement',
         'other_writer': '',
+        'path_errors': '0',
     }
 
 
@@ -300,5 +301,5 @@ def test_errors_in_the_data_path_are_a_warning_where_the_node_knows_of_none(prob
         return False
 
     probe.data_path.attend(work)
-    sentence = 'errors in the data path (1), the last: work not done: ValueError: too hard'
+    sentence = 'errors in the data path (1, limit: none), the last: work not done: ValueError: too hard'
     wait_until(lambda: operator.heard(Level.WARN, sentence), 'the sentence in the diagnostics')

@@ -7,7 +7,7 @@ from mount_ros.nodes.real_time import WATCH_PERIOD, Beats, RealTime, Urgent
 
 NAMES = {
     1: 'MainThread', 2: 'mount_driver', 3: 'diagnostics', 4: 'data', 5: 'can_receive',
-    6: 'dds.shm.12413', 7: 'dds.shm.wdog', 8: 'dds.asyn.0.0', 9: 'dds.ev.0', 10: 'dds.udp.12413',
+    6: 'dds.udp.12413', 7: 'dds.shm.wdog', 8: 'dds.asyn.0.0', 9: 'dds.ev.0', 10: 'dds.udp.12412',
 }  # fmt: skip
 WATCH, BESIDE, LOOP, TIMERS = 1, {2, 3}, {4, 5, 6}, 9
 ALL = {WATCH, *BESIDE, *LOOP}

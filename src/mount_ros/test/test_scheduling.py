@@ -1,6 +1,7 @@
 """The names by which the threads of the data are found, and real time that a process was started in."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -28,8 +29,10 @@ def test_the_middleware_names_its_threads_as_those_that_carry_the_data_are_told_
     node = Node('named', context=context)
     names = set(Threads().names().values())
     node.destroy_node()
-    for beginning in ('dds.shm.wdog', 'dds.shm.', 'dds.asyn', 'dds.ev'):
+    for beginning in ('dds.udp.', 'dds.asyn', 'dds.ev'):
         assert any(name.startswith(beginning) for name in names), f'{beginning} is not among {sorted(names)}'
+    by_locks = re.compile(r'dds\.shm\.\d+')
+    assert not any(map(by_locks.fullmatch, names)), 'data is taken by shared memory, which has locks'
 
 
 def test_threads_of_python_are_found_by_their_own_names():

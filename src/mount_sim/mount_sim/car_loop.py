@@ -4,7 +4,7 @@ import threading
 import time
 from collections.abc import Mapping
 
-from mount_sim.loop import LOCKSTEP_WAIT, ElectronicsLoop, NoAnswerError
+from mount_sim.loop import LOCKSTEP_WAIT, ROOM, ElectronicsLoop, NoAnswerError
 
 
 class CarLoop:
@@ -22,7 +22,11 @@ class CarLoop:
         begin, taken = time.monotonic(), 0
         while not ending.is_set():
             for _, loop in self._loops:
-                loop.step_in_real_time()
+                loop.send_sample()
+            for _, loop in self._loops:
+                loop.wait_for_answer(begin + (taken + ROOM) * period)
+            for _, loop in self._loops:
+                loop.go_on()
             taken += 1
             now = time.monotonic()
             remaining = begin + taken * period - now

@@ -16,6 +16,9 @@ from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 LOCKSTEP_WAIT = 0.1
 """Seconds: how often a loop in lock-step looks whether it shall end."""
 
+ROOM = 0.5
+"""Periods, chosen: so long the graph has the processors to answer, before the simulator does its own work."""
+
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
 
@@ -55,6 +58,7 @@ class ElectronicsLoop:
         self._sent_at = [math.nan] * _REMEMBERED
         self._asked: int | None = None  # lock-step: the sample that waits for its answer
         self._answer: ReceivedSetpoint | None = None
+        self._taken: tuple[float | None, int] = (None, 0)  # current (A), and how many samples late
         self._counted = 0  # the newest sample as the electronics count it, not yet cut to its width
         self._asked_at = 0.0
         self._answered_first = math.nan
@@ -71,7 +75,9 @@ class ElectronicsLoop:
         period = 1.0 / self._mount.sample_rate / (1.0 + self._electronics.clock_drift)
         begin = time.monotonic()
         while not ending.is_set():
-            self.step_in_real_time()
+            self.send_sample()
+            self.wait_for_answer(begin + (self._mount.sample + ROOM) * period)
+            self.go_on()
             self.figures.wall_time = time.monotonic() - begin
             remaining = begin + self._mount.sample * period - time.monotonic()
             if remaining > 0.0:
@@ -81,7 +87,22 @@ class ElectronicsLoop:
 
     def step_in_real_time(self) -> None:
         """Take the next sample with the newest setpoint, whether or not one has come."""
-        self._tick(self._can_end.newest())
+        self.send_sample()
+        self.go_on()
+
+    def send_sample(self) -> None:
+        """Send the next sample, and take the newest setpoint, if one has come, for the time from it on."""
+        self._taken = self._send(self._can_end.newest())
+
+    def wait_for_answer(self, end: float) -> None:
+        """Return when a frame has come, or at `end` (s, steady clock)."""
+        self._can_end.wait_for_frame(max(0.0, end - time.monotonic()))
+
+    def go_on(self) -> None:
+        """Let the plant go on to the next sample, and show the truth of the last."""
+        self._publish(self._mount.sample)
+        self._mount.advance(*self._taken)
+        self.figures.samples += 1
 
     def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
         """Sample as fast as the answers come; raise `NoAnswerError` after `patience` s without one."""
@@ -103,7 +124,8 @@ class ElectronicsLoop:
         if self._mount.finished:
             return False
         answer, self._answer = self._answer, None
-        self._tick(answer)
+        self._taken = self._send(answer)
+        self.go_on()
         self._asked, self._asked_at = self._counted, time.monotonic()
         return True
 
@@ -112,7 +134,8 @@ class ElectronicsLoop:
         """Whether the run is over, in lock-step with its last sample answered."""
         return self._mount.finished and self._asked is None
 
-    def _tick(self, received: ReceivedSetpoint | None) -> None:
+    def _send(self, received: ReceivedSetpoint | None) -> tuple[float | None, int]:
+        """Send the next sample; return what `received` lets the plant take over from it on."""
         mount, number = self._mount, self._mount.sample
         reading = mount.measure()
         microseconds = self._count(number)
@@ -129,9 +152,7 @@ class ElectronicsLoop:
         self._sent_at[self._counted % _REMEMBERED] = time.time()
         for frame in frames:
             self._can_end.send_frame(frame)
-        self._publish(number)
-        mount.advance(*taken)
-        self.figures.samples += 1
+        return taken
 
     def _count(self, number: int) -> int:
         """Note sample `number` as the electronics count it; return their clock in us."""

@@ -1,6 +1,7 @@
 """ROS 2 node of the simulator: parameters in, CAN frames and the rack's instruments out."""
 
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -22,9 +23,10 @@ from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import Beats, Urgent
+from mount_ros.nodes.sliding_window import SlidingWindow
 from mount_ros.private_rclpy import given_at_start
 from mount_sim.car_loop import CarLoop
-from mount_sim.diagnosis import car_verdict, verdict
+from mount_sim.diagnosis import Counted, car_verdict, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults.schedule import Faults, injected_faults, texts_of_mount
 from mount_sim.excitation.scenario import build_excitation
@@ -62,6 +64,7 @@ class MountSim(SafeLifecycleNode):
         self._loop: ElectronicsLoop | CarLoop | None = None
         self._loops: dict[str, ElectronicsLoop] = {}
         self._can_ends: list[CanEnd] = []
+        self._counted: SlidingWindow[dict[str, Counted]] = SlidingWindow({})
 
     def configure(self) -> None:
         self._settings = read(self, SimParameters())
@@ -92,6 +95,7 @@ class MountSim(SafeLifecycleNode):
             )
         drift = self._settings.electronics.clock_drift
         self._loop = self._loops.get(_ALONE) or CarLoop(self._loops, drift, self._settings.sample_rate)
+        self._counted = SlidingWindow({})
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
@@ -118,9 +122,11 @@ class MountSim(SafeLifecycleNode):
     def judge(self) -> Verdict:
         figures = {name: loop.figures for name, loop in self._loops.items()}
         run = next(iter(self._mounts.values())).run
+        now = {name: counted(each) for name, each in figures.items()}
+        earlier = self._counted.earlier(time.monotonic(), now)
         if _ALONE in figures:
-            return verdict(figures[_ALONE], run, lockstep=self.lockstep)
-        return car_verdict(figures, run, lockstep=self.lockstep)
+            return verdict(figures[_ALONE], run, earlier.get(_ALONE, Counted()), lockstep=self.lockstep)
+        return car_verdict(figures, run, earlier, lockstep=self.lockstep)
 
     def _injected(self, text: str) -> dict[str, str]:
         """Return the faults to inject by mount."""

@@ -1,7 +1,10 @@
 """The simulator's verdict on itself."""
 
-from mount_ros.nodes.diagnostics import Level
-from mount_sim.diagnosis import DRIVING, FINISHED, verdict
+import pytest
+
+from mount_ros.nodes.diagnostics import Level, Standing
+from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+from mount_sim.diagnosis import DRIVING, FINISHED, Counted, car_verdict, counted, verdict
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.simulated_mount import BeyondRange, Run
 
@@ -48,7 +51,7 @@ def test_a_machine_too_busy_for_real_time_is_a_warning():
     assert _judged(overruns=200).level is Level.OK
     busy = _judged(overruns=201)
     assert busy.level is Level.WARN
-    assert busy.sentence.startswith('201 of 4000 samples were late (limit 5 %)')
+    assert busy.sentence.startswith('201 of 4000 samples were late (limit 5 % of 10 s)')
     assert _judged(overruns=201, lockstep=True).level is Level.OK
 
 
@@ -65,3 +68,23 @@ def test_a_mount_beyond_the_range_of_its_sensor_is_a_warning_with_the_first_mome
         '3.250 s; they were sent as not valid and answered with 0 A: excite it less'
     )
     assert (judged.figures['beyond_range'], judged.figures['first_beyond_range_s']) == (3, '3.250')
+
+
+@pytest.mark.parametrize('count', ['overruns', 'beyond_range'])
+def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
+    window, standing, told = SlidingWindow({}), Standing(), []
+    run = Run(samples=100_000, excitation_start=0)
+    for tenth in range(300):
+        found = 600 * min(max(tenth - 49, 0), 5)
+        value = found if count == 'overruns' else BeyondRange(found, 5.0)
+        figures = {'left': LoopFigures(samples=100 * tenth, **{count: value}), 'right': LoopFigures()}
+        earlier = window.earlier(tenth / 10, {name: counted(each) for name, each in figures.items()})
+        verdict_told = standing.keep(car_verdict(figures, run, earlier, lockstep=False))
+        alone = verdict(figures['left'], run, earlier.get('left', Counted()), lockstep=False)
+        assert alone.level is verdict_told.level
+        told.append((verdict_told.level, verdict_told.sentence))
+    warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
+    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
+    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
+    assert len(set(told)) == 2
+    assert told[50][1].startswith('left: ')

@@ -2,8 +2,10 @@
 
 import itertools
 import math
+import socket
 import threading
 import time
+from types import SimpleNamespace
 
 import can
 import numpy as np
@@ -435,3 +437,29 @@ def test_in_real_time_the_electronics_sample_by_their_clock_behind_the_end_of_th
     assert loop.figures.samples >= 300
     assert loop.figures.wall_time >= 1e-3 * (loop.figures.samples - 1) - 0.002
     assert [sample.enabled for sample in host.samples[:200]] == [True] * 20 + [False] * 180
+
+
+# Whose turn the processors are
+
+
+def test_in_real_time_the_simulator_lets_the_graph_answer_before_it_does_its_own_work(ends, make_mount):
+    end, _ = ends
+    mount = make_mount()
+    published = []
+    loop = _loop(mount, end, published)
+    loop.send_sample()
+    assert (mount.sample, published) == (0, [])
+    loop.go_on()
+    assert (mount.sample, len(published)) == (1, 1)
+
+
+def test_the_wait_for_an_answer_ends_with_a_frame_or_its_limit():
+    here, there = socket.socketpair()
+    with here, there:
+        end = CanEnd(SimpleNamespace(fileno=here.fileno))
+        begin = time.monotonic()
+        end.wait_for_frame(0.01)
+        assert time.monotonic() - begin >= 0.01
+        there.send(b'a frame')
+        end.wait_for_frame(LIMIT)
+        assert time.monotonic() - begin < LIMIT

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from mount_bags.bag.recording import ReadingError, Recording
 from mount_bags.messages.series import SeriesError
+from mount_ros.messages.verdicts import ToldVerdict, verdicts_in
 from mount_ros.topics import DIAGNOSTICS
 
 _ERROR = 2  # diagnostic_msgs/DiagnosticStatus.ERROR
@@ -35,13 +36,13 @@ def node_reports(recording: Recording) -> list[NodeReport]:
         if series.type != DIAGNOSTICS.type:
             return []
         logged = zip(series.receive_times.tolist(), series.messages(), strict=True)
-        reports = [_report(time, status) for time, message in logged for status in message.status]
+        reports = [_report(time, told) for time, message in logged for told in verdicts_in(message)]
     except (ReadingError, SeriesError):
         return []
     return sorted(reports, key=lambda report: report.log_time)
 
 
-def _report(log_time: int, status) -> NodeReport:
-    namespace, _, node = status.name.rpartition('/')
-    state = next((entry.value for entry in status.values if entry.key == 'state'), '')
-    return NodeReport(log_time, namespace.strip('/'), node, status.level, status.message, state)
+def _report(log_time: int, told: ToldVerdict) -> NodeReport:
+    namespace, _, node = told.node.rpartition('/')
+    state = told.figures.get('state', '')
+    return NodeReport(log_time, namespace.strip('/'), node, told.level, told.sentence, state)

@@ -4,16 +4,16 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from enum import Enum
-from typing import Any
 
 from mount_bags.events.switching_changes import PAUSE
 from mount_bags.messages.stamps import StampWatch
 from mount_ros.messages.event import Mark
+from mount_ros.messages.verdicts import ToldVerdict
 
 BURST = 10  # marks, chosen: so many of a kind in a row ...
 REFILL = 2.0  # s, chosen: ... and then one in this time, so that a broken stream does not flood
 
-_ERROR = b'\x02'  # diagnostic_msgs/DiagnosticStatus.ERROR
+_ERROR = 2  # diagnostic_msgs/DiagnosticStatus.ERROR
 
 Send = Callable[[Mark], None]
 
@@ -82,15 +82,15 @@ class FaultWatch:
         self._prefix = f'{namespace.strip("/")}/'.lstrip('/')
         self._failing: set[str] = set()
 
-    def add(self, stamp: int, status: Any) -> None:
-        """Take one `DiagnosticStatus`, seen at `stamp` (ns)."""
-        if not status.name.startswith(self._prefix):
+    def add(self, stamp: int, told: ToldVerdict) -> None:
+        """Take the verdict of one node, seen at `stamp` (ns)."""
+        if not told.node.startswith(self._prefix):
             return
-        if status.level != _ERROR:
-            self._failing.discard(status.name)
-        elif status.name not in self._failing:
-            self._failing.add(status.name)
-            self._marks.mark(MarkKind.FAULT, stamp, f'{status.name}: {status.message}')
+        if told.level != _ERROR:
+            self._failing.discard(told.node)
+        elif told.node not in self._failing:
+            self._failing.add(told.node)
+            self._marks.mark(MarkKind.FAULT, stamp, f'{told.node}: {told.sentence}')
 
 
 class LostSampleWatch:

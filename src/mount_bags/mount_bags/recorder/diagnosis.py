@@ -1,13 +1,15 @@
-"""The recorder's verdict on itself, from its figures alone."""
+"""The recorder's verdict on itself, from its figures alone: all of them, and what came lately."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import NamedTuple
 
 from mount_bags.messages.stamps import FARTHEST, StampWatch
 from mount_bags.recorder.recorder import RecorderFigures, Unobserved
 from mount_bags.recorder.snapshot import SnapshotFigures
-from mount_ros.nodes.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
+from mount_ros.nodes.sliding_window import WINDOW
 
 LEAST_FREE = 1 << 30  # bytes, chosen
 LEAST_TIME = 60.0  # s, chosen: how long the disk must last at the present rate
@@ -18,6 +20,19 @@ class OnFull(Enum):
 
     STOP = 'stop'  # an error: the run shall end
     CONTINUE = 'continue'  # a warning: the run goes on without recording
+
+
+class Counted(NamedTuple):
+    """What had been counted at one time, of which a verdict takes what came lately; counts by topic."""
+
+    received: int = 0
+    lost: int = 0
+    missing: Mapping[str, int] = {}
+    misdated: Mapping[str, int] = {}
+    unobserved: Mapping[str, int] = {}
+
+
+_NOTHING = Counted()
 
 
 @dataclass(frozen=True)
@@ -36,59 +51,91 @@ class RecorderState:
     events: int = 0  # all that came on `event`
     snapshot: SnapshotFigures | None = None
 
+    @property
+    def counted(self) -> Counted:
+        """What has been counted by now."""
+        return Counted(
+            self.figures.received,
+            self.figures.lost,
+            {topic: watch.lost for topic, watch in self.watches.items()},
+            {topic: watch.misdated for topic, watch in self.watches.items()},
+            {topic: entry.count for topic, entry in self.unobserved.items()},
+        )
 
-def judge(state: RecorderState, on_full: OnFull) -> Verdict:
-    """Return level, sentence and figures of an active recorder."""
-    level, sentence = _verdict(state, on_full)
+
+def judge(state: RecorderState, on_full: OnFull, earlier: Counted = _NOTHING) -> Verdict:
+    """Return level, sentence and figures of an active recorder.
+
+    `earlier` is what had been counted a window ago, or when it began.
+    """
     failed = bool(state.figures.failure)
     fatal = failed and on_full is OnFull.STOP
-    return Verdict(level, sentence, {**_figures(state), 'failed': failed, 'fatal': fatal})
-
-
-def _verdict(state: RecorderState, on_full: OnFull) -> tuple[Level, str]:
-    figures = state.figures
-    if figures.failure and on_full is OnFull.STOP:
-        return Level.ERROR, f'{figures.failure}; free some space and start again'
-    if figures.failure:
-        return Level.WARN, f'the run goes on without recording: {figures.failure}'
-    if warnings := list(_warnings(state)):
-        return Level.WARN, '. '.join(warnings)
     found = sum(count > 0 for count in state.publishers.values())
-    return (
-        Level.OK,
-        f'{_activity(state.snapshot)}; {found} of {len(state.publishers)} topics have a publisher',
-    )
+    well = f'{_activity(state.snapshot)}; {found} of {len(state.publishers)} topics have a publisher'
+    values = {**_figures(state), 'failed': failed, 'fatal': fatal}
+    return verdict_on(_findings(state, on_full, earlier), well, values)
 
 
-def _warnings(state: RecorderState) -> Iterator[str]:
-    """Yield a sentence for each thing that is not as it should be; none hides another."""
-    figures = state.figures
-    if figures.lost:
+def _findings(state: RecorderState, on_full: OnFull, earlier: Counted) -> list[Finding]:
+    failure = state.figures.failure
+    if failure and on_full is OnFull.STOP:
+        return [Finding(Level.ERROR, failure, f'{failure}; free some space and start again')]
+    if failure:
+        return [Finding(Level.WARN, failure, f'the run goes on without recording: {failure}')]
+    return [
+        Finding(Level.WARN, name, sentence)
+        for name, sentence in (*_of_messages(state, earlier), *_of_space(state))
+    ]
+
+
+def _of_messages(state: RecorderState, earlier: Counted) -> Iterator[tuple[str, str]]:
+    """Yield name and sentence of what was wrong lately with messages and their stamps."""
+    now, none = state.counted, f'limit: none in {WINDOW:g} s'
+    if now.lost > earlier.lost:
         yield (
-            f'{figures.lost} of {figures.received} messages lost: the disk is slower than the data; '
-            'record fewer topics or use a faster disk'
+            'lost',
+            f'{now.lost - earlier.lost} of {now.received - earlier.received} messages lost ({none}): '
+            'the disk is slower than the data; record fewer topics or use a faster disk',
         )
-    if state.unobserved:
-        yield f'{unobserved_sentence(state.unobserved)}; who else publishes there?'
-    missing = {topic: watch.lost for topic, watch in state.watches.items() if watch.lost}
-    if missing:
-        counts = ', '.join(f'{topic} {count}' for topic, count in missing.items())
-        yield f'samples missing between the stamps: {counts}; is the machine overloaded?'
-    misdated = {topic: watch.misdated for topic, watch in state.watches.items() if watch.misdated}
-    if misdated:
-        counts = ', '.join(f'{topic} {count}' for topic, count in misdated.items())
+    if unobserved := _lately(now.unobserved, earlier.unobserved):
+        entries = {name: replace(state.unobserved[name], count=count) for name, count in unobserved.items()}
+        sentence = f'{unobserved_sentence(entries)} ({none}); who else publishes there?'
+        yield f'unobserved {", ".join(unobserved)}', sentence
+    if missing := _lately(now.missing, earlier.missing):
+        sentence = (
+            f'samples missing between the stamps: {_counts(missing)} ({none}); is the machine overloaded?'
+        )
+        yield f'missing {", ".join(missing)}', sentence
+    if misdated := _lately(now.misdated, earlier.misdated):
         limit = f'more than {FARTHEST / 1e9:g} s from the samples around them'
-        yield f'stamps {limit}: {counts}; who else publishes there?'
+        sentence = f'stamps {limit}: {_counts(misdated)} ({none}); who else publishes there?'
+        yield f'misdated {", ".join(misdated)}', sentence
+
+
+def _of_space(state: RecorderState) -> Iterator[tuple[str, str]]:
+    """Yield name and sentence of what disk and memory lack."""
     if _is_short_of_space(state):
         yield (
-            f'{state.free / 1e9:.1f} GB left on the disk of {state.folder} at {state.rate / 1e6:.1f} MB/s; '
-            'free some space'
+            'space',
+            f'{state.free / 1e9:.1f} GB left on the disk of {state.folder} at {state.rate / 1e6:.1f} MB/s '
+            f'(limit: {LEAST_FREE / 1e9:.1f} GB, and enough for {LEAST_TIME:g} s); free some space',
         )
     if state.snapshot is not None and state.snapshot.short_of_memory:
         yield (
+            'memory',
             'the memory does not hold the wished time before an event; '
-            'raise snapshot_memory or record fewer topics'
+            'raise snapshot_memory or record fewer topics',
         )
+
+
+def _lately(now: Mapping[str, int], earlier: Mapping[str, int]) -> dict[str, int]:
+    """Return how much each count has grown, where it has."""
+    grown = {topic: count - earlier.get(topic, 0) for topic, count in now.items()}
+    return {topic: count for topic, count in grown.items() if count > 0}
+
+
+def _counts(counts: Mapping[str, int]) -> str:
+    return ', '.join(f'{topic} {count}' for topic, count in counts.items())
 
 
 def unobserved_sentence(unobserved: Mapping[str, Unobserved]) -> str:

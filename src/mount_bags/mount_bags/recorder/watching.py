@@ -1,10 +1,6 @@
 """What the recorder looks at in passing: the stamps of streams, the switching of damping, faults of nodes."""
 
 from collections.abc import Callable
-from typing import Any
-
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
 
 from mount_bags.events.automatic_marks import (
     AutomaticMarks,
@@ -16,6 +12,7 @@ from mount_bags.events.automatic_marks import (
 from mount_bags.recorder.recorder import Observe, Recorder
 from mount_models.sampling import SAMPLE_RATE
 from mount_ros.messages.scalars import ScalarsReader, stamp_of
+from mount_ros.messages.verdicts import verdicts_of
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DIAGNOSTICS, Delivery, Topic
 
 PresentTime = Callable[[], int]
@@ -59,8 +56,7 @@ def _stream_observer(samples: LostSampleWatch, switching: SwitchOnWatch | None) 
 
 def _fault_observer(faults: FaultWatch, now: PresentTime) -> Observe:
     def observe(raw: bytes, _: int) -> None:
-        message: Any = deserialize_message(raw, DiagnosticArray)
-        for status in message.status:
-            faults.add(now(), status)
+        for told in verdicts_of(raw):
+            faults.add(now(), told)
 
     return observe

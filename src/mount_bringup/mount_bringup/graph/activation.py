@@ -12,6 +12,7 @@ from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import DRIVER, SIM, GraphNode
 from mount_bringup.graph.pace import Pace, pace
 from mount_bringup.graph.verdicts import Verdicts
+from mount_models.sampling import SAMPLE_RATE
 
 FRESH_DIAGNOSTICS = 1.5
 """Seconds (chosen): every node tells its figures once a second."""
@@ -88,7 +89,9 @@ class Activation:
         self, node: GraphNode, error: GraphError, before: Pace, say: Callable[[str], None]
     ) -> None:
         was_late = self._pace(node.mount).was_late_since(before)
-        reason = ' (this machine was too late for 1 kHz)' if was_late else ''
+        told = self._graph.figures(self._driver(node.mount))
+        rate = float(told.get('sample_rate', SAMPLE_RATE))
+        reason = f' (this machine was too late for {rate / 1000.0:g} kHz)' if was_late else ''
         self._note_again(node, f'{error}{reason}')
         say(f'activating {node.full_name} again{reason}')
 

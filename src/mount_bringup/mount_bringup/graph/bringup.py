@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 
 from mount_bringup.graph.activation import FRESH_DIAGNOSTICS, TRANSITION_LIMIT, Activation
 from mount_bringup.graph.errors import GraphError, Interrupted
-from mount_bringup.graph.liveliness import SILENCE_LIMIT
+from mount_bringup.graph.liveliness import silence_sentence
 from mount_bringup.graph.matches import unmatched
 from mount_bringup.graph.nodes import (
     DRIVER,
@@ -34,11 +34,11 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
-from mount_bringup.graph.shared_memory import remove_abandoned
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.leaving import leave_middleware
+from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, SESSION
 from mount_sim.diagnosis import FINISHED
@@ -176,8 +176,7 @@ class Bringup:
         if silent := self.verdicts.liveliness.silent(time.monotonic()):
             hanging = [group for group in self._groups if {node.full_name for node in group} & {*silent}]
             nodes = tuple(node for group in hanging for node in group)
-            reason = f'{", ".join(silent)} told nothing for {SILENCE_LIMIT:g} s and counts as dead'
-            raise NodesLostError(Loss(nodes, reason))
+            raise NodesLostError(Loss(nodes, silence_sentence(silent)))
         if reason := self.verdicts.needing_initialisation():
             raise NodesLostError(Loss((), reason))
 

@@ -20,9 +20,10 @@ from launch_ros.actions import Node
 
 from mount_bringup.graph.composed import COMPOSED
 from mount_bringup.graph.domain import domain_locks
+from mount_bringup.graph.launch_arguments import LaunchArgument
 from mount_bringup.graph.launched import SUPERVISOR, arguments_of, exit_error
 from mount_bringup.graph.nodes import GraphNode, groups
-from mount_bringup.graph.order import LaunchArgument, LaunchOrder, launch_order
+from mount_bringup.graph.order import LaunchOrder, launch_order
 from mount_bringup.graph.processes import node_environment, parameter_text
 from mount_bringup.graph.restarts import restartable
 from mount_ros.environment import prepare_environment

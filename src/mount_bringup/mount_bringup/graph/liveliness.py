@@ -1,5 +1,7 @@
 """Which nodes tell nothing any more: one that hangs counts as dead."""
 
+from collections.abc import Sequence
+
 SILENCE_LIMIT = 4.0
 """Seconds (chosen) without diagnostics, which come once a second, after which a node counts as dead."""
 _LONGEST_LOOK = 0.5  # s, chosen: ten times as long as the supervisor takes from one look to the next
@@ -33,3 +35,12 @@ class Liveliness:
         slept = max(0.0, now - looked - _LONGEST_LOOK) if looked is not None else 0.0
         self._heard = {name: min(heard + slept, now) for name, heard in self._heard.items()}
         return [name for name, heard in self._heard.items() if now - heard > SILENCE_LIMIT]
+
+
+def silence_sentence(names: Sequence[str]) -> str:
+    """Return what is to be told of nodes that have been silent for too long: value, limit and remedy."""
+    return (
+        f'{", ".join(names)} told nothing on /diagnostics for {SILENCE_LIMIT:g} s (limit {SILENCE_LIMIT:g} '
+        's, usual is 1 s) and counts as dead: look for what stopped it, into its log and at the load of this '
+        'machine'
+    )

@@ -1,4 +1,4 @@
-"""What a launch file takes from the user, and the graph that this makes; `ros2 launch` is not needed here."""
+"""The graph that the arguments of a launch file order; `ros2 launch` is not needed here."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -8,15 +8,13 @@ from typing import Any, NamedTuple
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
+from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, LaunchArgument
 from mount_bringup.graph.nodes import (
     CONTROL,
     DRIVER,
     INIT,
     RECORDER,
-    RESTART_LIMIT,
     SIM,
-    SIMULATED,
-    VEHICLE,
     GraphNode,
     GraphSettings,
     Grouping,
@@ -27,38 +25,18 @@ from mount_bringup.mounts import settings_of_mount
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.sample_rate import NODES, check_sample_rate
 from mount_bringup.settings import OF_EACH, SettingError, checked_settings, defaults_of_nodes
-from mount_control.policy.registry import POLICIES
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import with_flattened
 from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
-from mount_sim.electronics.faults.schedule import FORM, told_faults
+from mount_sim.electronics.faults.schedule import told_faults
 from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import MOUNTS, seated_mount
+from mount_sim.plant.mounts import seated_mount
 from mount_sim.plant.places import mount_names
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
-
-_OF_SPECIMEN = ('mount_driver', 'mount_init', 'mount_control')
-"""The nodes that load the specimen file."""
-
-
-class LaunchArgument(NamedTuple):
-    """An argument of a launch file, and NODE.NAME of the parameters that it sets if it is not empty."""
-
-    name: str
-    meaning: str
-    sets: tuple[str, ...] = ()
-    default: str = ''
-    choices: tuple[str, ...] = ()
-
-    @property
-    def description(self) -> str:
-        """The meaning, and what an empty text stands for."""
-        told = self.default or not self.sets or 'empty:' in self.meaning
-        return self.meaning if told else f'{self.meaning}; empty: as in the config file'
 
 
 class LaunchOrder(NamedTuple):
@@ -69,90 +47,6 @@ class LaunchOrder(NamedTuple):
     scenario: str
     duration: float
     log_level: str
-
-
-_POLICY_OF_DAMPER = 'switched_viscous'  # the others compute their force without a given damper
-_ANY = (
-    LaunchArgument('namespace', 'where the graph lives, such as mount_right; empty: /'),
-    LaunchArgument('mounts', 'mounts with electronics, such as left,right; empty: one, in this namespace'),
-    LaunchArgument('record', 'whether the graph records', default='true', choices=('true', 'false')),
-    LaunchArgument(
-        'recording',
-        'folder that the recording creates; empty: only with record:=false',
-        ('mount_recorder.uri',),
-    ),
-    LaunchArgument('policy', f'how forces are chosen: {", ".join(POLICIES)}', ('mount_control.policy',)),
-    LaunchArgument(
-        'damper', f'damper of policy {_POLICY_OF_DAMPER}, such as viscous_2000', ('mount_control.damper',)
-    ),
-    LaunchArgument(
-        'parameters_file',
-        'specimen file of this actuator; empty: as in the config file, else the shipped one',
-        tuple(f'{node}.parameters_file' for node in _OF_SPECIMEN),
-    ),
-    LaunchArgument(
-        'specimen',
-        'name that the specimen file must bear; empty: as in the config file, else any',
-        tuple(f'{node}.specimen' for node in _OF_SPECIMEN),
-    ),
-    LaunchArgument(
-        'priority',
-        'real-time priority (SCHED_FIFO, 1 .. 98) of the loop, half of it for the recorder; 0: none',
-        default='0',
-    ),
-    LaunchArgument(
-        'composed',
-        'true: driver, initialisation and control of the mount share a process',
-        default='false',
-        choices=('true', 'false'),
-    ),
-    LaunchArgument(
-        'restarts',
-        'times that a node may be lost within a minute before the graph ends; 0: the first loss ends it',
-        default=str(RESTART_LIMIT),
-    ),
-    LaunchArgument(
-        'log_level',
-        'what the nodes say at least',
-        default='info',
-        choices=('debug', 'info', 'warn', 'error', 'fatal'),
-    ),
-)
-
-
-def _sample_rate(nodes: Sequence[GraphNode]) -> LaunchArgument:
-    return LaunchArgument(
-        'sample_rate',
-        'Hz: how often the electronics measure and are answered',
-        tuple(f'{node.name}.sample_rate' for node in nodes),
-    )
-
-
-_PORT = 'UDP port of the simulated CAN bus; empty: one for each ROS domain and namespace'
-
-SIM_ARGUMENTS = (
-    *_ANY,
-    _sample_rate(SIMULATED),
-    LaunchArgument('scenario', 'what is driven: motorway, bench, sweep, recorded', ('mount_sim.scenario',)),
-    LaunchArgument('mount', f'what is between engine and chassis: {", ".join(MOUNTS)}', ('mount_sim.mount',)),
-    LaunchArgument(
-        'duration', 's of excitation, after which the graph ends', ('mount_sim.timeline.duration',)
-    ),
-    LaunchArgument('port', _PORT, ('mount_driver.port', 'mount_sim.port')),
-    LaunchArgument('fault', f'faults as {FORM}, with commas between them', ('mount_sim.faults',)),
-)
-"""The arguments of the graph with the simulated car, besides `config`."""
-
-VEHICLE_ARGUMENTS = (
-    *_ANY,
-    _sample_rate(VEHICLE),
-    LaunchArgument('interface', 'interface of python-can', ('mount_driver.interface',), default='socketcan'),
-    LaunchArgument('channel', 'channel of the interface', ('mount_driver.channel',), default='can0'),
-    LaunchArgument('channels', 'channel of each of several mounts, such as can0,can1'),
-    LaunchArgument('port', f'{_PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
-    LaunchArgument('duration', 's after which the graph ends; empty: when it is told to end'),
-)
-"""The arguments of the graph in the car, besides `config`."""
 
 
 def launch_order(
@@ -286,10 +180,10 @@ def _value(name: str, text: str, default: Any) -> Any:
 
 def _check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> None:
     policy = control_parameters(settings).policy
-    if damper and policy != _POLICY_OF_DAMPER:
+    if damper and policy != POLICY_OF_DAMPER:
         raise SettingError(
-            f'damper:={damper} is for policy {_POLICY_OF_DAMPER}; instead received {policy}: '
-            f'add policy:={_POLICY_OF_DAMPER}'
+            f'damper:={damper} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
+            f'add policy:={POLICY_OF_DAMPER}'
         )
 
 

@@ -8,6 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.liveliness import Liveliness
 from mount_bringup.graph.nodes import CONTROL, DRIVER, GraphNode
+from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.nodes.diagnostics import Level
 
 
@@ -23,19 +24,19 @@ class Verdicts:
 
     def take(self, message: DiagnosticArray) -> None:
         """Take what a node tells."""
-        for status in message.status:
+        for told in verdicts_in(message):
             # /diagnostics belongs to all mounts of the car
-            if not status.name.startswith(self._space):
+            if not told.node.startswith(self._space):
                 continue
-            name = status.name.removeprefix(self._space)
+            name = told.node.removeprefix(self._space)
             if '/' in name and name not in self._names:
                 continue
             if name in self._names:
                 self.liveliness.hear(name, time.monotonic())
             self._figures[name] = {
-                **{value.key: value.value for value in status.values},
-                'level': str(status.level[0]),
-                'sentence': status.message,
+                **told.figures,
+                'level': str(told.level),
+                'sentence': told.sentence,
             }
 
     def figures(self, node: GraphNode) -> dict[str, str]:

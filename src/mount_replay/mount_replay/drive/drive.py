@@ -26,7 +26,7 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.mounts import mounts_of, settings_of_mounts
-from mount_control.diagnosis import fault_sentence
+from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
@@ -182,7 +182,7 @@ def _beyond_range(samples: int, first: float) -> list[str]:
 
 
 def _control_faults(faults: int) -> list[str]:
-    return [fault_sentence(faults)] if faults else []
+    return [f'{FAULT_SENTENCE} (times: {faults})'] if faults else []
 
 
 def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:

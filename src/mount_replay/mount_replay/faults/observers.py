@@ -12,15 +12,14 @@ from contextlib import contextmanager
 from operator import attrgetter
 from typing import NamedTuple, TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 
 from mount_driver.bus import MULTICAST_GROUP, Reception, open_bus
 from mount_driver.codec import MountCodec, WrongCrcError, WrongLengthError
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.messages.verdicts import verdicts_of
 from mount_ros.topics import AIR_GAP, DIAGNOSTICS, SIM_TRUTH
 
 _LOOK_PERIOD = 0.1  # s: how often a listener looks whether it shall end
@@ -98,11 +97,11 @@ class Observers:
     def take_diagnostics(self, raw: bytes) -> None:
         """Note the verdicts of this graph; `/diagnostics` belongs to all."""
         now = time.monotonic()
-        for status in deserialize_message(raw, DiagnosticArray).status:
-            space, _, node = status.name.rpartition('/')
+        for told in verdicts_of(raw):
+            space, _, node = told.node.rpartition('/')
             if space == self._namespace:
-                self.told.append(Told(now, node, status.level[0], status.message))
-                active = any(value.key == 'state' and value.value == 'active' for value in status.values)
+                self.told.append(Told(now, node, told.level, told.sentence))
+                active = told.figures.get('state') == 'active'
                 (self.active.add if active else self.active.discard)(node)
 
 

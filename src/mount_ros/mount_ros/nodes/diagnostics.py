@@ -1,13 +1,17 @@
 """The verdict of a node on `/diagnostics`: a level and a sentence, at 1 Hz and on each change.
 
+A sentence stands still while what it tells of stands: a number in it is that of the detection, and what goes
+on changing is a figure beside it. Else each look would publish.
+
 A thread of its own judges ten times a second. By a timer of the node's executor each time would cost two
 milliseconds of Python (measured), which the executor takes to find out what is ready.
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -28,13 +32,54 @@ class Level(IntEnum):
     STALE = 3
 
 
+class Finding(NamedTuple):
+    """Something that is not as it should be: value, limit and remedy in one sentence.
+
+    By its `name` it is known again while it stands, whatever numbers a later sentence holds.
+    """
+
+    level: Level
+    name: str
+    sentence: str
+
+
 @dataclass(frozen=True)
 class Verdict:
-    """A node's judgement of itself: level, one sentence, and figures by name."""
+    """A node's judgement of itself: level, one sentence, made of `findings` if any, and figures by name."""
 
     level: Level
     sentence: str
     figures: Mapping[str, object] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+
+def verdict_on(findings: Iterable[Finding], well: str, figures: Mapping[str, object]) -> Verdict:
+    """Return the verdict on `findings`, gravest first, or that all is `well`.
+
+    The first error speaks alone; of warnings none hides another.
+    """
+    found = tuple(findings)
+    level = max((each.level for each in found), default=Level.OK)
+    sentences = [each.sentence for each in found if each.level is level]
+    sentence = _joined(sentences if level is Level.WARN else sentences[:1])
+    return Verdict(level, sentence or well, figures, found)
+
+
+def _joined(sentences: Sequence[str]) -> str:
+    return ' '.join(text if text.endswith('?') else f'{text}.' for text in sentences).removesuffix('.')
+
+
+class Standing:
+    """What was found and still stands, each in the words in which it was told first."""
+
+    def __init__(self) -> None:
+        self._told: dict[tuple[Level, str], Finding] = {}
+
+    def keep(self, verdict: Verdict) -> Verdict:
+        """Return `verdict` with the sentences told before for its findings; forget what stands no more."""
+        before = self._told
+        self._told = {each[:2]: before.get(each[:2], each) for each in verdict.findings}
+        return verdict_on(self._told.values(), verdict.sentence, verdict.figures) if self._told else verdict
 
 
 class Diagnostics:

@@ -1,6 +1,7 @@
 """A lifecycle node that fails closed: every error ends in the safe state, with a sentence that says why."""
 
 import threading
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
@@ -9,10 +10,11 @@ from rclpy.parameter import Parameter
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
-from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
+from mount_ros.nodes.diagnostics import Diagnostics, Finding, Level, Standing, Verdict, verdict_on
 from mount_ros.nodes.parameter_gate import Change, ParameterGate
 from mount_ros.nodes.parameters import refuse_unknown
 from mount_ros.nodes.real_time import Beats, RealTime, Urgent
+from mount_ros.nodes.sliding_window import SlidingWindow
 from mount_ros.private_rclpy import OpenLifecycleNode, integer_as_float
 from mount_ros.writers import WriterWatch
 
@@ -63,6 +65,8 @@ class SafeLifecycleNode(OpenLifecycleNode):
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
+        self._standing = Standing()
+        self._path_errors = SlidingWindow(0)
         self._diagnostics = Diagnostics(self, self._look_and_judge)
         self._diagnostics.start()
 
@@ -204,6 +208,7 @@ class SafeLifecycleNode(OpenLifecycleNode):
 
     def _configure(self) -> None:
         refuse_unknown(self)
+        self._path_errors = SlidingWindow(0)
         self.configure()
 
     def _attempt(self, what, step, undo) -> TransitionCallbackReturn:
@@ -247,14 +252,15 @@ class SafeLifecycleNode(OpenLifecycleNode):
     def _present_verdict(self) -> Verdict:
         path, writers = self.data_path, self._writers
         verdict = self._verdict_without_path()
+        errors = self._errors_of(path) if path is not None else []
         other = (writers.foreign or writers.doubt) if writers is not None else ''
         if other and verdict.level is Level.OK:
             verdict = Verdict(Level.WARN, other, verdict.figures)
         if path is not None and path.failure:
             verdict = Verdict(Level.ERROR, path.failure, {**verdict.figures, 'fatal': True})
-        elif path is not None and path.refused and verdict.level is Level.OK:
-            sentence = f'errors in the data path ({path.refused}), the last: {path.refusal}'
-            verdict = Verdict(Level.WARN, sentence, verdict.figures)
+        elif errors and verdict.level is Level.OK:
+            verdict = verdict_on(errors, '', verdict.figures)
+        verdict = self._standing.keep(verdict)
         unmatched = ', '.join(path.unmatched()) if path is not None else 'not configured'
         if self.real_time.given_back:
             sentence = self.real_time.given_back
@@ -262,8 +268,21 @@ class SafeLifecycleNode(OpenLifecycleNode):
             sentence = f'{verdict.sentence}; {sentence}' if worse else sentence
             verdict = Verdict(max(verdict.level, Level.WARN), sentence, verdict.figures)
         state = 'active' if self._active else 'inactive'
-        figures = {**verdict.figures, 'state': state, 'unmatched': unmatched, 'other_writer': other}
+        figures = {
+            **verdict.figures,
+            'state': state,
+            'unmatched': unmatched,
+            'other_writer': other,
+            'path_errors': path.refused if path is not None else 0,
+        }
         return Verdict(verdict.level, verdict.sentence, figures)
+
+    def _errors_of(self, path: ServedPath) -> list[Finding]:
+        """Return the finding of errors within the last seconds, if there were any."""
+        errors = path.refused
+        lately = errors - self._path_errors.earlier(time.monotonic(), errors)
+        sentence = f'errors in the data path ({lately}, limit: none), the last: {path.refusal}'
+        return [Finding(Level.WARN, 'path errors', sentence)] if lately else []
 
     def _verdict_without_path(self) -> Verdict:
         if self._refusal:

@@ -19,6 +19,7 @@ from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
+from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_ros.nodes.starter import Starter, given_priority
 
 _SPIN_PERIOD = 60.0  # s, chosen: a thread is woken when it shall end; this is for the case that it is not
@@ -61,6 +62,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         node.ending.set()
     if over.starter.ended:
         logger.error(f'{over.starter.name} has ended, so this one ends too, at 0 A: start the graph again')
+        remove_abandoned()  # that of the starter; what it started ends by itself, and takes its own
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()

@@ -18,6 +18,7 @@ process; the electronics then go to 0 A by their own watch.
 
 import contextlib
 import math
+import re
 import resource
 import threading
 import time
@@ -40,8 +41,9 @@ _WITHOUT_SLEEP = (
     1.0  # s, chosen: processor time of a thread between two sleeps; after a stall of 2 s it is 0.6 s
 )
 _LAST = 3.0  # s, chosen: the same, until the process is killed
-_MIDDLEWARE = 'dds.shm.'  # threads of Fast DDS that take what comes by shared memory, and call its readers
-_NOT_OF_DATA = 'dds.shm.wdog'  # looks whether other processes are alive
+# Threads of Fast DDS that take data and call its readers. By the rule of RTPS for ports (7400 + 250 domain
+# + 11 + 2 participant) theirs are odd, those of discovery even.
+_MIDDLEWARE = re.compile(r'dds\.udp\.\d*[13579]')
 _ORDINARY = (
     'dds.ev.'  # the middleware's timers: an ordinary thread that wakes often, and needs no interpreter
 )
@@ -161,7 +163,7 @@ class RealTime:
         if any(loop.urgent.interpreter for loop in self._loops):
             wanted = dict.fromkeys(self._threads.of_python(), max(1, self.priority - 1))
         for number, name in self._threads.names().items():
-            if name in own or (name.startswith(_MIDDLEWARE) and name != _NOT_OF_DATA):
+            if name in own or _MIDDLEWARE.fullmatch(name):
                 wanted[number] = self.priority
         return {**wanted, self._watcher: self.priority + 1}
 

@@ -1,7 +1,9 @@
 """The far end of the CAN bus: sends what the electronics measure, receives and judges setpoints."""
 
 import math
+import select
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 
 import can
@@ -120,6 +122,11 @@ class CanEnd:
                 return received
             if remaining <= 0.0:
                 return None
+
+    def wait_for_frame(self, limit: float) -> None:
+        """Return when there is a frame to take, or after `limit` s; at once on a bus without a socket."""
+        with suppress(NotImplementedError):
+            select.select([self._bus], (), (), limit)
 
     def newest(self) -> ReceivedSetpoint | None:
         """Take all frames that have come since the last call and return the last sound setpoint in them."""

@@ -8,6 +8,7 @@ from mount_bags.messages.decoding import decode
 from mount_bags.messages.definitions import installed_definition
 from mount_bags.run.session import SessionError, session_content, session_parameters
 from mount_ros.messages.event import read_mark
+from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, DIAGNOSTICS, EVENT, SESSION
 from mount_view.feed.feed import Message
 
@@ -70,15 +71,14 @@ class GraphState:
         return [name for name, node in self.nodes.items() if now - node.told > _SILENT]
 
     def _take_diagnostics(self, message: Message) -> None:
-        for status in _decoded(message).status:
-            space, _, name = status.name.rpartition('/')
+        for told in verdicts_in(_decoded(message)):
+            space, _, name = told.node.rpartition('/')
             if space != self.namespace.strip('/'):
                 continue  # /diagnostics belongs to all mounts of the car
             before = self.nodes.get(name)
-            level, figures = int(status.level), {value.key: value.value for value in status.values}
-            self.nodes[name] = NodeState(level, status.message, figures, message.received)
-            if level and (before is None or before.sentence != status.message):
-                self.events.append(Happening(message.received, name, status.message))
+            self.nodes[name] = NodeState(told.level, told.sentence, told.figures, message.received)
+            if told.level and (before is None or before.sentence != told.sentence):
+                self.events.append(Happening(message.received, name, told.sentence))
 
     def _take_session(self, text: str) -> None:
         try:

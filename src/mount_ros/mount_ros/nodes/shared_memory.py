@@ -1,9 +1,9 @@
 """Shared memory of Fast DDS that belongs to no living process any more is removed.
 
-Measured: a participant that ends in order removes its segment and the lock of its port, not the port
-itself; one that is killed leaves all of it. An owner holds its lock file (`_el`, `_sl`) as long as it lives,
-so what can be locked, and a port without a lock, belongs to nobody. `fastdds shm clean` does the same but for
-such ports.
+Measured: each participant makes a segment, whether or not anything goes by it. One that ends in order removes
+it and the lock of its port, not the port itself; one that is killed leaves all of it. An owner holds its lock
+file (`_el`, `_sl`) as long as it lives, so what can be locked, and a port without a lock, belongs to nobody.
+`fastdds shm clean` does the same but for such ports.
 """
 
 import contextlib

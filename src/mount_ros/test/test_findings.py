@@ -1,0 +1,70 @@
+"""Findings are told in the words in which they were found; counts are those of a sliding window."""
+
+import random
+
+import pytest
+
+from mount_ros.nodes.diagnostics import Finding, Level, Standing, Verdict, verdict_on
+from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+
+LOOK = 0.1  # s
+
+
+def loss(count):
+    return Finding(Level.WARN, 'loss', f'{count} lost; check the bus')
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_a_burst_counts_for_as_long_as_the_window_lasts_and_is_told_in_the_same_words(seed):
+    rng = random.Random(seed)
+    begin, length = rng.randrange(1, 300), rng.randrange(1, 50)
+    window, standing, counted, told = SlidingWindow(0), Standing(), 0, []
+    for look in range(600):
+        counted += rng.randrange(1, 9) if begin <= look < begin + length else 0
+        lately = counted - window.earlier(look * LOOK, counted)
+        verdict = standing.keep(verdict_on([loss(lately)] if lately else [], 'well', {'lost': counted}))
+        told.append((verdict.level, verdict.sentence))
+        assert verdict.figures['lost'] == counted
+    warned = [look for look, (level, _) in enumerate(told) if level is Level.WARN]
+    last = round(WINDOW / LOOK) + begin + length - 1
+    assert begin == warned[0]
+    assert abs(warned[-1] + 1 - last) <= 1  # of the window's end a rounding may decide
+    assert warned == list(range(warned[0], warned[-1] + 1))
+    assert len({told[look] for look in warned}) == 1
+    assert told[-1] == (Level.OK, 'well')
+
+
+def test_what_was_counted_before_the_first_look_counts():
+    assert SlidingWindow(0).earlier(5.0, 3) == 0
+
+
+def test_a_window_forgets_however_rarely_it_is_looked_at():
+    window = SlidingWindow(0)
+    assert [window.earlier(time, count) for time, count in ((0.0, 1), (WINDOW, 2), (3 * WINDOW, 3))] == [
+        0,
+        1,
+        2,
+    ]
+
+
+def test_a_finding_that_came_back_is_told_afresh():
+    standing = Standing()
+    said = [
+        standing.keep(verdict_on(found, 'well', {})).sentence
+        for found in ([loss(1)], [], [loss(7)], [loss(9)])
+    ]
+    assert said == ['1 lost; check the bus', 'well', '7 lost; check the bus', '7 lost; check the bus']
+
+
+def test_a_graver_level_is_told_at_once_and_the_first_error_speaks_alone():
+    hot, hotter = Finding(Level.WARN, 'hot', '120 degC'), Finding(Level.ERROR, 'hot', '150 degC')
+    standing = Standing()
+    assert standing.keep(verdict_on([hot, loss(1)], 'well', {})).sentence == '120 degC. 1 lost; check the bus'
+    silent = Finding(Level.ERROR, 'silence', 'no frames')
+    verdict = standing.keep(verdict_on([hotter, silent, loss(2)], 'well', {}))
+    assert (verdict.level, verdict.sentence) == (Level.ERROR, '150 degC')
+
+
+def test_a_verdict_without_findings_passes():
+    verdict = Verdict(Level.ERROR, 'as it is')
+    assert Standing().keep(verdict) is verdict
