@@ -75,7 +75,7 @@ def warm(simulated_actuator, celsius):
 
 
 def judged(result, specimen: Specimen):
-    return verdict(InitFigures(result, 1, 0, ''), specimen, PARAMETERS)
+    return verdict(InitFigures(result, 1, 0, '', 0), specimen, PARAMETERS)
 
 
 def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
