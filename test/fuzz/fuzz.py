@@ -4,8 +4,8 @@
     .venv/bin/python test/fuzz/fuzz.py --guided 600 --only frames
 
 The inputs are numbered: a failure names the number, which as an `@example` of its test is a regression test.
-One that takes longer than 2 s is a failure too. With `--guided` and the package `atheris` in the environment,
-code coverage chooses the inputs for so many seconds.
+One that computes for longer than 2 s, or waits for longer than a minute, is a failure too. With `--guided`
+and the package `atheris` in the environment, code coverage chooses the inputs for so many seconds.
 """
 
 import argparse
@@ -19,12 +19,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-LIMIT = 2.0  # s, chosen: an input that takes longer hangs
+LIMIT = 2.0  # s of the processor, chosen: an input that takes longer hangs
+LONGEST_WAIT = 60.0  # s by the wall clock, chosen: a loaded machine takes that long for nothing
 Check = Callable[[int], None]
 
 
 class HangError(AssertionError):
-    """An input took longer than `LIMIT`."""
+    """An input computed for longer than `LIMIT` or waited for longer than `LONGEST_WAIT`."""
 
 
 def property_of(package: str, module: str, name: str):
@@ -41,7 +42,7 @@ def property_of(package: str, module: str, name: str):
 def all_targets() -> Iterator[dict[str, list[Check]]]:
     """Give {kind of input: checks of one number}; files of the readers live in a folder that goes."""
     with tempfile.TemporaryDirectory() as folder:
-        yield {**bytes_targets(), **text_targets(), **file_targets(Path(folder))}
+        yield {**bytes_targets(), **text_targets(), **settings_targets(), **file_targets(Path(folder))}
 
 
 def bytes_targets() -> dict[str, list[Check]]:
@@ -78,6 +79,19 @@ def text_targets() -> dict[str, list[Check]]:
     return {'specimen': checks[:1], 'damper': checks[1:]}
 
 
+def settings_targets() -> dict[str, list[Check]]:
+    """Return the checks of what a user sets: parameter files, options, sessions, changes at run time."""
+    names = (
+        'test_a_changed_parameter_file_is_refused_or_every_value_is_within_its_range',
+        'test_a_changed_option_is_refused_or_within_its_range',
+        'test_a_changed_session_is_refused_or_gives_a_sample_rate_within_its_range',
+        'test_a_changed_value_at_run_time_is_refused_or_leaves_a_sound_controller',
+    )
+    return {
+        'parameters': [plain(property_of('mount_bringup', 'test_foreign_settings', name)) for name in names]
+    }
+
+
 def file_targets(folder: Path) -> dict[str, list[Check]]:
     """Return the checks of recordings: MCAP by four writers and our own, sqlite3, `metadata.yaml`."""
     files = {
@@ -102,8 +116,8 @@ def file_targets(folder: Path) -> dict[str, list[Check]]:
 
 
 def small_drive(module, folder: Path, writer: str):
-    """Return file, bytes and content of a recording of 5 samples as `writer` of the test makes it."""
-    made = module.write_drive(folder / writer.replace(' ', '_'), 5, chunk_size=700)
+    """Return file, bytes and content of a recording of 3 samples as `writer` of the test makes it."""
+    made = module.write_drive(folder / writer.replace(' ', '_'), 3, chunk_size=700)
     (file,) = made.glob('*.mcap')
     if writer != 'ours':
         module.rewritten(file, made / 'other.mcap', module.WRITERS[writer])
@@ -121,17 +135,23 @@ def count_through(checks: list[Check], first: int, inputs: int, name: str) -> li
     failed: list[int] = []
     begin = time.monotonic()
     for number in range(first, first + inputs):
-        signal.setitimer(signal.ITIMER_REAL, LIMIT)
+        limit_time(LIMIT, LONGEST_WAIT)
         try:
             checks[number % len(checks)](number // len(checks))
         except Exception as error:
             failed.append(number)
             which = f'check {number % len(checks)}, number {number // len(checks)}'
             print(f'{name}: {which}: {type(error).__name__}: {error!s:.300}', flush=True)
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    limit_time(0.0, 0.0)
     took = time.monotonic() - begin
     print(f'{name}: {inputs} inputs, {len(failed)} failed, {took:.0f} s', flush=True)
     return failed
+
+
+def limit_time(computing: float, waiting: float) -> None:
+    """Have a signal come after so many seconds of the processor or by the wall clock; 0: never."""
+    signal.setitimer(signal.ITIMER_PROF, computing)
+    signal.setitimer(signal.ITIMER_REAL, waiting)
 
 
 def guide(check: Check, seconds: int) -> None:
@@ -157,8 +177,9 @@ def main() -> int:
     given = parser.parse_args()
 
     def hang(*_) -> None:
-        raise HangError(f'longer than {LIMIT} s')
+        raise HangError(f'computed for {LIMIT:g} s or waited for {LONGEST_WAIT:g} s')
 
+    signal.signal(signal.SIGPROF, hang)
     signal.signal(signal.SIGALRM, hang)
     failures = 0
     with all_targets() as targets:

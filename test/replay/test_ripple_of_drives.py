@@ -75,3 +75,11 @@ def test_a_fault_while_damping_is_found_within_a_second_of_contact(fault):
     begin = round(1e3 * FAULT)
     assert doubt[0] >= begin
     assert np.sum(currents[begin : doubt[0]] > CONTACT) < 400
+
+
+def test_pads_that_wear_by_the_fault_are_found_in_the_first_damping_beyond_the_ready_position():
+    doubt, currents = watched({'faults': (f'pads_worn@{FAULT:g}',), 'timeline.duration': 13.0})
+    assert doubt is not None
+    begin = round(1e3 * FAULT)
+    assert begin <= doubt[0]
+    assert np.sum(currents[begin : doubt[0]] > 0.75) < 150

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, sample, write_drive
+from recorded_drive import PERIOD, START, joint_state, sample, write_drive
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -18,6 +18,7 @@ from mount_bags.container.writer import ChunkedMcap
 from mount_bags.edit.cut import cut
 from mount_bags.edit.merge import merge
 from mount_bags.edit.recover import recover
+from mount_bags.messages.series import SeriesError
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 101
@@ -179,3 +180,19 @@ def test_times_are_those_of_the_chunks_where_the_statistics_tell_of_others(tmp_p
     assert lying.time_range == honest.time_range
     assert any('statistics tell of other times' in warning for warning in lying.warnings)
     assert lying['displacement'].time[0] == honest['displacement'].time[0]
+
+
+@pytest.mark.parametrize(('field', 'type_'), [('position', 'float64[]'), ('name', 'string[]')])
+def test_a_stored_definition_without_a_field_is_refused_in_a_sentence(tmp_path, field, type_):
+    folder = written(tmp_path / 'bag', 2)
+    with sqlite3.connect(folder / 'bag.db3') as base:
+        base.execute(
+            'UPDATE message_definitions SET encoded_message_definition = '
+            'replace(encoded_message_definition, ?, ?)',
+            (f'{type_} {field}', f'{type_} elsewhere'),
+        )
+        of_two = joint_state(START, ['mount', 'other'], np.array([1.0, 2.0]), np.empty(0))
+        base.execute('INSERT INTO messages (topic_id, timestamp, data) VALUES (1, ?, ?)', (START, of_two))
+    series = mount_bags.open(folder)['displacement']
+    with pytest.raises(SeriesError, match=f"its definition of sensor_msgs/msg/JointState has no .*'{field}'"):
+        _ = series['mount']

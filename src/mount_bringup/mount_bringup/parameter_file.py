@@ -21,8 +21,17 @@ def settings_of_file(
     `known` is {node: {parameter: default}}. Raises `SettingError` for a file that cannot be read or names
     none of these nodes, and `ParameterError` for a parameter that none of those named has.
     """
+    return settings_in(_content(file), str(file), namespace, known)
+
+
+def settings_in(
+    content: Any, file: str, namespace: str, known: Mapping[str, Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """Return what `settings_of_file` does of the content of a file that refusals call `file`."""
+    if not isinstance(content, Mapping):
+        raise SettingError(f'parameter file {file} must name nodes with their {_VALUES}')
     settings: dict[str, dict[str, Any]] = {}
-    for pattern, values in _entries(_content(file)):
+    for pattern, values in _entries(content):
         nodes = [node for node in known if _named(pattern, node)]
         if not nodes:
             raise SettingError(f'{file}: {pattern!r} is no node of the graph; known are {", ".join(known)}')
@@ -38,14 +47,11 @@ def settings_of_file(
     return settings
 
 
-def _content(file: Path) -> Mapping[str, Any]:
+def _content(file: Path) -> Any:
     try:
-        content = yaml_in_file(file)
+        return yaml_in_file(file)
     except YamlError as error:
         raise SettingError(f'parameter file {file} {error}') from None
-    if not isinstance(content, Mapping):
-        raise SettingError(f'parameter file {file} must name nodes with their {_VALUES}')
-    return content
 
 
 def _entries(content: Mapping[str, Any], path: str = '') -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -66,6 +66,8 @@ def calibrated(files, tmp_path_factory):
             *ripple,
             '--base',
             specimen,
+            '--supply',
+            13.5,
             '--figure',
             folder / 'gap.png',
             '--json',
@@ -80,6 +82,7 @@ def calibrated(files, tmp_path_factory):
 
 def test_the_specimen_meets_the_actuator_it_was_measured_on(calibrated):
     specimen = load_specimen(calibrated / 'left.yaml', 'left')
+    assert specimen.bridge.link_voltage == 13.5  # as told
     gaps, currents = np.linspace(300e-6, 520e-6, 12)[:, np.newaxis], np.linspace(0.3, 3.0, 28)
     truth = np.array([[force(RACK.actuator, i, d) for i in currents] for d in gaps[:, 0]])
     error = (checked_force(specimen.force_law, currents, gaps) / truth - 1.0)[truth > 20.0]

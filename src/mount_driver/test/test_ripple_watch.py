@@ -302,3 +302,32 @@ def test_a_frozen_ripple_is_found_once_the_current_moves(learnt):
     for samples, found in ((still, False), (moving, True)):
         samples[1][:], samples[2][:] = frozen
         assert (fed(learnt, samples, begin=10_000 * (1 + found)) is not None) is found
+
+
+ONCE = np.concatenate([READY, 0.5 + 0.6 * np.sin(np.linspace(0.0, 2.0 * np.pi, 125)) ** 2, READY])
+"""Damped for one period of 8 Hz, up to 1.1 A; above 0.75 A for some 70 samples."""
+
+
+@pytest.mark.parametrize('volts', [9.0, 14.0, 16.0])
+def test_pads_that_wear_are_found_where_the_engine_is_damped_for_one_period_alone(volts):
+    found = watch()
+    assert fed(found, readings(RAMP, coil_at(20.0, volts)), volts) is None
+    begin, worn = len(RAMP), MECHANICS._replace(contact_gap=260e-6)
+    assert fed(found, readings(ONCE, coil_at(20.0, volts)), volts, begin=begin) is None
+    doubt = fed(found, readings(ONCE, coil_at(20.0, volts), worn), volts, begin=begin + len(ONCE))
+    assert doubt is not None
+    assert len(READY) + 300 <= doubt[0] < len(READY) + 350
+    assert doubt[1].startswith('coil inductance by the ripple at ')
+
+
+@pytest.mark.parametrize('volts', [9.0, 12.0, 16.0])
+def test_another_supply_than_in_the_ramp_is_no_deviation(learnt, volts):
+    assert fed(learnt, readings(DAMPING, coil_at(20.0, volts)), volts, begin=len(RAMP)) is None
+    assert abs(learnt.figures.gap_change) < 3e-6
+
+
+@pytest.mark.parametrize('volts', [9.0, 14.0, 16.0])
+def test_the_gap_of_the_ramp_is_the_same_at_any_supply(volts):
+    found = watch()
+    assert fed(found, readings(RAMP, coil_at(20.0, volts)), volts) is None
+    assert found.figures.gap * 1e6 == pytest.approx(341.0, abs=4.0)

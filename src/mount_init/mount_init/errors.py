@@ -29,6 +29,10 @@ class WrongCoilError(InitialisationError):
     """The resistance of the coil is not that of the specimen."""
 
 
+class SupplyError(InitialisationError):
+    """The supply lies where the gap curves do not hold, or does not drive the ramp."""
+
+
 class NoContactError(InitialisationError):
     """The pads never came into contact, or never left it."""
 

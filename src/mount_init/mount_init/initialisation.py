@@ -42,10 +42,10 @@ from mount_init.plausibility import (
 )
 from mount_init.ramp import Ramp, current_ramp
 from mount_init.readings import Readings, check_rate, check_readings
+from mount_init.supply import RampSupply, check_reach, inductance_at_supply_of_curves, saturated
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, find_crossing
-from mount_models.coil.resistance import CoilResistance, measured_resistance
 from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
 from mount_models.specimen import Specimen
 
@@ -71,7 +71,7 @@ class Evidence:
     contact: ContactGap
     curve: InductanceCurve
     temperature: CoilTemperature
-    resistance: CoilResistance
+    supply: RampSupply
     samples: int
     skipped: int
 
@@ -150,7 +150,7 @@ class Initialisation:
         if number == self.length // 2:
             self._middle_stamp = stamp
         valid = self.readings.add(current, current_rate, flux_rate)
-        self._watch(valid, current, self._setpoints[number - 1] if number else OFF)
+        self._watch(valid, current, flux_rate, self._setpoints[number - 1] if number else OFF)
         return OFF if self._failure is not None else self._setpoints[number]
 
     def silence(self, duration: float) -> TooFewRipplesError:
@@ -172,6 +172,7 @@ class Initialisation:
         assert self._first_stamp is not None
         assert self.last_stamp is not None
         check_rate(self.last_stamp - self._first_stamp, self.length, self.parameters)
+        check_reach(self.specimen, self.readings, self.ramp)
         check_readings(self.readings, self.ramp, self.parameters)
         temperature = coil_temperature(
             self._temperatures, self._middle_stamp, self.parameters.coil_temperature_celsius
@@ -179,7 +180,7 @@ class Initialisation:
         evidence = _estimate(self.specimen, self.parameters, self.ramp, self.readings, temperature)
         return _complete(self.specimen, self.parameters, evidence)
 
-    def _watch(self, valid: bool, current: float, setpoint: float) -> None:
+    def _watch(self, valid: bool, current: float, flux_rate: float, setpoint: float) -> None:
         parameters = self.parameters
         if not valid:
             self._invalid += 1
@@ -195,9 +196,10 @@ class Initialisation:
         self._followed |= not deviates and current > parameters.following_error
         if self._deviating > parameters.following_duration * parameters.sample_rate:
             gone = self._followed and abs(current) <= parameters.following_error
+            full = saturated(self.specimen, current, flux_rate)
             self._failure = CurrentNotFollowingError(
                 f'coil current ({current:.3f} A) must follow its setpoint ({setpoint:.3f} A) within '
-                f'{parameters.following_error:g} A; {_GONE if gone else _NOT_FOLLOWING}'
+                f'{parameters.following_error:g} A; {full or (_GONE if gone else _NOT_FOLLOWING)}'
             )
 
 
@@ -219,12 +221,9 @@ def _estimate(
     readings: Readings,
     temperature: CoilTemperature,
 ) -> Evidence:
-    current, inductance = readings.current, readings.inductance(specimen.turns_area)
-    level = specimen.crossing_inductance
-    celsius = temperature.celsius
-
-    driven = slice(ramp.up.start, ramp.down.stop)
-    resistance = measured_resistance(specimen.turns_area, current[driven], readings.flux_rate[driven])
+    level, celsius = specimen.crossing_inductance, temperature.celsius
+    current = readings.current
+    inductance, supply = inductance_at_supply_of_curves(specimen, parameters, ramp, readings, celsius)
 
     dwells = [
         dwell_inductance(current[part], inductance[part], parameters)
@@ -236,7 +235,7 @@ def _estimate(
     check_same_rest_gap(before, after, parameters)
     mean = _mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells])
     rest = rest_gap(specimen, *mean, celsius)
-    check_resistance(specimen, resistance, celsius, parameters)
+    check_resistance(specimen, supply, celsius, parameters)
 
     curve = inductance_curve(current, inductance, ramp.up, ramp.down, parameters.peak_current)
     check_single_crossing(curve, level, specimen.rest_current)
@@ -263,7 +262,7 @@ def _estimate(
         contact=contact,
         curve=curve,
         temperature=temperature,
-        resistance=resistance,
+        supply=supply,
         samples=readings.valid,
         skipped=readings.skipped,
     )

@@ -11,12 +11,14 @@ from mount_init.errors import (
     CurrentNotFollowingError,
     ImpreciseError,
     NoContactError,
+    SupplyError,
     WrongCoilError,
 )
 from mount_init.estimation import ContactGap, Dwell, FloatArray, InductanceCurve, RestGap
 from mount_init.parameters import InitParameters
+from mount_init.supply import RampSupply
 from mount_models.actuator.law import checked_force
-from mount_models.coil.resistance import CoilResistance, resistance_at
+from mount_models.coil.resistance import resistance_at
 from mount_models.specimen import Specimen
 
 _WORKING_CELSIUS = -40.0, 180.0  # degC, chosen: ISO 16750-4, insulation class H
@@ -34,11 +36,12 @@ def check_rest_current(specimen: Specimen, dwell: Dwell, parameters: InitParamet
 
 
 def check_resistance(
-    specimen: Specimen, resistance: CoilResistance, celsius: float, parameters: InitParameters
+    specimen: Specimen, supply: RampSupply, celsius: float, parameters: InitParameters
 ) -> None:
     """Raise `WrongCoilError` unless the resistance is that of the specimen at a temperature (degC).
 
-    Where that is unknown (NaN), any temperature of a working coil is granted.
+    Where that is unknown (NaN), any temperature of a working coil is granted. While the supply changes, one
+    part of the ramp must show it.
     """
     if specimen.coil_resistance is None:
         return
@@ -46,15 +49,23 @@ def check_resistance(
     coldest, hottest = (celsius, celsius) if known else _WORKING_CELSIUS
     low = (1.0 - parameters.resistance_tolerance) * resistance_at(specimen.coil_resistance, coldest)
     high = (1.0 + parameters.resistance_tolerance) * resistance_at(specimen.coil_resistance, hottest)
-    if low <= resistance.ohm <= high:
+    found = [supply.whole.ohm] if supply.steady else [part.ohm for part in supply.parts]
+    if any(low <= ohm <= high for ohm in found):
         return
     where = f'at {celsius:.0f} degC' if known else f'at {coldest:g} .. {hottest:g} degC, its own is unknown'
-    cause = (
-        'are turns shorted?' if resistance.ohm < low else 'is a contact loose, or the coil hotter than told?'
-    )
+    limits = f'{low:.3f} .. {high:.3f} ohm, that of {specimen.name} {where}'
+    if not supply.steady:
+        shown = ' and '.join(f'{ohm:.3f}' for ohm in found) or 'none, so unevenly'
+        raise SupplyError(
+            f'voltage of the bridge by the coil ripple changed between {supply.lowest:.1f} and '
+            f'{supply.highest:.1f} V during the ramp, and no part of it shows a resistance within {limits} '
+            f'({shown}); activate again while the supply is steady, else check the coil'
+        )
+    (ohm,) = found
+    cause = 'are turns shorted?' if ohm < low else 'is a contact loose, or the coil hotter than told?'
     raise WrongCoilError(
-        f'resistance of the coil ({resistance.ohm:.3f} ohm, link voltage {resistance.link_voltage:.1f} V) '
-        f'must lie within {low:.3f} .. {high:.3f} ohm, that of {specimen.name} {where}; {cause} Check coil '
+        f'resistance of the coil ({ohm:.3f} ohm, link voltage {supply.whole.link_voltage:.1f} V) '
+        f'must lie within {limits}; {cause} Check coil '
         'and cable, coil_temperature and the specimen'
     )
 

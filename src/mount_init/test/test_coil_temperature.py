@@ -75,7 +75,7 @@ def warm(simulated_actuator, celsius):
 
 
 def judged(result, specimen: Specimen):
-    return verdict(InitFigures(result, 1, 0, ''), specimen, PARAMETERS)
+    return verdict(InitFigures(result, 1, 0, '', 0), specimen, PARAMETERS)
 
 
 def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
@@ -98,11 +98,9 @@ def test_an_unknown_temperature_is_taken_for_that_of_the_calibration_with_a_warn
     simulated_actuator, specimen, run_initialisation
 ):
     result = run_initialisation(warm(simulated_actuator, 60.0), specimen, PARAMETERS)
-    calibrated = PARAMETERS._replace(
-        coil_temperature_celsius=specimen.temperature.calibration_celsius,
-        resistance_tolerance=0.5,  # a coil told so cold would be refused by its resistance
-    )
-    expected = run_initialisation(warm(simulated_actuator, 60.0), specimen, calibrated)
+    calibrated = PARAMETERS._replace(coil_temperature_celsius=specimen.temperature.calibration_celsius)
+    of_any_resistance = replace(specimen, coil_resistance=None)  # else one told so cold would be refused
+    expected = run_initialisation(warm(simulated_actuator, 60.0), of_any_resistance, calibrated)
     assert (result.rest_gap, result.contact_gap) == (expected.rest_gap, expected.contact_gap)
     assert abs(result.rest_gap - 508e-6) > 20e-6  # what the warning is for
     said = judged(result, specimen)

@@ -321,8 +321,8 @@ def test_a_coil_of_forty_per_cent_more_resistance_is_judged_by_its_temperature(
         plant = simulated_actuator(distort=of_resistance(3.5))
         parameters = InitParameters(coil_temperature_celsius=celsius, smallest_travel=2e-6)
         result = run_initialisation(plant, dataclasses.replace(specimen, temperature=None), parameters)
-        assert result.evidence.resistance.ohm == pytest.approx(3.5, abs=1e-6)
-        assert result.evidence.resistance.link_voltage == pytest.approx(14.0, abs=1e-6)
+        assert result.evidence.supply.whole.ohm == pytest.approx(3.5, abs=1e-6)
+        assert result.evidence.supply.whole.link_voltage == pytest.approx(14.0, abs=1e-6)
 
 
 def test_without_a_resistance_in_the_specimen_none_is_asked_for(
@@ -330,4 +330,4 @@ def test_without_a_resistance_in_the_specimen_none_is_asked_for(
 ):
     unknown = dataclasses.replace(specimen, coil_resistance=None)
     result = run_initialisation(simulated_actuator(distort=of_resistance(0.1)), unknown)
-    assert result.evidence.resistance.ohm == pytest.approx(0.1, abs=1e-6)
+    assert result.evidence.supply.whole.ohm == pytest.approx(0.1, abs=1e-6)

@@ -18,6 +18,7 @@ import yaml
 
 from mount_models.actuator.law import ForceLaw
 from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
+from mount_models.coil.duty import Bridge
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
 from mount_models.coil.heating import CoilHeating, check_heating
 from mount_models.coil.temperature import CompensationError, TemperatureCompensation, check_compensation
@@ -47,7 +48,7 @@ class Specimen:
 
     `friction` holds what was identified of `FrictionCoefficients` and `FrictionContact`, by their names; what
     is not in it keeps its default. Without `temperature` the gap curves hold at one temperature only; a file
-    without `heating` has its defaults.
+    without `heating` or `bridge` has their defaults.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Specimen:
     coil_resistance: float | None = None  # ohm at 20 degC; None: not known, so not held against the ripple
     temperature: TemperatureCompensation | None = None
     heating: CoilHeating = field(default_factory=CoilHeating)
+    bridge: Bridge = field(default_factory=Bridge)
     friction: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
 
@@ -184,6 +186,7 @@ def checked_specimen(specimen: Specimen) -> Specimen:
         _check_limits(specimen.coil_resistance, _COIL_RESISTANCE, 'coil_resistance')
     for name, quantity in quantities(CoilHeating).items():
         _check_limits(getattr(specimen.heating, name), quantity, f'heating.{name}')
+    _check_bridge(specimen.bridge)
     try:
         check_heating(specimen.heating)
     except ParameterError as error:
@@ -208,7 +211,11 @@ def checked_specimen(specimen: Specimen) -> Specimen:
 
 _READABLE = 0o644
 _COIL_RESISTANCE = Quantity('ohm', 'resistance of the coil at 20 degC', 0.01, 100.0)
-_OPTIONAL = {'coil_resistance': None, 'heating': CoilHeating()._asdict()}  # not in calibrations of before
+_OPTIONAL = {  # not in calibrations of before
+    'coil_resistance': None,
+    'heating': CoilHeating()._asdict(),
+    'bridge': Bridge()._asdict(),
+}
 
 
 # Several parts of a run load the same file, and to check it takes some 20 ms.
@@ -223,6 +230,16 @@ def _check_version(content: Any) -> None:
         raise SpecimenError(
             f'schema_version ({_told(version)}) must be {SCHEMA_VERSION}; the file is of another version of '
             'this software, or none of its specimens: calibrate again'
+        )
+
+
+def _check_bridge(bridge: Bridge) -> None:
+    for name, quantity in quantities(Bridge).items():
+        _check_limits(getattr(bridge, name), quantity, f'bridge.{name}')
+    if not bridge.lowest_voltage <= bridge.link_voltage <= bridge.highest_voltage:
+        raise SpecimenError(
+            f'bridge.link_voltage ({bridge.link_voltage:g} V) must lie within lowest_voltage .. '
+            f'highest_voltage ({bridge.lowest_voltage:g} .. {bridge.highest_voltage:g} V); correct the range'
         )
 
 

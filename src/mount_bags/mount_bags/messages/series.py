@@ -162,7 +162,10 @@ class Series:
             return tuple(path for path, numbers in layout.numbers.items() if numbers.count == 1)
         if layout is not None:
             return tuple(text for path, text in layout.strings.items() if path.startswith('name['))
-        return tuple(dict.fromkeys(name for message in self._decoded for name in message.name))
+        try:
+            return tuple(dict.fromkeys(str(name) for message in self._decoded for name in message.name))
+        except (AttributeError, TypeError):
+            raise SeriesError(f"{self.topic}: its definition of {self.type} has no list 'name'") from None
 
     def __getitem__(self, name: str) -> Column:
         """Return the column `name` in the unit `unit(name)`; raises `SeriesError` with the known names."""
@@ -252,7 +255,10 @@ class Series:
         if not len(self):
             return np.empty(0)
         if layout is None or rows is None:
-            return np.array([_joint_number(message, name, part) for message in self._decoded])
+            try:
+                return np.array([_joint_number(message, name, part) for message in self._decoded])
+            except (AttributeError, TypeError, ValueError):
+                raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}') from None
         numbers = layout.numbers.get(part)
         if numbers is None:
             raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}')
@@ -293,7 +299,7 @@ def _joint_number(message: Any, name: str, part: str) -> float:
     numbers = getattr(message, part)
     if name not in message.name or len(numbers) != len(message.name):
         return math.nan
-    return numbers[message.name.index(name)]
+    return float(numbers[message.name.index(name)])
 
 
 def _split_place(path: str) -> tuple[str, int]:

@@ -175,6 +175,9 @@ def inductance(
     turns_area: Annotated[
         float | None, typer.Option(help='turns times core area, m^2; default: that of the base')
     ] = None,
+    supply: Annotated[
+        float | None, typer.Option(help='voltage of the bridge meanwhile, V; default: that of the base')
+    ] = None,
     coefficient: Annotated[
         float | None, typer.Option(help='rise of the resistivity of the core per kelvin, 1/K')
     ] = None,
@@ -222,7 +225,12 @@ def inductance(
     from dataclasses import replace
 
     starting = replace(
-        starting, rest_current=order.rest_current, crossing_inductance=order.crossing_inductance
+        starting,
+        rest_current=order.rest_current,
+        crossing_inductance=order.crossing_inductance,
+        bridge=starting.bridge._replace(
+            link_voltage=_positive(supply, '--supply', 'V') or starting.bridge.link_voltage
+        ),
     )
     specimen = with_gap_curves(
         starting, name, result.calibration, result.compensation, result.compensated_by, area, files

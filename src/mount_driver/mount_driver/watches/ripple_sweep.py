@@ -20,7 +20,7 @@ _FEWEST = 3  # readings, chosen: of fewer a node says nothing
 _SATURATED = (
     0.5  # share of the crossing inductance, chosen: below it the core is full and the gap hardly shows
 )
-_SATURATED_LIMIT = 0.35  # 1, chosen: what supply and temperature change there is up to 0.25
+_SATURATED_LIMIT = 0.35  # 1, chosen: what the temperature changes there is up to 0.25
 _CURRENT_MARGIN = 0.05  # A, chosen: mount_init has refused long before
 _INDUCTANCE_MARGIN = 0.02  # 1, chosen
 
@@ -33,7 +33,6 @@ class Reference(NamedTuple):
     tolerance: list[float]
     crossing_current: float
     gap: float  # m, at the crossing: the pads are pressed there
-    voltage: float  # V, of the bridge
 
 
 class Sweep:
@@ -63,9 +62,7 @@ class Sweep:
             self._begin()
         return False
 
-    def reference(
-        self, law: RippleLaw, voltage: float, inductance_limit: float, gap_limit: float
-    ) -> Reference | None:
+    def reference(self, law: RippleLaw, inductance_limit: float, gap_limit: float) -> Reference | None:
         """Return the reference of the sweep that has ended; None, and a new begin, where it has holes.
 
         A reading may deviate by `inductance_limit` (1), or by what a gap that differs by `gap_limit` (m)
@@ -96,7 +93,6 @@ class Sweep:
             tolerance.tolist(),
             float(crossing),
             gap_of_crossing(law, float(crossing)),
-            voltage,
         )
 
 

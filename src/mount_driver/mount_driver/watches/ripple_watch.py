@@ -18,11 +18,15 @@ Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that 
 less than one false alarm in 1e5 years. The mean shows a missing pad after 5 readings within 0.1 A and a
 blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Told is what lasts for `duration`:
 three statuses, as supply and temperature are that late.
+
+Worn pads show between 0.75 A and the crossing, where an engine that is damped once for 0.1 s may come by only
+once, with a few readings in each zone. There a mean over all currents joins them; after 48 readings it is
+told also if none comes again.
 """
 
 from typing import Annotated, NamedTuple
 
-from mount_driver.watches.ripple_law import RippleLaw, crossing_per_gap, warmth
+from mount_driver.watches.ripple_law import RippleLaw, SupplyCarrier, crossing_per_gap, warmth
 from mount_driver.watches.ripple_sweep import NODE, Reference, Sweep, objection
 from mount_models.coil.heating import COPPER_CELSIUS, CoilHeating
 from mount_models.quantity import Quantity
@@ -33,15 +37,14 @@ _NOISE_SHARE = 1.0 / 64.0  # in that of the scatter, chosen
 _FARTHEST = 4.0  # in tolerances, chosen: so that one reading moves a mean by a quarter of it at most
 _ODD = 0.5  # 1, chosen: no difference of two readings counts as more
 _TO_STD = 0.886  # sqrt(pi) / 2: from the mean difference of two readings to their standard deviation, normal
-_BY_SUPPLY = (
-    0.2  # 1/A, chosen: what another supply does to L_i by the duty; measured 0.15 .. 0.2 from 14 to 9 V
-)
 _UNKNOWN_CELSIUS = 0.1  # 1, chosen: what 100 K do
 _UNKNOWN_RESISTANCE = 0.4  # 1, chosen: likewise
+_BLIND = 0.75  # A, chosen: up to here worn pads change L_i by less than 1 % for each 10 um
 _NEAR = 0.2  # A, chosen: so near to the crossing a deviation is told as a gap
 _PAUSE = 50_000_000  # ns, chosen: of a longer time without samples nothing is known
 _SURE = 24  # readings: so many sound ones bring a mean of `_FARTHEST` back below 1
-_ZONES = 32
+_CERTAIN = 48  # readings over the zones, chosen: told though none comes again, for an engine is damped once
+_JOINT = _ZONES = 32
 _JUMP = 0.03  # 1, chosen: another 35 K from one status to the next; a coil takes a minute for it
 _NOTHING_KNOWN = ('missing', 'voltage')  # findings with which no reading is compared
 
@@ -86,12 +89,14 @@ class RippleWatch:
         self._parameters, self._law, self._heating = parameters, law, heating
         self._duration = round(1e9 * parameters.duration)
         self._turns_area = law.turns_area
+        self._carrier = SupplyCarrier(law)
         self._sweep = Sweep()
         self._reference: Reference | None = None
-        self._means = [0.0] * _ZONES  # of the deviations in tolerances, each of 0.1 A
+        self._means = [0.0] * (_ZONES + 1)  # of the deviations in tolerances, each of 0.1 A, and over zones
         self._noise, self._last = 0.0, 0.0
-        self._beyond = [0] * _ZONES  # readings of a zone since its mean has been beyond its limit
-        self._beyond_since = [0] * _ZONES  # ns
+        self._beyond = [0] * (_ZONES + 1)  # readings of a zone since its mean has been beyond its limit
+        self._beyond_since = [0] * (_ZONES + 1)  # ns
+        self._joint_at = 0.0, 0.0, 0.0  # A, H, 1: current, expected inductance and tolerance
         self._beyond_last = -10 * self._duration  # ns: when a mean was beyond its limit last
         self._change = float('nan')  # m
         self._supply = float('nan')
@@ -123,8 +128,8 @@ class RippleWatch:
         self._wider = 0.0 if known else _UNKNOWN_CELSIUS
         before, self._cold = self._cold, 1.0 / warmth(self._law, celsius)
         if abs(self._cold - before) > _JUMP * before:  # readings of before were carried wrongly
-            self._means = [0.0] * _ZONES
-            self._beyond = [0] * _ZONES
+            self._means = [0.0] * (_ZONES + 1)
+            self._beyond = [0] * (_ZONES + 1)
 
     def judge(self, current: float, current_rate: float, flux_rate: float, enabled: bool, now: int) -> str:
         """Return why the ripple does not fit, empty while it does or while that is not certain.
@@ -151,7 +156,8 @@ class RippleWatch:
                 return sentence
         if not valid or finding in _NOTHING_KNOWN:
             return ''
-        inductance = flux_volts / current_rate * self._cold
+        held = self._resistance * current
+        inductance = self._carrier.carried(flux_volts / current_rate, held, self._volts) * self._cold
         if self._reference is None:
             return self._learn(current, inductance) if self._sweep.take(current, inductance) else ''
         return self._compare(self._reference, current, inductance, now)
@@ -169,7 +175,7 @@ class RippleWatch:
 
     def _learn(self, current: float, inductance: float) -> str:
         p = self._parameters
-        self._reference = self._sweep.reference(self._law, self._volts, p.inductance_limit, p.gap_limit)
+        self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
         return '' if self._reference is None else objection(self._reference, self._law, self._wider)
 
     def _compare(self, reference: Reference, current: float, inductance: float, now: int) -> str:
@@ -186,20 +192,27 @@ class RippleWatch:
         self._noise += _NOISE_SHARE * (_TO_STD * (step if step < _ODD else _ODD) - self._noise)
         if self._noise > self._parameters.noise_limit:  # such readings tell nothing of the gap
             return ''
-        by_supply = self._volts / reference.voltage - 1.0
-        by_supply = by_supply if by_supply >= 0.0 else -by_supply
-        tolerance = reference.tolerance[place] + _BY_SUPPLY * by_supply * current + self._wider
+        tolerance = reference.tolerance[place] + self._wider
         excess = deviation / tolerance
         excess = _FARTHEST if excess > _FARTHEST else -_FARTHEST if excess < -_FARTHEST else excess
-        zone = place >> 1
-        self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
         if -_NEAR < current - reference.crossing_current < _NEAR:
             self._note_gap(deviation * expected / -reference.slope[place])
+        at = current, expected, tolerance
+        mean = self._beyond_mean(place >> 1, excess, now)
+        if _BLIND < current < reference.crossing_current + _NEAR:
+            self._joint_at = at
+            self._beyond_mean(_JOINT, excess, now)
+        if not mean and self._beyond[_JOINT] >= _CERTAIN and self._has_lasted(_JOINT, now):
+            at, mean = self._joint_at, self._means[_JOINT]
+        return self._gap_sentence(*at, mean) if mean else ''
+
+    def _beyond_mean(self, zone: int, excess: float, now: int) -> float:
+        """Take a deviation (tolerances) into a zone's mean; return it if it has long been beyond, else 0."""
+        self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
         if -1.0 <= mean <= 1.0:
             self._beyond[zone] = 0
-        elif self._lasts_beyond(zone, now):
-            return self._gap_sentence(current, expected, mean * tolerance, tolerance)
-        return ''
+            return 0.0
+        return mean if self._lasts_beyond(zone, now) else 0.0
 
     def _lasts_beyond(self, zone: int, now: int) -> bool:
         """Whether the mean of a zone, now beyond its limit, has stayed there for long enough."""
@@ -207,7 +220,10 @@ class RippleWatch:
             self._beyond_since[zone] = now
         self._beyond[zone] += 1
         self._beyond_last = now
-        return self._beyond[zone] >= _SURE and now - self._beyond_since[zone] >= self._duration
+        return self._beyond[zone] >= _SURE and self._has_lasted(zone, now)
+
+    def _has_lasted(self, zone: int, now: int) -> bool:
+        return now - self._beyond_since[zone] >= self._duration
 
     def _note_gap(self, current: float) -> None:
         """Take by how much (A) the crossing has moved by the last reading."""
@@ -253,8 +269,8 @@ class RippleWatch:
             f'{lasted}: check the coil for shorted turns, and the ripple measurement'
         )
 
-    def _gap_sentence(self, current: float, expected: float, deviation: float, tolerance: float) -> str:
-        inductance = 1e3 * expected * (1.0 + deviation)
+    def _gap_sentence(self, current: float, expected: float, tolerance: float, mean: float) -> str:
+        inductance = 1e3 * expected * (1.0 + mean * tolerance)
         return (
             f'coil inductance by the ripple at {current:.2f} A ({inductance:.1f} mH) must lie within '
             f'{100.0 * tolerance:.0f} % of that in the ramp of the initialisation ({1e3 * expected:.1f} mH): '

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.averages import mean
+from mount_models.arithmetic.least_squares import least_squares
 
 COPPER_COEFFICIENT = 0.00393
 """Relative rise of the resistance of copper per kelvin at 20 degC, 1/K (IEC 60028)."""
@@ -27,6 +28,13 @@ class CoilResistance(NamedTuple):
     ohm: float
     std: float
     link_voltage: float
+
+
+class DriftingResistance(NamedTuple):
+    """Resistance (ohm) while the voltage drifts, and by how much the medians of 20 samples scatter (V)."""
+
+    ohm: float
+    misfit: float
 
 
 def resistance_at(ohm: float, celsius: float) -> float:
@@ -53,6 +61,25 @@ def measured_resistance(turns_area: float, current: FloatArray, flux_rate: Float
     return CoilResistance(-slope, math.sqrt(variance), intercept)
 
 
+def resistance_beside_drift(
+    turns_area: float, current: FloatArray, flux_rate: FloatArray
+) -> DriftingResistance:
+    """Return the resistance like `measured_resistance`, of samples at equal times while the voltage drifts.
+
+    The drift is taken for a straight line over the time, so the current (A) must not be one.
+    """
+    time = np.arange(current.size, dtype=float) / current.size
+    finite = np.isfinite(current) & np.isfinite(flux_rate)
+    time, current, voltage = time[finite], current[finite], turns_area * flux_rate[finite]
+    columns = np.stack([np.ones(time.size), time, -current], axis=1)
+    (link, drift, ohm), _ = least_squares(columns, voltage)
+    residual = voltage - link - drift * time + ohm * current
+    blocks = np.sort(residual[: residual.size // _BLOCK * _BLOCK].reshape(-1, _BLOCK), axis=1)
+    medians = blocks[:, _BLOCK // 2].copy()
+    return DriftingResistance(float(ohm), math.sqrt(mean(medians * medians)))
+
+
+_BLOCK = 20  # samples, chosen
 _FARTHEST = 4.0 * 1.4826  # of median deviations, chosen: 4 standard deviations of a normal distribution
 _ROUNDING = 1e-3  # V, chosen: the resolution of readings without noise
 

@@ -46,8 +46,15 @@ class CompensationError(ValueError):
 
 def temperature_share(compensation: TemperatureCompensation, celsius: float) -> float:
     """Return which share of the shifts holds at a coil temperature: 0 at calibration, 1 at reference."""
-    there = _skin_change(compensation, celsius)
-    return there / _skin_change(compensation, compensation.reference_celsius)
+    there = skin_change(compensation, celsius)
+    return there / skin_change(compensation, compensation.reference_celsius)
+
+
+def skin_change(compensation: TemperatureCompensation, celsius: float) -> float:
+    """Return the relative change of the root of the conductivity from the temperature of calibration on."""
+    warmer = celsius - compensation.calibration_celsius
+    coefficient = max(compensation.conductivity_coefficient, 1e-6)  # in the limit a straight line
+    return 1.0 / math.sqrt(1.0 + coefficient * warmer) - 1.0
 
 
 def inductance_at_calibration(
@@ -127,13 +134,6 @@ def check_compensation(compensation: TemperatureCompensation, curves: GapCurves)
 
 _LEAST_DIFFERENCE = 10.0  # K, chosen: less tells too little
 _HALVINGS = 60
-
-
-def _skin_change(compensation: TemperatureCompensation, celsius: float) -> float:
-    """Return the relative change of the root of the conductivity from the temperature of calibration on."""
-    warmer = celsius - compensation.calibration_celsius
-    coefficient = max(compensation.conductivity_coefficient, 1e-6)  # in the limit a straight line
-    return 1.0 / math.sqrt(1.0 + coefficient * warmer) - 1.0
 
 
 def _checked_share(compensation: TemperatureCompensation, celsius: float) -> float:
