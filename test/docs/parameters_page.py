@@ -1,7 +1,7 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
-`python test/docs/parameters_page.py` renews the page, the file of `vehicle_file.py`, and the names that a shell
-offers behind Tab, which hold them too; tests hold all three against the code.
+`python test/docs/parameters_page.py` renews the page, the file of `vehicle_file.py`, and the names that a
+shell offers behind Tab, which hold them too; tests hold all three against the code.
 """
 
 import math
