@@ -12,7 +12,6 @@ from parameters_page import SETS, notes_of
 
 from mount_bringup.graph.nodes import VEHICLE
 from mount_bringup.settings import defaults_of_nodes
-from mount_control.policy.registry import POLICIES
 from mount_models.quantity import Quantity
 
 FILE = Path(__file__).resolve().parents[2] / 'src' / 'mount_bringup' / 'config' / 'vehicle.yaml'
@@ -24,15 +23,6 @@ GIVEN: dict[str, dict[str, Any]] = {
     'mount_control': {'continuous_viscous.eigenfrequency': 8.0},
 }
 """What this vehicle gives its nodes; all else is there as a comment with the default."""
-
-TEXTS = {
-    'parameters_file': 'specimen file of this actuator; empty: the shipped one; the same for all three nodes',
-    'specimen': 'name that the specimen file must bear; empty: any; the same for all three nodes',
-    'policy': ' or '.join(POLICIES),
-    'switching': 'enabled, never or always: when the policy switched_viscous may damp',
-    'damper': 'of the policy switched_viscous: viscous_2000, progressive, degressive, a table or a CSV file',
-}
-"""The meaning of parameters without a number."""
 
 HEAD = """\
 # The settings of one vehicle, for `ros2 launch mount_bringup vehicle.launch.py config:=FILE`. This is the
@@ -60,7 +50,7 @@ def _node(node: str, defaults: dict[str, Any]) -> Iterator[str]:
     for name, default in defaults.items():
         given = GIVEN[node].get(name)
         setting = f'{name}: {_value(default if given is None else given)}'
-        yield f'    {"# " if given is None else ""}{setting}  # {_meaning(name, notes.get(name))}'
+        yield f'    {"# " if given is None else ""}{setting}  # {_meaning(notes[name])}'
     yield ''
 
 
@@ -70,8 +60,6 @@ def _value(value: Any) -> str:
     return '.nan' if isinstance(value, float) and math.isnan(value) else repr(value)
 
 
-def _meaning(name: str, note: Quantity | None) -> str:
-    if note is None:
-        return TEXTS[name]
+def _meaning(note: Quantity) -> str:
     limits = f' {note.low:g} .. {note.high:g}' if note.low > -math.inf else ''
     return f'{note.unit}{limits}: {note.meaning}'

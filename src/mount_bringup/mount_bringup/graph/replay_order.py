@@ -15,7 +15,8 @@ from mount_bringup.graph.order import LaunchOrder, check_damper, known_parameter
 from mount_bringup.graph.player import PLAYED
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.settings import SettingError, checked_settings
-from mount_control.settings import FILES, FRICTION
+from mount_control.settings import FRICTION
+from mount_models.specimen_choice import SpecimenChoice
 from mount_ros.nodes.real_time import HIGHEST
 
 _HIGHEST_RATE = 10.0  # chosen
@@ -90,7 +91,7 @@ def _settings(
     if 'parameters_file' in own[CONTROL.name]:
         ours = tuple(f'{prefix}.' for prefix in FRICTION)
         kept = {name: value for name, value in kept.items() if not name.startswith(ours)}
-    for name in FILES:
+    for name in SpecimenChoice._fields:
         kept.pop(name, None)  # what they said is among the recorded values
     own[CONTROL.name] = kept | own[CONTROL.name]
     return checked_settings(own, known)
