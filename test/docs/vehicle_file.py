@@ -61,5 +61,4 @@ def _value(value: Any) -> str:
 
 
 def _meaning(note: Quantity) -> str:
-    limits = f' {note.low:g} .. {note.high:g}' if note.low > -math.inf else ''
-    return f'{note.unit}{limits}: {note.meaning}'
+    return f'{note.unit}{f", {note.limits}" if note.limits else ""}: {note.meaning}'
