@@ -26,7 +26,7 @@ def executed(file: Path) -> NotebookNode:
         places = dict.fromkeys(('IPYTHONDIR', 'JUPYTER_CONFIG_DIR', 'JUPYTER_RUNTIME_DIR'), own)
         environment = {**os.environ, **places}
         client = NotebookClient(
-            notebook, timeout=_LIMIT, kernel_name='python3', record_timing=False,
+            notebook, timeout=_LIMIT, kernel_name='python3', record_timing=False, coalesce_streams=True,
             resources={'metadata': {'path': str(FOLDER)}},
         )  # fmt: skip
         manager = client.create_kernel_manager()

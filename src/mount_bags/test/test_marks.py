@@ -114,6 +114,11 @@ def test_switching_on_is_marked_each_time_and_switching_off_is_not(marks, sent):
     assert sent == [Mark(time * PERIOD, 'switch_on', told) for time in (1001, 1100)]
 
 
+def test_of_several_mounts_the_one_is_named_that_damps(marks, sent):
+    SwitchOnWatch(marks, 'left').add(1, 1.0, math.nan)
+    assert sent == [Mark(1, 'switch_on', 'left: damping on')]
+
+
 def test_an_opening_that_flutters_is_marked_once_and_in_a_report_one_stretch(marks, sent):
     time = np.arange(400)
     active = np.where(time % 30 < 15, 0.03, 0.0) * ((time > 100) & (time < 300))

@@ -75,6 +75,7 @@ REFUSED = {
     'audit': (MISSING,),
     'calibrate actuator': (MISSING, '--name', 'x'),
     'calibrate inductance': (MISSING, '--name', 'x'),
+    'check': ('--suite', MISSING),
     'compare': (MISSING, MISSING),
     'cut': (MISSING, '--from', '1s', '--to', '2s', '--out', MISSING),
     'drive': ('--core', '--scenario', 'recorded', '--file', MISSING),

@@ -75,7 +75,7 @@ def test_the_example_makes_the_force_that_it_wants(make, sine):
 def test_every_number_of_a_policy_has_unit_meaning_and_range(policy):
     notes, parameters = quantities(POLICIES[policy].Parameters), POLICIES[policy].Parameters()
     numbers = {name: value for name, value in parameters._asdict().items() if not isinstance(value, str)}
-    assert set(notes) == set(numbers)
+    assert set(notes) == set(parameters._fields)
     assert all(notes[name].low <= value <= notes[name].high for name, value in numbers.items())
 
 

@@ -89,6 +89,16 @@ def test_damping_is_told_with_times_from_the_first_displacement_sample(happening
     assert told == ['    1.00 s damping on at 0.9 mm in the band', '    1.46 s damping off']
 
 
+def test_the_damping_of_several_mounts_is_told_from_the_marks_of_their_common_recorder(told):
+    happenings = Happenings(of_mounts(SIMULATED, ('left', 'right')), told.append)
+    happenings.told('left/mount_driver', DRIVER)
+    happenings.mark('', Mark(8_000_000_000, 'switch_on', 'left: damping on'))
+    happenings.told('right/mount_control', off_at(8_460_000_000))
+    assert happenings.present == 'damping on; nothing lost'
+    happenings.told('left/mount_control', off_at(8_460_000_000))
+    assert told == ['    1.00 s left: damping on', '    1.46 s left: damping off']
+
+
 def test_damping_that_flutters_is_summed_up(happenings, told, clock):
     happenings.told('mount_driver', DRIVER)
     for switch in range(200):

@@ -4,7 +4,7 @@ import threading
 import time
 from collections.abc import Mapping
 
-from mount_sim.loop import LOCKSTEP_WAIT, ROOM, ElectronicsLoop, NoAnswerError
+from mount_sim.loop import LOCKSTEP_WAIT, ElectronicsLoop, NoAnswerError, OwnWork
 
 
 class CarLoop:
@@ -19,14 +19,16 @@ class CarLoop:
     def run_in_real_time(self, ending: threading.Event) -> None:
         """Sample all mounts by the electronics' clock, as `ElectronicsLoop` does for one."""
         period = 1.0 / self._sample_rate / (1.0 + self._clock_drift)
+        own = OwnWork(period)
         begin, taken = time.monotonic(), 0
         while not ending.is_set():
             for _, loop in self._loops:
                 loop.send_sample()
             for _, loop in self._loops:
-                loop.wait_for_answer(begin + (taken + ROOM) * period)
-            for _, loop in self._loops:
-                loop.go_on()
+                loop.wait_for_answer(own.latest_begin(begin + (taken + 1) * period))
+            with own:
+                for _, loop in self._loops:
+                    loop.go_on()
             taken += 1
             now = time.monotonic()
             remaining = begin + taken * period - now

@@ -16,11 +16,12 @@ from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 LOCKSTEP_WAIT = 0.1
 """Seconds: how often a loop in lock-step looks whether it shall end."""
 
-ROOM = 0.5
-"""Periods, chosen: so long the graph has the processors to answer, before the simulator does its own work."""
-
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
+
+
+_FORGOTTEN = 0.01  # chosen: of the longest time that the work took, from one sample to the next
+_RESERVE = 1.5  # chosen: times the work's longest time are kept for it
 
 
 class NoAnswerError(RuntimeError):
@@ -38,6 +39,29 @@ class LoopFigures:
     latency: LatencyHistogram = field(default_factory=LatencyHistogram)
     failure: str = ''
     beyond_range: BeyondRange = field(default_factory=BeyondRange)
+
+
+class OwnWork:
+    """How long the simulator's own work on a sample takes, which waits until the graph has answered.
+
+    Electronics have a processor of their own; with two of them the simulator would take one from the graph.
+    """
+
+    def __init__(self, longest: float):
+        """`longest` in s: what is to be expected at first."""
+        self._longest = longest
+        self._begin = 0.0
+
+    def latest_begin(self, end: float) -> float:
+        """Return when it must begin so that it is done at `end` (s)."""
+        return end - _RESERVE * self._longest
+
+    def __enter__(self) -> None:
+        self._begin = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        taken = time.monotonic() - self._begin
+        self._longest = max(taken, (1.0 - _FORGOTTEN) * self._longest)
 
 
 class ElectronicsLoop:
@@ -73,11 +97,13 @@ class ElectronicsLoop:
         Electronics do not fall silent when a drive is over; if they did, the control would rightly report it.
         """
         period = 1.0 / self._mount.sample_rate / (1.0 + self._electronics.clock_drift)
+        own = OwnWork(period)
         begin = time.monotonic()
         while not ending.is_set():
             self.send_sample()
-            self.wait_for_answer(begin + (self._mount.sample + ROOM) * period)
-            self.go_on()
+            self.wait_for_answer(own.latest_begin(begin + (self._mount.sample + 1) * period))
+            with own:
+                self.go_on()
             self.figures.wall_time = time.monotonic() - begin
             remaining = begin + self._mount.sample * period - time.monotonic()
             if remaining > 0.0:

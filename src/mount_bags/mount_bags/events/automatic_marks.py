@@ -57,11 +57,20 @@ class AutomaticMarks:
         self._send(Mark(stamp, kind.value, text))
 
 
-class SwitchOnWatch:
-    """Marks where `damping_active` leaves 0 after a pause that is long enough to be one."""
+def of_mount(mount: str) -> str:
+    """Return what stands before the text of a mark that concerns one of several mounts."""
+    return f'{mount}: ' if mount else ''
 
-    def __init__(self, marks: AutomaticMarks):
+
+class SwitchOnWatch:
+    """Marks where `damping_active` leaves 0 after a pause that is long enough to be one.
+
+    `mount`: which of several, empty where there is one.
+    """
+
+    def __init__(self, marks: AutomaticMarks, mount: str = ''):
         self._marks = marks
+        self._of = of_mount(mount)
         self._last: int | None = None  # stamp of the last step with damping on
 
     def add(self, stamp: int, active: float, magnitude: float) -> None:
@@ -70,7 +79,7 @@ class SwitchOnWatch:
             return
         if self._last is None or not 0 <= stamp - self._last <= PAUSE * 1e9:
             level = '' if math.isnan(magnitude) else f' at {1e3 * magnitude:.2f} mm in the band'
-            self._marks.mark(MarkKind.SWITCH_ON, stamp, f'damping on{level}')
+            self._marks.mark(MarkKind.SWITCH_ON, stamp, f'{self._of}damping on{level}')
         self._last = stamp
 
 

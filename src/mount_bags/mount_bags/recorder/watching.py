@@ -36,8 +36,13 @@ def watch_topic(
         kind = MarkKind.UNANSWERED if topic is CONTROL_TRACE else MarkKind.LOST_SAMPLE
         watch = recorder.watch(name, topic.rate_at(sample_rate), stamp_of)
         samples = LostSampleWatch(marks, name, watch, kind)
-        switching = SwitchOnWatch(marks) if topic is CONTROL_TRACE else None
+        switching = SwitchOnWatch(marks, _mount(name, namespace)) if topic is CONTROL_TRACE else None
         recorder.observe(name, _stream_observer(samples, switching))
+
+
+def _mount(name: str, namespace: str) -> str:
+    """Return the mount that a topic belongs to, empty where it stands in the recorder's own namespace."""
+    return name.rpartition('/')[0].removeprefix(namespace.rstrip('/')).strip('/')
 
 
 def _stream_observer(samples: LostSampleWatch, switching: SwitchOnWatch | None) -> Observe:

@@ -97,7 +97,9 @@ class Bringup:
         self._node.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self.verdicts.take, recording_qos(DIAGNOSTICS)
         )
-        for mount in self._mounts:
+        for mount in dict.fromkeys(
+            ['', *self._mounts]
+        ):  # the recorder of several mounts marks in their common
             name, take = f'{mount}/{EVENT.name}'.lstrip('/'), partial(self._take_event, mount)
             self._node.create_subscription(String, name, take, recording_qos(EVENT))
         qos = publisher_qos(SESSION)

@@ -31,7 +31,7 @@ INFO_EPILOG = """Exit code: 0 when the recording could be read, whatever it hold
 
 Examples:
 
-`engine-mount info bags/2026-11-20_18-03-11_motorway`
+`engine-mount info bags/first`
 
 `engine-mount info RECORDING --json info.json`
 

@@ -4,7 +4,7 @@ import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from mount_bags.events.automatic_marks import MarkKind, Ration
+from mount_bags.events.automatic_marks import MarkKind, Ration, of_mount
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphNode
 from mount_bringup.graph.verdicts import Witness
 from mount_ros.messages.event import BY_HAND, Mark
@@ -42,6 +42,7 @@ class Happenings(Witness):
         self._active: float | None = None  # when all nodes were active, s on the clock
         self._zero: int | None = None
         self._sentences: dict[str, str] = {}
+        self._mounts = {node.mount for node in nodes if node.mount}
         self._damping: dict[str, int] = {}  # mount -> stamp since which it damps, ns
         self._times_on = 0
         self._losses: dict[str, int] = {}
@@ -90,6 +91,9 @@ class Happenings(Witness):
         self._tell_sentence(name, node, figures)
 
     def mark(self, mount: str, mark: Mark) -> None:
+        for name in self._mounts:  # in a mark that the recorder of all sets
+            if not mount and mark.text.startswith(of_mount(name)):
+                mount, mark = name, mark._replace(text=mark.text.removeprefix(of_mount(name)))
         if mark.kind == MarkKind.SWITCH_ON.value:
             self._times_on += 1
             self._damping[mount] = mark.time
@@ -115,7 +119,7 @@ class Happenings(Witness):
         grave = int(figures['level']) >= Level.WARN
         if node == INIT.name and not before and 'contact_gap_um' in figures:
             self._sentences[name] = sentence
-            self._say(line('gap', f'{_of(name.rpartition("/")[0])}{_gaps(figures)}'))
+            self._say(line('gap', f'{of_mount(name.rpartition("/")[0])}{_gaps(figures)}'))
         settled = self._active is not None and self._clock() - self._active >= _SETTLING
         if grave and settled and _NUMBERS.sub('', sentence) != _NUMBERS.sub('', before):
             self._sentences[name] = sentence
@@ -130,15 +134,11 @@ class Happenings(Witness):
         label = 'warning' if stamp is None else ''
         if stamp is not None and self._zero is not None:
             label = f'{(stamp - self._zero) * 1e-9:8.2f} s'
-        self._say(line(label, f'{_of(mount)}{text}{more}'))
+        self._say(line(label, f'{of_mount(mount)}{text}{more}'))
 
 
 def _short(name: str) -> str:
     return name.replace('mount_', '')
-
-
-def _of(mount: str) -> str:
-    return f'{mount}: ' if mount else ''
 
 
 def _gaps(figures: Mapping[str, str]) -> str:
