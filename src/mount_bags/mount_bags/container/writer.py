@@ -58,7 +58,6 @@ class ChunkedMcap:
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunk_indexes = bytearray()  # packed: a long recording has very many of them
         self._chunk_count = 0
         self._metadata_indexes: list[MetadataIndex] = []
         self._attachment_indexes: list[AttachmentIndex] = []
@@ -190,7 +189,7 @@ class ChunkedMcap:
         """Write summary and footer; the room that was held back is used for it."""
         self.file.release_room()
         self._append(_packed(DataEnd(self._data_crc)))
-        self.file.append(self._summary(self.file.size))
+        self.file.append(self._summary(self.file.size, self.file.kept()))
 
     def _append(self, data: bytes) -> None:
         self.file.append(data)
@@ -247,7 +246,7 @@ class ChunkedMcap:
             packed.append(_packed_index(channel, numbers))
             end += len(packed[-1])
         self._append(b''.join(packed))
-        self._chunk_indexes += _packed(
+        index = _packed(
             ChunkIndex(
                 message_start_time=chunk.message_start_time,
                 message_end_time=chunk.message_end_time,
@@ -260,6 +259,7 @@ class ChunkedMcap:
                 uncompressed_size=chunk.uncompressed_size,
             )
         )
+        self.file.keep(index)  # a long recording has very many of them
         self._chunk_count += 1
         self._count(chunk, entries)
         self.after_chunk()
@@ -271,12 +271,12 @@ class ChunkedMcap:
         self.start_time = first if self.start_time is None else min(self.start_time, first)
         self.end_time = last if self.end_time is None else max(self.end_time, last)
 
-    def _summary(self, start: int) -> bytes:
-        groups: dict[Opcode, bytes | bytearray] = {
+    def _summary(self, start: int, chunk_indexes: bytes) -> bytes:
+        groups: dict[Opcode, bytes] = {
             Opcode.SCHEMA: _all_packed(self._schemas),
             Opcode.CHANNEL: _all_packed(self._channels),
             Opcode.STATISTICS: _packed(self._statistics()),
-            Opcode.CHUNK_INDEX: self._chunk_indexes,
+            Opcode.CHUNK_INDEX: chunk_indexes,
             Opcode.ATTACHMENT_INDEX: _all_packed(self._attachment_indexes),
             Opcode.METADATA_INDEX: _all_packed(self._metadata_indexes),
         }
