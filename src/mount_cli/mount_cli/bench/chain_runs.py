@@ -19,6 +19,7 @@ from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, SIMU
 from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.sample_rate import with_sample_rate
 from mount_cli.bench.processes import children, memory, processor_time
+from mount_cli.bench.relay import EVENTS, SPIN
 from mount_models.sampling import SAMPLE_RATE
 from mount_ros.environment import prepare_environment
 
@@ -84,10 +85,12 @@ def run_graph(
     return ChainRun(float(latency), found['cpu'], start, found['growth'], 1.0 - answered / max(1, samples))
 
 
-def run_relay(place: Place, seconds: float, sample_rate: float = SAMPLE_RATE) -> ChainRun:
+def run_relay(
+    place: Place, seconds: float, sample_rate: float = SAMPLE_RATE, executor: str = SPIN
+) -> ChainRun:
     """Run the chain of empty nodes for as long, in two processes between the frames."""
     begin = time.monotonic()
-    with _relay(place, composed=False) as (port, processes):
+    with _relay(place, [[_ENDS], [_MIDDLE]], executor) as (port, processes):
         peer = _peer(port, seconds, sample_rate)
         first = float(_line(peer))
         with _watched(processes) as found:
@@ -99,7 +102,7 @@ def run_relay(place: Place, seconds: float, sample_rate: float = SAMPLE_RATE) ->
 
 def relay_in_turn(place: Place, seconds: float) -> float:
     """Return the samples per second of the composed chain whose peer waits for each answer."""
-    with _relay(place, composed=True) as (port, _):
+    with _relay(place, [[_ENDS, _MIDDLE]], EVENTS) as (port, _):
         peer = _peer(port, seconds, 0.0)
         _line(peer)
         told = json.loads(_line(peer))
@@ -108,13 +111,14 @@ def relay_in_turn(place: Place, seconds: float) -> float:
 
 
 @contextlib.contextmanager
-def _relay(place: Place, composed: bool) -> Iterator[tuple[int, list[int]]]:
-    """Keep the processes of the chain running, and give the port of its bus and their ids."""
+def _relay(place: Place, groups: Sequence[Sequence[str]], executor: str) -> Iterator[tuple[int, list[int]]]:
+    """Keep a process for each group of parts running, and give the port of their bus and their ids."""
     prepare_environment()
     port = can_port(place.domain, '') + _RELAY_PORT
-    groups = [[_ENDS, _MIDDLE]] if composed else [[_ENDS], [_MIDDLE]]
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(place.domain)}
-    processes = [subprocess.Popen(_command(group, port), env=environment) for group in groups]
+    processes = [
+        subprocess.Popen(_command(group, port, '--executor', executor), env=environment) for group in groups
+    ]
     try:
         yield port, [process.pid for process in processes]
     finally:

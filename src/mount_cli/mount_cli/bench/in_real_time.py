@@ -11,10 +11,12 @@ from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings, G
 from mount_bringup.graph.supervisor import Supervisor
 from mount_cli.bench.chain_runs import ChainRun, Place, relay_in_turn, run_graph, run_relay
 from mount_cli.bench.comparison import Comparison
+from mount_cli.bench.relay import EVENTS
 from mount_ros.environment import prepare_environment
 from mount_sim.diagnosis import FINISHED
 
-_APART, _COMPOSED = 'empty nodes', 'empty nodes, one process'
+_APART, _COMPOSED = 'empty nodes, rclpy.spin', 'empty nodes, one process'
+_EVENTS = 'empty nodes, EventsExecutor'
 _FAST = 2000.0  # Hz
 _LARGEST_GROWTH = 1e6 / 1800.0  # B/s, chosen: 1 MB in 30 minutes
 _LOCKSTEP_DRIVE = 5.0  # s of excitation
@@ -28,15 +30,21 @@ def graph_figures(place: Place, seconds: float, rounds: int, say: Say) -> dict[s
     graph: list[ChainRun] = []
     graph_composed: list[ChainRun] = []
     apart: list[ChainRun] = []
+    apart_events: list[ChainRun] = []
     for number in range(1, rounds + 1):
         say(f'graph and empty nodes in real time, round {number} of {rounds}')
         graph.append(run_graph(place, seconds))
         apart.append(run_relay(place, seconds))
+        apart_events.append(run_relay(place, seconds, executor=EVENTS))
         graph_composed.append(run_graph(place, seconds, composed=True))
     allowed = seconds * _LARGEST_GROWTH
     return {
         'latency': _compared('setpoint latency', graph, _APART, apart, 'latency'),
         'latency_composed': _compared('setpoint latency, composed', graph_composed, _APART, apart, 'latency'),
+        'latency_events': _compared('setpoint latency', graph, _EVENTS, apart_events, 'latency'),
+        'latency_composed_events': _compared(
+            'setpoint latency, composed', graph_composed, _EVENTS, apart_events, 'latency'
+        ),
         'cpu': _compared('driver, init, control', graph, _APART, apart, 'cpu', 'cores'),
         'cpu_composed': _compared(
             'driver, init, control, composed', graph_composed, _APART, apart, 'cpu', 'cores'

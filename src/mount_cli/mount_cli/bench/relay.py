@@ -1,8 +1,9 @@
 """One process of a chain of empty nodes: CAN frame -> topic -> topic -> CAN frame, and nothing computed.
 
-What one would write with rclpy and python-can alone, with the same executor, delivery and sizes as the
-graph: what this chain costs is the price of middleware and bus. `ends` stands where the driver stands,
-`middle` where the controller stands, `peer` where the electronics stand; parts may share a process.
+What one would write with rclpy and python-can alone, with the same delivery and sizes as the graph: what this
+chain costs is the price of middleware and bus. `ends` stands where the driver stands, `middle` where the
+controller stands, `peer` where the electronics stand; parts may share a process. They are served as by
+`rclpy.spin`, or by the `EventsExecutor`, which is experimental in rclpy and which the graph uses.
 """
 
 import argparse
@@ -15,13 +16,15 @@ from collections.abc import Iterator
 
 import can
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 GROUP = '239.74.163.3'  # chosen: a multicast group beside that of the graph
+SPIN, EVENTS = 'spin', 'events'
+EXECUTORS = {SPIN: SingleThreadedExecutor, EVENTS: EventsExecutor}
 _SAMPLE, _ANSWER = 0x100, 0x101  # chosen: identifiers of the two frames
 _SAMPLE_LENGTH, _ANSWER_LENGTH = 24, 12  # bytes: of MountMeasurement and MountSetpoint
 _QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -37,12 +40,13 @@ def main() -> None:
     parser.add_argument('--port', type=int, required=True)
     parser.add_argument('--seconds', type=float, default=5.0)
     parser.add_argument('--rate', type=float, default=1000.0, help='Hz; 0: the peer waits for each answer')
+    parser.add_argument('--executor', choices=EXECUTORS, default=SPIN)
     chosen = parser.parse_args()
     if chosen.parts == ['peer']:
         _measure(chosen.port, chosen.seconds, chosen.rate)
         return
     rclpy.init()
-    executor = EventsExecutor()
+    executor = EXECUTORS[chosen.executor]()
     with contextlib.ExitStack() as ending:
         ending.callback(rclpy.try_shutdown)
         for part in chosen.parts:
