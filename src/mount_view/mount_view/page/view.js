@@ -182,14 +182,16 @@ function drawLine(paint, visible, line, x, y) {
   paint.globalAlpha = line.key.startsWith('beside.') ? 0.75 : 1;
   paint.lineWidth = line.key.startsWith('beside.') ? 1 : 1.5;
   paint.beginPath();
-  let drawn = false;
+  // Where much is missing at once no line is drawn: a viewer that was held up has seen nothing there.
+  const usual = visible.length > 1 ? (visible[visible.length - 1][1] - visible[0][1]) / (visible.length - 1) : 0;
+  let drawn = -Infinity;  // time of the last value, s
   for (const [, time, values] of visible) {
     const pair = values[line.key];
-    if (!pair) { drawn = false; continue; }
+    if (!pair) { drawn = -Infinity; continue; }
     const place = x(time);
-    if (drawn) paint.lineTo(place, y(pair[0])); else paint.moveTo(place, y(pair[0]));
+    if (time - drawn < 5 * usual) paint.lineTo(place, y(pair[0])); else paint.moveTo(place, y(pair[0]));
     paint.lineTo(place, y(pair[1]));
-    drawn = true;
+    drawn = time;
   }
   paint.stroke();
   paint.globalAlpha = 1;
