@@ -15,6 +15,22 @@ end_process(3)
 """
 
 
+_STUCK_WITH_THE_INTERPRETER = """
+import ctypes, functools
+from mount_ros.nodes.leaving import leave_middleware
+keeping = ctypes.PyDLL(None)  # its functions keep the interpreter
+print('last words', end='')
+leave_middleware(functools.partial(keeping.sleep, 600), code={code}, last=0.3)
+"""
+_LEFT = """
+import time
+from mount_ros.nodes.leaving import leave_middleware
+leave_middleware(lambda: None, last=0.05)
+time.sleep(0.2)
+print('goes on', end='')
+"""
+
+
 def test_taking_down_within_the_limit_is_told():
     steps = []
     assert leave_middleware(lambda: steps.append('down'))
@@ -32,3 +48,15 @@ def test_what_goes_wrong_while_taking_down_is_not_swallowed():
 def test_a_process_ends_although_its_middleware_does_not():
     ended = subprocess.run([sys.executable, '-c', _STUCK], capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout, ended.stderr) == (3, 'False', '')
+
+
+@pytest.mark.parametrize('code', [0, 1])
+def test_a_process_ends_although_its_middleware_keeps_the_interpreter(code):
+    program = _STUCK_WITH_THE_INTERPRETER.format(code=code)
+    ended = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (code, 'last words', '')
+
+
+def test_a_process_that_has_left_goes_on():
+    ended = subprocess.run([sys.executable, '-c', _LEFT], capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'goes on', '')

@@ -71,7 +71,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         node.close()
     real_time.close()  # until here no load keeps the coil from 0 A
     code = 1 if over.failed else 0
-    if not leave_middleware(partial(_take_down, nodes)) or code:
+    if not leave_middleware(partial(_take_down, nodes), code=code) or code:
         end_process(code)
 
 
