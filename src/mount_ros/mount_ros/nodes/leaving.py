@@ -3,8 +3,8 @@
 Fast DDS 2.14 has been seen to wait for itself there for ever. On a machine too busy to keep up, its event
 thread and the thread that destroyed an endpoint each held what the other one needed. A participant that is
 destroyed while it learns of the end of another waits for that with a lock which the other thread needs, and
-rclpy keeps the interpreter meanwhile. By then the work is done, the coil is at 0 A and the recording is closed;
-all that is left is to end.
+rclpy keeps the interpreter meanwhile. By then the work is done, the coil is at 0 A and the recording is
+closed; all that is left is to end.
 """
 
 import ctypes
