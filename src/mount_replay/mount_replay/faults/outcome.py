@@ -14,7 +14,7 @@ from mount_ros.nodes.diagnostics import Level
 AFTER_DETECTION = 0.020  # s: 0 A on the bus, from the first sign that the fault was detected
 AFTER_OCCURRENCE = 0.050  # s: 0 A on the bus, from the beginning of silence
 _NO_CURRENT = 0.01  # A, chosen: below it the coil carries none
-_LAST = 0.1  # s, chosen: the end of a fault, over which the coil's current is told
+_LAST = 0.03  # s, chosen: the end of a fault, over which the coil's current is told; some end after 0.1 s
 _LATENESS = re.compile('no (displacement|setpoint) ')  # of a machine with other work
 _REMEDY = re.compile(r'[;:?,] *\w+ \w+')
 
