@@ -3,7 +3,7 @@
 VENV ?= .venv
 BIN := $(VENV)/bin
 CAR := mount_models mount_ros mount_driver mount_init mount_control mount_sim mount_bags mount_bringup
-DESK := mount_replay mount_identification mount_report mount_experiments mount_view mount_cli
+DESK := mount_signals mount_replay mount_identification mount_report mount_experiments mount_view mount_cli
 PACKAGES := $(CAR) $(DESK)
 # The first Python that runs, is 3.11 to 3.13 (the wheels of rclpy end there) and can make environments. That of the
 # distribution comes first: it was compiled with profile-guided optimisation, which many that were compiled by
@@ -26,7 +26,7 @@ RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test check faults experiments identify pages bench lint format setup setup-dev clean
+.PHONY: help drive test check faults experiments identify pages bench lint format setup setup-desk setup-dev clean
 
 help: ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
@@ -74,6 +74,7 @@ format: $(VENV)/.ready-dev ## put the sources in shape
 	@$(BIN)/ruff format .
 
 setup: $(VENV)/.ready ## what `make drive` needs
+setup-desk: $(VENV)/.ready-desk ## what the fleet, recordings by URI and files of others need besides
 setup-dev: $(VENV)/.ready-dev ## what `make test` needs
 
 clean: ## remove the environment and all that was built
@@ -92,7 +93,12 @@ $(VENV)/.ready: $(VENV)/.created requirements.txt requirements-car.txt $(wildcar
 	@$(BIN)/engine-mount prepare
 	@touch $@
 
-$(VENV)/.ready-dev: $(VENV)/.ready requirements-dev.txt
+$(VENV)/.ready-desk: $(VENV)/.ready requirements-desk.txt
+	@echo 'Setting up fleet, stores and formats (once, about half a minute) ...'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-desk.txt
+	@touch $@
+
+$(VENV)/.ready-dev: $(VENV)/.ready-desk requirements-dev.txt
 	@echo 'Setting up tests and checks (once, about a minute) ...'
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
 	@touch $@

@@ -40,7 +40,7 @@ def test_a_package_names_what_builds_it(package):
 
 
 def test_where_there_is_no_ros_the_requirements_pin_what_the_code_imports_and_nothing_else():
-    assert pinned('requirements.txt') == projects(code_of)
+    assert pinned('requirements-desk.txt') == projects(code_of)
 
 
 def test_the_requirements_of_tests_pin_what_tests_import():
@@ -97,5 +97,5 @@ def _requirements(file: Path) -> Iterator[str]:
         if line.startswith('-r '):
             yield from _requirements(file.with_name(line.removeprefix('-r ')))
         elif line and not line.startswith('#'):
-            project, _ = re.fullmatch(r'([\w-]+)(?:\[\w+\])?==(.+)', line).groups()
+            project, _ = re.fullmatch(r'([\w-]+)(?:\[[\w,]+\])?==(.+)', line).groups()
             yield project

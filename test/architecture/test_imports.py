@@ -17,6 +17,7 @@ CAR = (
     ('mount_bringup',),
 )
 DESK = (
+    ('mount_signals',),
     ('mount_replay', 'mount_identification', 'mount_report'),
     ('mount_experiments', 'mount_view'),
     ('mount_cli',),

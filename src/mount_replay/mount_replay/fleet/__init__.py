@@ -1,0 +1,1 @@
+"""Many recordings: indexed, replayed with other parameters, asked."""

@@ -1,0 +1,1 @@
+"""Files of others as named columns, one module for each format."""
