@@ -5,7 +5,7 @@ name = 'mount_signals'
 setup(
     name=name,
     version='0.1.0',
-    description='Recordings of others: fetched from any store, read from any format, with their units and times said.',
+    description='Recordings of others: from any store, in any format, with units and times said.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test']),
     data_files=[
