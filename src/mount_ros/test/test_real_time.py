@@ -221,7 +221,7 @@ def test_a_thread_that_the_system_says_does_not_sleep_ends_it_at_once(system):
     assert not system.urgent()
 
 
-def test_what_was_given_back_stays_so_until_the_next_activation(system):
+def test_what_was_given_back_stays_so_until_an_activation_30_s_later(system):
     whole, loop = shared(system), Loop()
     whole.begin(loop)
     looks(whole, system, 10, {4: 1.0})
@@ -229,6 +229,11 @@ def test_what_was_given_back_stays_so_until_the_next_activation(system):
     assert not system.urgent()
     whole.end(loop)
     assert whole.given_back
+    whole.begin(loop)
+    assert whole.given_back  # so soon it is not taken again
+    assert not system.urgent()
+    whole.end(loop)
+    system.now += 30.0
     whole.begin(loop)
     assert not whole.given_back
     assert system.urgent() == ALL

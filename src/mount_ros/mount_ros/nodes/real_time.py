@@ -6,7 +6,7 @@ threads wanted to run on two cores; the loop came up to 140 ms late beside an or
 97 ms beside one of niceness -15, and 5 ms beside one in real time.) Meanwhile the memory of the process is
 kept in place (`locked_memory`).
 
-A watch gives the priority back, for all of them until the next activation, when
+A watch gives the priority back, for all of them until an activation after 30 s or more, when
 
 - one of them used more than its share of a core (a loop that spins, or more work than the machine carries);
 - an ordinary thread of the process wanted to run and could not (the loops of all graphs take the machine);
@@ -35,7 +35,7 @@ WATCH_PERIOD = 0.2  # s, chosen
 _WINDOW = 5  # periods, chosen: 1 s
 _SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
 _MISSED = 0.5  # of the periods of a window, chosen: a stall of the machine for 0.2 s is not meant
-_PULSE_PERIOD = 0.1  # s, chosen
+_REST = 30.0  # s, chosen: no activation takes it again meanwhile, else restarts keep the machine busy
 _PATIENCE = (
     3  # periods of the watch without a pulse, chosen: 0.6 s; Linux leaves 50 ms of each second at least
 )
@@ -92,7 +92,7 @@ class RealTime:
         self._clock = clock
         self._watcher = self._threads.own
         self._loops: list[RealTimeLoop] = []
-        self._stepped_down = False
+        self._stepped_down, self._ordinary_until = False, -math.inf  # s
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
         self._past: deque[_Look] = deque(maxlen=_WINDOW + 1)
@@ -111,7 +111,8 @@ class RealTime:
             if loop in self._loops:
                 return
             self._loops.append(loop)
-            self._stepped_down, self.given_back = False, ''
+            if self._clock() >= self._ordinary_until:
+                self._stepped_down, self.given_back = False, ''
             self._past.clear()
             bound(_WITHOUT_SLEEP, _LAST)
             self._give()
@@ -184,8 +185,12 @@ class RealTime:
 
     def _give_back(self, reason: str) -> str:
         if reason:
-            remedy = 'lower the load of this machine or the number of graphs on it, then activate again'
-            self._stepped_down = True
+            remedy = (
+                'lower the load of this machine or the number of graphs on it, then activate again, not '
+                f'before {_REST:g} s'
+            )
+            self._stepped_down, self._ordinary_until = True, self._clock() + _REST
+            self._past.clear()
             self._give()
             bound(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
             self.given_back = f'real-time priority {self.priority} given back: {reason}; {remedy}'
