@@ -10,8 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mount_signals.extras import required
+
 if TYPE_CHECKING:
     import pyarrow
+
+TABLES = 'a table of a fleet'
+"""What a missing library is needed for."""
 
 TEXT, NUMBER, COUNT, FLAG = 'string', 'double', 'int64', 'bool'
 """Types of columns, as pyarrow names them."""
@@ -29,8 +34,7 @@ class Column:
 
 def schema_of(columns: Sequence[Column]) -> 'pyarrow.Schema':
     """Return the schema of a table; unit and meaning are metadata of its fields."""
-    import pyarrow
-
+    pyarrow = required('pyarrow', TABLES)
     return pyarrow.schema(
         pyarrow.field(
             column.name,
@@ -46,8 +50,7 @@ def table_of(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> 'p
 
     Raises `ValueError` for a name that is no column.
     """
-    import pyarrow
-
+    pyarrow = required('pyarrow', TABLES)
     known = {column.name for column in columns}
     plain = []
     for row in rows:
@@ -59,11 +62,10 @@ def table_of(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> 'p
 
 def write_table(table: 'pyarrow.Table', file: Path) -> None:
     """Write a table as Parquet, whole or not at all; the same table gives the same bytes."""
-    import pyarrow.parquet
-
+    parquet = required('pyarrow.parquet', TABLES)
     beside = file.with_name(f'.{file.name}.{os.getpid()}')
     try:
-        pyarrow.parquet.write_table(table, beside, compression='zstd')
+        parquet.write_table(table, beside, compression='zstd')
         beside.replace(file)
     finally:
         beside.unlink(missing_ok=True)
