@@ -18,6 +18,7 @@ _WHAT = (
     Column('reason', TEXT, '', 'why nothing, or not all, of it can be read or told; empty where all can'),
     Column('whole', FLAG, '', 'whether nothing of the files is known to be damaged or missing'),
     Column('size_bytes', COUNT, 'B', 'size of its files'),
+    Column('fingerprint', TEXT, '', 'of sizes, times and etags of its files; empty: read again next time'),
     Column('scenario', TEXT, '', 'what was driven, as the session tells'),
     Column('mode', TEXT, '', 'real time, lock-step or core'),
     Column('simulated_mount', TEXT, '', 'which mount the simulator had; empty in a car'),
