@@ -1,40 +1,66 @@
-"""The column of a file that a user means."""
+"""The columns of a file that a user means, and reading no others."""
 
-import difflib
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
 
-from mount_signals.formats.measured import Measured, MeasuredColumn
-from mount_signals.units.mapping import MappingError
+from mount_bags.signals.signal import SignalError
+from mount_signals.formats.content import Stated
+from mount_signals.formats.measured import Heading, Measured, MeasuredColumn, found, listed
+from mount_signals.formats.reading import headings, read
+from mount_signals.units.mapping import Mapping
 from mount_signals.units.unit import unit_of
 
-_SHOWN = 12  # names in a refusal, chosen: a MDF4 file can hold thousands
+TITLES = (
+    't', 'time', 'times', 'timestamp', 'timestamps', 'time_s', 't_s', 'seconds', 'zeit', 'zeitstempel',
+    'elapsed', 'elapsed_time', 'time_stamp', 'seconds_elapsed',
+)  # fmt: skip
+"""Titles of columns that hold times, in small letters."""
+
+
+def read_chosen(uri: str | Path, mapping: Mapping, stated: Stated | None = None) -> Measured:
+    """Return what `mapping` names of the file or folder at `uri`, with the columns that may hold its times.
+
+    Raises `SignalError`, `SourceError` or `UnitError`.
+    """
+    there = headings(uri, stated)
+    wanted = [choice.column for choice in (*mapping.columns.values(), *mapping.others.values())]
+    chosen = {heading_of(there, text, str(uri)).name for text in wanted}
+    if mapping.time.column:
+        chosen.add(heading_of(there, mapping.time.column, str(uri)).name)
+    elif mapping.time.rate is None:
+        chosen |= {heading.name for heading in there if is_time(heading)}
+        chosen |= {heading.name for heading in there[:1] if not heading.timed}
+    return read(uri, [heading.name for heading in there if heading.name in chosen], stated)
 
 
 def column_of(measured: Measured, wanted: str) -> MeasuredColumn:
-    """Return the column by name, header, or number from 0 on; raises `MappingError` with those there are, or
-    `UnitError` for a unit behind its name that is not known.
-    """
-    columns = measured.columns
-    if wanted in columns:
-        return columns[wanted]
-    titled = [column for column in columns.values() if wanted in (column.name, column.header)]
-    if len(titled) == 1:
-        return titled[0]
-    if wanted.isdecimal() and int(wanted) < len(columns):
-        return list(columns.values())[int(wanted)]
-    by_case = [name for name in columns if name.lower() == wanted.lower()]
-    near = by_case or difflib.get_close_matches(wanted, columns, n=3, cutoff=0.6)
-    hint = f'is it {" or ".join(near)}? ' if near else ''
+    """Return the column that `wanted` names; raises `SignalError`, or `UnitError` for an unknown unit."""
+    there = [*measured.columns.values(), *measured.others]
+    return measured.column(heading_of(there, wanted, measured.provenance.uri).name)
+
+
+def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
+    """Return the heading that `wanted` names; raises `SignalError`, or `UnitError` for an unknown unit."""
     name, colon, unit = wanted.rpartition(':')
-    if colon and name in columns:
-        unit_of(unit)
-    raise MappingError(f'{place(measured)}: no column {wanted!r}; {hint}there are {known(measured)}')
+    try:
+        return found(wanted, there, uri)
+    except SignalError:
+        if colon:
+            with contextlib.suppress(SignalError):
+                found(name, there, uri)
+                unit_of(unit)  # it is no unit, else it would not stand in the name
+        raise
+
+
+def is_time(heading: Heading) -> bool:
+    """Return whether a column is called as one of times is."""
+    return heading.date or heading.name.lower().replace(' ', '_') in TITLES
 
 
 def known(measured: Measured) -> str:
-    """Return the names of the columns of a file, the first of many, for sentences."""
-    shown = list(measured.columns)[:_SHOWN]
-    more = len(measured.columns) - len(shown)
-    return ', '.join(shown) + (f' and {more} more' if more > 0 else '') if shown else 'none'
+    """Return the names of the columns of a file, for sentences."""
+    return listed([*measured.columns.values(), *measured.others])
 
 
 def place(measured: Measured) -> str:

@@ -4,15 +4,10 @@ import numpy as np
 
 from mount_bags.signals.signal import SECOND, FloatArray
 from mount_signals.formats.measured import Measured, MeasuredColumn, TimeBase
-from mount_signals.units.columns import column_of, known, place
+from mount_signals.units.columns import column_of, is_time, known, place
 from mount_signals.units.mapping import MappingError, TimeChoice
 from mount_signals.units.unit import Unit, UnitError, si_unit, unit_of
 
-TITLES = (
-    't', 'time', 'times', 'timestamp', 'timestamps', 'time_s', 't_s', 'seconds', 'zeit', 'zeitstempel',
-    'elapsed', 'elapsed_time', 'time_stamp', 'seconds_elapsed',
-)  # fmt: skip
-"""Titles of columns that hold times, in small letters."""
 SLOWEST, FASTEST = 10.0, 2e5
 """Hz, chosen: between these engine mounts are sampled; beyond, the unit of the times is doubted."""
 _GUESSED = ('s', 'ms', 'us', 'ns', 'min')
@@ -42,8 +37,7 @@ def times_of(
             f'COLUMN:UNIT (there are {known(measured)}), or the rate with --rate HZ'
         )
     base, notes = _in_column(measured, found, choice.unit)
-    title = found.name.lower() in TITLES
-    first = () if title else (f'{found.name}: the first column rises: taken as the time',)
+    first = () if is_time(found) else (f'{found.name}: the first column rises: taken as the time',)
     return base, (*first, *notes)
 
 
@@ -51,10 +45,11 @@ def time_column(measured: Measured, column: MeasuredColumn) -> MeasuredColumn | 
     """Return the column of times by its title, else the first if it rises; None where there is none."""
     columns = list(measured.columns.values())
     for candidate in columns:
-        if candidate.name.lower().replace(' ', '_') in TITLES and candidate is not column:
+        if is_time(candidate) and candidate is not column:
             return candidate
     first = columns[0]
-    rises = first is not column and first.values.size > 1 and bool(np.all(np.diff(first.values) > 0.0))
+    rises = first is not column and first.number == 0 and first.values.size > 1
+    rises = rises and bool(np.all(np.diff(first.values) > 0.0))
     return first if rises else None
 
 

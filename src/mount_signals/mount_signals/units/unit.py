@@ -138,8 +138,8 @@ _SPELLINGS: dict[str, tuple[tuple[str, float], ...]] = {
     'ratio': (('1 -', 1.0), ('%', 1e-2)),
 }
 _TEMPERATURES = (
-    (Unit('degC', 'temperature', 1.0, ZERO_CELSIUS), 'degC celsius grdC gradC'),
-    (Unit('degF', 'temperature', 5.0 / 9.0, ZERO_CELSIUS - 32.0 * 5.0 / 9.0), 'degF fahrenheit'),
+    (Unit('degC', 'temperature', 1.0, ZERO_CELSIUS), 'degC celsius C grdC gradC'),
+    (Unit('degF', 'temperature', 5.0 / 9.0, ZERO_CELSIUS - 32.0 * 5.0 / 9.0), 'degF fahrenheit F'),
 )
 _SIGNS = str.maketrans({'µ': 'u', 'μ': 'u', '²': '^2', '·': '*', '⋅': '*', '°': 'deg', '″': '"', 'Ω': 'Ω'})
 _TRAPS = {
@@ -148,8 +148,6 @@ _TRAPS = {
     'mS': 'mS is millisiemens; for milliseconds write ms',
     'uS': 'uS is microsiemens; for microseconds write us',
     'M': 'M is mega alone; for metres write m, for minutes min',
-    'C': 'C is coulomb; for Celsius write degC',
-    'F': 'F is farad; for Fahrenheit write degF',
     'KN': 'KN is no unit; for kilonewtons write kN',
 }
 
