@@ -239,7 +239,13 @@ def _grouping(order: DriveOrder) -> Grouping:
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
+    told = told_parameters(parameters)
+    return session_text(new_session({'scenario': order.scenario, 'mode': order.mode, 'parameters': told}))
+
+
+def told_parameters(parameters: Parameters) -> dict[str, dict[str, Any]]:
+    """Return the parameters as the session of a drive tells them."""
     told = {node: dict(values) for node, values in parameters.items()}
     # where these are not named, a recording is an older one
     told['mount_control'] = {'policy': DEFAULT, 'sample_rate': SAMPLE_RATE, **told.get('mount_control', {})}
-    return session_text(new_session({'scenario': order.scenario, 'mode': order.mode, 'parameters': told}))
+    return told
