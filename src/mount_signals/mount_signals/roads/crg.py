@@ -18,7 +18,9 @@ Track = tuple[float, float, FloatArray, tuple[str, ...]]
 """First place (m), spacing (m), heights (n,) in m with NaN where the file has none, notes."""
 
 
-def read_track(name: str, content: bytes, lateral: float, beside: Callable[[str], tuple[str, bytes]]) -> Track:
+def read_track(
+    name: str, content: bytes, lateral: float, beside: Callable[[str], tuple[str, bytes]]
+) -> Track:
     """Return the track `lateral` m left of the reference line; raises `ProfileError`.
 
     `beside` fetches a file that this one refers to: (name, content).
@@ -36,10 +38,15 @@ def read_track(name: str, content: bytes, lateral: float, beside: Callable[[str]
     slope, banking, notes = _reference_line(file, increment, lateral)
     height = grid + scale['scale_slope'] * slope + scale['scale_banking'] * banking
     _check_rows(name, file, first, increment)
-    words = [f'{name}: track at v = {lateral:g} m of {lateral_places[0]:g} .. {lateral_places[-1]:g} m', *notes]
+    words = [
+        f'{name}: track at v = {lateral:g} m of {lateral_places[0]:g} .. {lateral_places[-1]:g} m',
+        *notes,
+    ]
     words += [f'{word.upper()} {factor:g} is applied' for word, factor in scale.items() if factor != 1.0]
     if set(modifiers) - set(_SCALES):
-        words.append(f'modifiers that are not applied: {", ".join(sorted(set(modifiers) - set(_SCALES))).upper()}')
+        words.append(
+            f'modifiers that are not applied: {", ".join(sorted(set(modifiers) - set(_SCALES))).upper()}'
+        )
     return first, increment * scale['scale_length'], height, tuple(words)
 
 
@@ -47,7 +54,8 @@ def _referred(name: str, file: CrgFile, beside: Callable[[str], tuple[str, bytes
     reference = ''.join(file.sections.get('ROAD_CRG_FILE', ()))
     if not reference:
         raise ProfileError(
-            f'{name} has no table of heights: no $KD_DEFINITION with channels, no line $$$$, no $ROAD_CRG_FILE'
+            f'{name} has no table of heights: no $KD_DEFINITION with channels, no line $$$$, no '
+            '$ROAD_CRG_FILE'
         )
     if '$' in reference:
         raise ProfileError(f'{name} refers to {reference} by an environment variable; give that file itself')
@@ -77,21 +85,22 @@ def _check_rows(name: str, file: CrgFile, first: float, increment: float) -> Non
     rows, end = len(file.table), file.values('ROAD_CRG').get('reference_line_end_u')
     if end is not None and end > first and rows < round((end - first) / increment) + 1:
         raise ProfileError(
-            f'{name}: {rows} rows of {increment:g} m from u = {first:g} m on, but REFERENCE_LINE_END_U is {end:g} m; '
-            'is the file cut off?'
+            f'{name}: {rows} rows of {increment:g} m from u = {first:g} m on, but REFERENCE_LINE_END_U is '
+            f'{end:g} m; is the file cut off?'
         )
 
 
 def _long_sections(name: str, file: CrgFile) -> tuple[FloatArray, list[int]]:
     """Return the lateral places (m, rising) of the long sections and their columns."""
-    named, numbered = {}, {}
+    named: dict[float, int] = {}
+    numbered: dict[float, int] = {}
     for column, channel in enumerate(file.channels):
         for pattern, found in ((_AT, named), (_NUMBERED, numbered)):
             match = pattern.match(channel.title)
             if match:
                 _check_unit(name, channel)
                 found[float(match[1])] = column
-    if named and numbered or not named and not numbered:
+    if bool(named) == bool(numbered):
         raise ProfileError(
             f'{name}: channels must be long sections, all "at v = X" or all numbered; instead there are '
             f'{", ".join(channel.title for channel in file.channels[:5])} ...'
@@ -101,7 +110,9 @@ def _long_sections(name: str, file: CrgFile) -> tuple[FloatArray, list[int]]:
         return places, [named[place] for place in places]
     order = sorted(numbered)
     if order != list(range(1, len(order) + 1)):
-        raise ProfileError(f'{name}: long sections must be numbered 1 .. {len(order)}; instead up to {order[-1]:g}')
+        raise ProfileError(
+            f'{name}: long sections must be numbered 1 .. {len(order)}; instead up to {order[-1]:g}'
+        )
     road = file.values('ROAD_CRG')
     right, left = road.get('long_section_v_right'), road.get('long_section_v_left')
     step = road.get('long_section_v_increment')
@@ -115,8 +126,8 @@ def _long_sections(name: str, file: CrgFile) -> tuple[FloatArray, list[int]]:
 def _check_unit(name: str, channel: Channel) -> None:
     if channel.unit != 'm':
         raise ProfileError(
-            f'{name}: channel {channel.title!r} is in {channel.unit or "no unit"}; OpenCRG gives heights in m: '
-            'is it a road, or friction or colour of one?'
+            f'{name}: channel {channel.title!r} is in {channel.unit or "no unit"}; OpenCRG gives heights in '
+            'm: is it a road, or friction or colour of one?'
         )
 
 
@@ -124,8 +135,8 @@ def _at(name: str, lateral: float, places: FloatArray, file: CrgFile, columns: l
     """Return the heights (n,) at a lateral place, between two sections linear as OpenCRG evaluates them."""
     if not places[0] - _SAME <= lateral <= places[-1] + _SAME:
         raise ProfileError(
-            f'{name}: no track at v = {lateral:g} m; its long sections are at {places[0]:g} .. {places[-1]:g} m: '
-            'choose one with --lateral'
+            f'{name}: no track at v = {lateral:g} m; its long sections are at {places[0]:g} .. '
+            f'{places[-1]:g} m: choose one with --lateral'
         )
     exact = np.flatnonzero(np.abs(places - lateral) <= _SAME)
     if exact.size:
@@ -140,7 +151,8 @@ def _reference_line(
 ) -> tuple[FloatArray, FloatArray, list[str]]:
     """Return what slope and banking add to the heights, (n,) each, and notes.
 
-    The slope in a row holds from the row before on, that in the first row is unused; banking holds in its row.
+    The slope in a row holds from the row before on, that in the first row is unused; banking holds in its
+    row.
     """
     rows, notes = len(file.table), []
     titles = [channel.title for channel in file.channels]

@@ -1,8 +1,8 @@
 """The container of OpenCRG files: sections of text, and behind them a table of numbers.
 
-Written from the description of the format (ASAM OpenCRG 1.2, chapter 3): text in ISO 8859-1 in lines of at most
-72 characters; a section is `$KEYWORD` .. `$`; `*` begins a line of comment, `!` a comment within a line; behind
-the line that begins with `$$` numbers follow in records of 80 bytes.
+Written from the description of the format (ASAM OpenCRG 1.2, chapter 3): text in ISO 8859-1 in lines of at
+most 72 characters; a section is `$KEYWORD` .. `$`; `*` begins a line of comment, `!` a comment within a line;
+behind the line that begins with `$$` numbers follow in records of 80 bytes.
 
 | format | numbers | row |
 |---|---|---|
@@ -19,7 +19,7 @@ from mount_signals.roads.profile import FloatArray, ProfileError
 
 _RECORD = 80  # bytes
 _TEXT_WIDTHS = {'LRFI': 10, 'LDFI': 20}
-_BINARY_TYPES = {'KRBI': np.dtype('>f4'), 'KDBI': np.dtype('>f8')}
+_BINARY_TYPES = {'KRBI': '>f4', 'KDBI': '>f8'}
 _DEFAULT_FORMAT = 'KRBI'
 FORMATS = (*_TEXT_WIDTHS, *_BINARY_TYPES)
 
@@ -65,7 +65,9 @@ def parse_crg(name: str, content: bytes) -> CrgFile:
     channels = tuple(_channel(line) for line in definition if line.upper().startswith('D:'))
     virtual = tuple(_channel(line) for line in definition if line.upper().startswith('U:'))
     if kind not in FORMATS:
-        raise ProfileError(f'{name}: numbers in format {kind} are not read; OpenCRG knows {", ".join(FORMATS)}')
+        raise ProfileError(
+            f'{name}: numbers in format {kind} are not read; OpenCRG knows {", ".join(FORMATS)}'
+        )
     if data is None or not channels:
         return CrgFile(sections, kind, (), virtual, np.empty((0, 0)))
     if kind in _TEXT_WIDTHS:
@@ -96,7 +98,9 @@ def _sections(name: str, content: bytes) -> tuple[dict[str, tuple[str, ...]], by
         elif keyword and not line.startswith('*') and line.partition('!')[0].strip():
             sections[keyword] += (line.partition('!')[0].strip(),)
     if keyword:
-        raise ProfileError(f'{name}: the file ends within section ${keyword}; is it cut off, or no OpenCRG file?')
+        raise ProfileError(
+            f'{name}: the file ends within section ${keyword}; is it cut off, or no OpenCRG file?'
+        )
     return sections, None
 
 
@@ -131,11 +135,12 @@ def _text_table(name: str, data: bytes, channels: int, width: int, first_line: i
     try:
         return np.where(missing, b'nan', plain).astype(float)
     except ValueError:
-        row, column = next(place for place in np.ndindex(*plain.shape) if not _is_number(plain[place]))
+        place = next(place for place, cell in enumerate(plain.ravel()) if not _is_number(bytes(cell)))
+        row, column = divmod(place, channels)
         line = first_line + row * records + column // in_record
         raise ProfileError(
-            f'{name}, line {line}: {cells[row, column].decode("latin-1")!r} in place of channel {column + 1} '
-            f'is no number; each has {width} characters'
+            f'{name}, line {line}: {bytes(cells[row, column]).decode("latin-1")!r} in place of channel '
+            f'{column + 1} is no number; each has {width} characters'
         ) from None
 
 
@@ -143,18 +148,18 @@ def _is_number(cell: bytes) -> bool:
     return cell.startswith(b'*') or _number(cell.decode('latin-1')) is not None
 
 
-def _binary_table(name: str, data: bytes, channels: int, kind: np.dtype) -> FloatArray:
+def _binary_table(name: str, data: bytes, channels: int, kind: str) -> FloatArray:
     if len(data) % _RECORD:
         raise ProfileError(
-            f'{name}: {len(data)} bytes of numbers are no whole records of {_RECORD} bytes; is the file cut off, '
-            'or were line ends converted on its way?'
+            f'{name}: {len(data)} bytes of numbers are no whole records of {_RECORD} bytes; is the file cut '
+            'off, or were line ends converted on its way?'
         )
     numbers = np.frombuffer(data, kind).astype(float)
     rows, over = divmod(numbers.size, channels)
     if not np.isnan(numbers[numbers.size - over :]).all():
         raise ProfileError(
-            f'{name}: {numbers.size} numbers are no rows of {channels} channels, and what is left over is not '
-            'the NaN that fills the last record; is the file cut off, or its $KD_DEFINITION another one?'
+            f'{name}: {numbers.size} numbers are no rows of {channels} channels, and what is left over is '
+            'not the NaN that fills the last record; is the file cut off, or its $KD_DEFINITION another one?'
         )
     table = numbers[: rows * channels].reshape(rows, channels)
     filled = np.flatnonzero(~np.isnan(table).all(axis=1))

@@ -32,7 +32,7 @@ class RoadProfile:
     @property
     def distance(self) -> FloatArray:
         """Places (n,) in m."""
-        return self.first + self.spacing * np.arange(self.height.size)
+        return self.first + self.spacing * np.arange(self.height.size, dtype=np.float64)
 
     @property
     def length(self) -> float:
