@@ -33,7 +33,8 @@ _RAMP_IN = RandomRoad().ramp_in  # s: as the simulated roads
 class WheelHeight:
     """Heights (n,) in m under the wheel every `STEP_TIME`, and what is to be told of them.
 
-    `told` is plain data for the session: where the road came from, its class, the speed; `notes` are sentences.
+    `told` is plain data for the session: where the road came from, its class, the speed. `notes` are
+    sentences.
     """
 
     height: FloatArray
@@ -41,7 +42,7 @@ class WheelHeight:
     notes: tuple[str, ...]
 
     def write(self, folder: Path) -> Path:
-        """Write the plain form that the simulator reads, `road_value.npy` with its times, and return its path."""
+        """Write `road_value.npy` with its times beside it, which the simulator reads; return its path."""
         folder.mkdir(parents=True, exist_ok=True)
         np.save(folder / 'road_t.npy', STEP_TIME * np.arange(self.height.size))
         np.save(folder / 'road_value.npy', self.height)
@@ -66,11 +67,13 @@ def wheel_height(
     reached = _KEPT * speed.mean / profile.spacing
     if reached < _ENGINE:
         raise ProfileError(
-            f'{profile.name}: places {profile.spacing:g} m apart at {speed.mean:.3g} m/s hold {reached:.2g} Hz; at least '
-            f'{_ENGINE:g} Hz are needed, that is {_KEPT * speed.mean / _ENGINE:.2g} m or finer'
+            f'{profile.name}: places {profile.spacing:g} m apart at {speed.mean:.3g} m/s hold {reached:.2g} '
+            f'Hz; at least {_ENGINE:g} Hz are needed, that is {_KEPT * speed.mean / _ENGINE:.2g} m or finer'
         )
     if reached < BAND[1]:
-        notes.append(f'{profile.spacing:g} m apart: the road holds no more than {reached:.3g} Hz at this speed')
+        notes.append(
+            f'{profile.spacing:g} m apart: the road holds no more than {reached:.3g} Hz at this speed'
+        )
     height = without_long_waves(profile.height, profile.spacing)
     notes.append(f'the line through the heights and waves longer than {LONGEST_WAVE:g} m are taken out')
     if contact > 0.0:
@@ -80,11 +83,14 @@ def wheel_height(
     series = _over_time(height, profile.spacing, speed, contact, duration)
     if series.size * STEP_TIME < _SHORTEST:
         raise ProfileError(
-            f'{profile.name}: {profile.length:g} m at {speed.mean:.3g} m/s last {series.size * STEP_TIME:.2g} s; at least '
-            f'{_SHORTEST:g} s are needed: drive slower, or forth and back with --repeat'
+            f'{profile.name}: {profile.length:g} m at {speed.mean:.3g} m/s last '
+            f'{series.size * STEP_TIME:.2g} s; at least {_SHORTEST:g} s are needed: drive slower, or forth '
+            'and back with --repeat'
         )
     told = _told(profile, speed, contact, repeat=repeat)
-    return WheelHeight(series * np.minimum(STEP_TIME * np.arange(series.size) / _RAMP_IN, 1.0), told, tuple(notes))
+    return WheelHeight(
+        series * np.minimum(STEP_TIME * np.arange(series.size) / _RAMP_IN, 1.0), told, tuple(notes)
+    )
 
 
 def _needed(speed: Speed, duration: float) -> float:

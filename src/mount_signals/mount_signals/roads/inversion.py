@@ -16,7 +16,7 @@ from mount_signals.roads.driving import BAND
 from mount_signals.roads.profile import FloatArray
 
 _EDGE = 0.2  # chosen: share of an edge frequency over which the band fades
-WEAKEST = 1e-2
+WEAKEST = 1e-3
 """Chosen: where the chassis answers less than this share of its median answer in the band, the road is held
 back by the ratio, for there the sensor's noise would be taken for a road."""
 

@@ -42,7 +42,9 @@ class Speed(NamedTuple):
         top = float(self.values.max())
         if top <= _DOUBTED:
             return ()
-        return (f'{top:g} m/s are {3.6 * top:.0f} km/h; if {top:g} km/h are meant, write --speed {top:g}/3.6',)
+        return (
+            f'{top:g} m/s are {3.6 * top:.0f} km/h; if {top:g} km/h are meant, write --speed {top:g}/3.6',
+        )
 
 
 def speed_of(text: str) -> Speed:
@@ -55,7 +57,9 @@ def speed_of(text: str) -> Speed:
         return recorded_speed(read(text))
     if not SLOWEST <= number <= FASTEST:
         guess = f'; is it in km/h? Write {text}/3.6' if SLOWEST <= number / 3.6 <= FASTEST else ''
-        raise ProfileError(f'--speed {text} is {number:g} m/s; it must lie within {SLOWEST:g} .. {FASTEST:g} m/s{guess}')
+        raise ProfileError(
+            f'--speed {text} is {number:g} m/s; it must lie within {SLOWEST:g} .. {FASTEST:g} m/s{guess}'
+        )
     told = f'{number:.4g} m/s ({3.6 * number:.4g} km/h)'
     return Speed(np.zeros(1), np.array([number]), told)
 
@@ -66,21 +70,25 @@ def recorded_speed(measured: Measured) -> Speed:
     columns = {column.name.casefold(): column for column in reversed(measured.columns.values())}
     column = next((columns[name] for name in _NAMES if name in columns), None)
     if column is None:
-        raise ProfileError(f'{file}: no column of the speed; name one {", ".join(_NAMES)}; there are {", ".join(columns)}')
+        raise ProfileError(
+            f'{file}: no column of the speed; name one {", ".join(_NAMES)}; there are {", ".join(columns)}'
+        )
     unit = column.unit.replace(' ', '')
     if unit not in _UNITS:
         guess = 'm/s' if np.nanmax(column.values) < FASTEST / 2 else 'km/h'
         raise ProfileError(
             f'{file}: column {column.name!r} has '
-            f'{f"the unit {unit!r}" if unit else "no unit in its header"}; write it as in {column.name} [{guess}], one '
-            f'of {", ".join(_UNITS)}'
+            f'{f"the unit {unit!r}" if unit else "no unit in its header"}; write it as in {column.name} '
+            f'[{guess}], one of {", ".join(_UNITS)}'
         )
     if column.time is not None:
         times = column.time.times
     else:
         time = next((columns[name] for name in _TIMES if name in columns), None)
         if time is None or time.unit not in ('', 's'):
-            raise ProfileError(f'{file}: the speed needs a time in s beside it, in a column {", ".join(_TIMES)}')
+            raise ProfileError(
+                f'{file}: the speed needs a time in s beside it, in a column {", ".join(_TIMES)}'
+            )
         times = time.values
     return _checked(file, np.asarray(times - times[0]), _UNITS[unit] * column.values)
 
@@ -89,21 +97,26 @@ def _checked(file: str, times: FloatArray, values: FloatArray) -> Speed:
     known = np.isfinite(times) & np.isfinite(values)
     times, values = times[known], values[known]
     if times.size < 2:
-        raise ProfileError(f'{file} holds {times.size} speeds; at least 2 are needed, or a number as in 60/3.6')
+        raise ProfileError(
+            f'{file} holds {times.size} speeds; at least 2 are needed, or a number as in 60/3.6'
+        )
     steps = np.diff(times)
     if np.any(steps <= 0.0):
         place = int(np.argmax(steps <= 0.0))
-        raise ProfileError(f'{file}: time does not rise: {times[place]:g} s is followed by {times[place + 1]:g} s')
+        raise ProfileError(
+            f'{file}: time does not rise: {times[place]:g} s is followed by {times[place + 1]:g} s'
+        )
     if steps.max() > _LONGEST_GAP:
         place = int(steps.argmax())
         raise ProfileError(
-            f'{file}: no speed from {times[place]:g} to {times[place + 1]:g} s; up to {_LONGEST_GAP:g} s are bridged'
+            f'{file}: no speed from {times[place]:g} to {times[place + 1]:g} s; up to {_LONGEST_GAP:g} s are '
+            'bridged'
         )
     if values.min() < 0.0 or values.max() > FASTEST:
         place = int(np.argmax((values < 0.0) | (values > FASTEST)))
         raise ProfileError(
-            f'{file}: the speed at {times[place]:g} s is {values[place]:g} m/s; it must lie within 0 .. {FASTEST:g} m/s: '
-            'is its unit another one?'
+            f'{file}: the speed at {times[place]:g} s is {values[place]:g} m/s; it must lie within 0 .. '
+            f'{FASTEST:g} m/s: is its unit another one?'
         )
     told = f'{values.min():.3g} .. {values.max():.3g} m/s as in {file}'
     return Speed(times, values, told)

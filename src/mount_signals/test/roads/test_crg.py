@@ -131,7 +131,8 @@ def test_heights_in_another_unit_or_of_another_kind_are_refused(tmp_path, write_
 
 
 def test_places_come_from_the_virtual_channel_where_there_is_one():
-    text = '$ROAD_CRG\nREFERENCE_LINE_INCREMENT=1.0\n$\n$KD_DEFINITION\n#:LRFI\nU:reference line u,m,730.0,0.01\n'
+    text = '$ROAD_CRG\nREFERENCE_LINE_INCREMENT=1.0\n$\n$KD_DEFINITION\n#:LRFI\n'
+    text += 'U:reference line u,m,730.0,0.01\n'
     file = parse_crg('x.crg', (text + 'D:long section 1,m\n$\n$$$$\n 0.0000000\n').encode())
     assert file.virtual[0].numbers == (730.0, 0.01)
     assert file.channels[0].title == 'long section 1'
