@@ -39,7 +39,7 @@ def read_track(
     height = grid + scale['scale_slope'] * slope + scale['scale_banking'] * banking
     _check_rows(name, file, first, increment)
     words = [
-        f'{name}: track at v = {lateral:g} m of {lateral_places[0]:g} .. {lateral_places[-1]:g} m',
+        f'track at v = {lateral:g} m of {lateral_places[0]:g} .. {lateral_places[-1]:g} m',
         *notes,
     ]
     words += [f'{word.upper()} {factor:g} is applied' for word, factor in scale.items() if factor != 1.0]

@@ -57,8 +57,7 @@ def checked_profile(
     """
     name = provenance.uri.rpartition('/')[2]
     even = even_places(name, distance, height)
-    told = (*notes, *(f'{name}: {note}' for note in even.notes))
-    profile = RoadProfile(even.first, even.spacing, even.height, provenance, told, effective)
+    profile = RoadProfile(even.first, even.spacing, even.height, provenance, (*notes, *even.notes), effective)
     check_heights(profile, unit, size)
     check_displacement(profile, unevenness(profile))
     return profile
