@@ -11,12 +11,12 @@ import numpy as np
 from mount_signals.formats.measured import Measured
 from mount_signals.formats.reading import read
 from mount_signals.roads.profile import FloatArray, ProfileError
+from mount_signals.units.unit import is_unit, unit_of
 
 SLOWEST, FASTEST = 0.5, 90.0
 """m/s, chosen: below, no wave within the body's and the engine's range is met; above, km/h are meant."""
 _DOUBTED = 45.0  # m/s, chosen: above 162 km/h a number in km/h is as likely
-_UNITS = {'m/s': 1.0, 'km/h': 1.0 / 3.6, 'kmh': 1.0 / 3.6, 'kph': 1.0 / 3.6, 'mph': 0.44704}
-"""m/s; the mile is 1609.344 m by definition."""
+_UNITS = ('m/s', 'km/h', 'kmh', 'kph', 'mph')  # behind a number
 _NAMES = ('speed', 'v', 'velocity', 'vehicle_speed', 'geschwindigkeit')
 _TIMES = ('t', 'time', 'timestamp', 'time_s', 't_s', 'seconds', 'zeit')
 _LONGEST_GAP = 1.0  # s, chosen: a car's speed between two values so far apart is near the line through them
@@ -73,13 +73,11 @@ def recorded_speed(measured: Measured) -> Speed:
         raise ProfileError(
             f'{file}: no column of the speed; name one {", ".join(_NAMES)}; there are {", ".join(columns)}'
         )
-    unit = column.unit.replace(' ', '')
-    if unit not in _UNITS:
+    if not is_unit(column.unit) or unit_of(column.unit).dimension != 'velocity':
         guess = 'm/s' if np.nanmax(column.values) < FASTEST / 2 else 'km/h'
+        why = f'the unit {column.unit!r}, which is no speed' if column.unit else 'no unit in its header'
         raise ProfileError(
-            f'{file}: column {column.name!r} has '
-            f'{f"the unit {unit!r}" if unit else "no unit in its header"}; write it as in {column.name} '
-            f'[{guess}], one of {", ".join(_UNITS)}'
+            f'{file}: column {column.name!r} has {why}; write it as in {column.name} [{guess}]'
         )
     if column.time is not None:
         times = column.time.times
@@ -90,7 +88,7 @@ def recorded_speed(measured: Measured) -> Speed:
                 f'{file}: the speed needs a time in s beside it, in a column {", ".join(_TIMES)}'
             )
         times = time.values
-    return _checked(file, np.asarray(times - times[0]), _UNITS[unit] * column.values)
+    return _checked(file, np.asarray(times - times[0]), unit_of(column.unit).to_si(column.values))
 
 
 def _checked(file: str, times: FloatArray, values: FloatArray) -> Speed:
@@ -131,7 +129,7 @@ def _arithmetic(text: str) -> float | None:
         number = _value(ast.parse(match[1].strip(), mode='eval').body)
     except (SyntaxError, ValueError, ZeroDivisionError, OverflowError):
         return None
-    return number * _UNITS[match[2] or 'm/s']
+    return number * unit_of(match[2] or 'm/s').factor
 
 
 def _value(node: ast.expr) -> float:

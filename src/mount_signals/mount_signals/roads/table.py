@@ -7,13 +7,8 @@ import numpy as np
 
 from mount_signals.formats.measured import Heading, Measured, MeasuredColumn, listed
 from mount_signals.roads.profile import FloatArray, ProfileError
+from mount_signals.units.unit import is_unit, unit_of
 
-LENGTHS = {
-    'm': 1.0, 'mm': 1e-3, 'cm': 1e-2, 'dm': 0.1, 'um': 1e-6, 'µm': 1e-6, 'μm': 1e-6, 'km': 1e3, 'in': 0.0254,
-    'inch': 0.0254, 'ft': 0.3048, 'mi': 1609.344, 'mile': 1609.344,
-}  # fmt: skip
-"""Length units in m; of one each inch 0.0254 m by definition."""
-_TIMES = ('s', 'ms', 'us', 'ns', 'sec', 'min', 'h')
 _DISTANCES = (
     'distance', 'dist', 'x', 's', 'u', 'station', 'chainage', 'position', 'weg', 'strecke', 'wegstrecke',
     'laenge', 'länge',
@@ -24,7 +19,6 @@ _HEIGHTS = (
 )  # fmt: skip
 _TIME_NAMES = ('t', 'time', 'timestamp', 'zeit')
 _ACCELERATIONS = ('acc', 'accel', 'acceleration', 'beschleunigung', 'az', 'ax', 'ay')
-_ACCELERATION_UNITS = ('m/s^2', 'm/s²', 'm/s2', 'm/s/s', 'g', 'mg', 'm s^-2')
 EFFECTIVE = 'effective_height'
 """Name of a height that is already the one behind the tyre."""
 
@@ -50,7 +44,7 @@ def heights_of(measured: Measured, column: str = '', distance: str = '', spacing
     along, unit = _chosen(measured, distance, _DISTANCES, 'distance', '--distance', headings)
     if along.number == height.number:
         raise ProfileError(f'{name}: column {height.name!r} is both height and distance; name the other one')
-    if unit in _TIMES or along.name.casefold() in _TIME_NAMES:
+    if _dimension(unit) == 'time' or along.name.casefold() in _TIME_NAMES:
         raise ProfileError(
             f'{name}: column {along.name!r} is a time; a road is height over distance: name a distance with '
             '--distance, or multiply by the speed at which it was measured'
@@ -72,7 +66,9 @@ def _chosen(
         if name in by_name:
             return by_name[name], by_name[name].unit
     file = measured.provenance.uri.rpartition('/')[2]
-    times = [one.name for one in headings if one.name.casefold() in _TIME_NAMES or one.unit in _TIMES]
+    times = [
+        one.name for one in headings if one.name.casefold() in _TIME_NAMES or _dimension(one.unit) == 'time'
+    ]
     hint = f'; {times[0]!r} is a time: a road is height over distance' if what == 'distance' and times else ''
     raise ProfileError(
         f'{file}: which column is the {what}? Name it with {option} NAME:UNIT; there are '
@@ -83,22 +79,27 @@ def _chosen(
 def _refuse_acceleration(name: str, column: MeasuredColumn, unit: str) -> None:
     words = column.name.casefold().replace('.', '_').replace('/', '_').split('_')
     by_name = any(word in _ACCELERATIONS for word in words)
-    if unit.casefold() in _ACCELERATION_UNITS or (by_name and unit.casefold() not in LENGTHS):
+    if _dimension(unit) == 'acceleration' or (by_name and _dimension(unit) != 'length'):
         raise ProfileError(
             f'{name}: column {column.name!r} ({unit or "no unit"}) is an acceleration, not a height; drive '
             'it with --scenario recorded, or make a road of it with engine-mount road invert'
         )
 
 
+def _dimension(unit: str) -> str:
+    return unit_of(unit).dimension if is_unit(unit) else ''
+
+
 def _size(name: str, column: MeasuredColumn, unit: str, option: str) -> float:
-    if unit in LENGTHS:
-        return LENGTHS[unit]
+    """Return one of `unit` in m; raises `ProfileError` where it is no length."""
+    if _dimension(unit) == 'length':
+        return unit_of(unit).factor
     known = column.values[np.isfinite(column.values)]
     spread = f' ({known.min():g} .. {known.max():g})' if known.size else ''
+    why = f'the unit {unit!r}, which is no length' if unit else 'no unit in its header'
     raise ProfileError(
-        f'{name}: column {column.name!r}{spread} has '
-        + (f'the unit {unit!r}, which is no length' if unit else 'no unit in its header')
-        + f'; say it as in {option} {column.name}:{_guess(column, option)}, one of {", ".join(LENGTHS)}'
+        f'{name}: column {column.name!r}{spread} has {why}; say it as in {option} '
+        f'{column.name}:{_guess(column, option)}'
     )
 
 
