@@ -6,13 +6,20 @@ A plain path goes through unchanged, without loading any library.
 import contextlib
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from mount_signals.sources.local import LocalStore
 from mount_signals.sources.source import Entry, Source
 from mount_signals.sources.uris import is_uri, scheme_of
+
+Tell = Callable[[int, int], None]
+"""Takes how many bytes are here, and of how many."""
+
+
+def tell_nobody(done: int, of: int) -> None:
+    """Tell nobody how far it is."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +44,7 @@ def entries(uri: str) -> Iterator[Entry]:
     return source_of(uri).entries(uri)
 
 
-def fetched(uri: str, scratch: Path | None = None) -> Path:
+def fetched(uri: str, scratch: Path | None = None, tell: Tell = tell_nobody) -> Path:
     """Return a whole local copy of the file or folder at `uri`, kept until this process ends.
 
     A plain path and file:// are returned where they lie, others below `scratch`, by default the cache of
