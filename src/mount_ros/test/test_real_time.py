@@ -58,7 +58,10 @@ def system(monkeypatch):
     system = FakeThreads()
     system.bounds = []
     system.now = 0.0
+    system.locked = []
     monkeypatch.setattr(real_time, 'bound', lambda *limits: system.bounds.append(limits))
+    monkeypatch.setattr(real_time, 'lock_memory', lambda: system.locked.append(True) or True)
+    monkeypatch.setattr(real_time, 'unlock_memory', lambda: system.locked.append(False))
     return system
 
 
@@ -87,6 +90,26 @@ def test_the_threads_of_the_data_have_the_priority_while_a_node_is_active(system
     whole.end(loop)
     assert not system.urgent()
     assert whole.held == 0
+
+
+def test_the_memory_stays_in_place_while_a_node_of_the_process_is_active(system):
+    whole, first, second = shared(system), Loop(), Loop()
+    whole.begin(first)
+    whole.begin(second)
+    whole.end(first)
+    assert whole.memory_locked
+    assert system.locked == [True]
+    whole.end(second)
+    assert not whole.memory_locked
+    assert system.locked == [True, False]
+
+
+def test_without_priority_no_memory_is_kept(system):
+    system.permitted = False
+    for whole in (shared(system), shared(system, priority=0)):
+        whole.begin(Loop())
+        assert not whole.memory_locked
+    assert not system.locked
 
 
 def test_who_can_wait_for_the_interpreter_leaves_the_others_ordinary(system):
@@ -198,7 +221,7 @@ def test_a_thread_that_the_system_says_does_not_sleep_ends_it_at_once(system):
     assert not system.urgent()
 
 
-def test_what_was_given_back_stays_so_until_the_next_activation(system):
+def test_what_was_given_back_stays_so_until_an_activation_30_s_later(system):
     whole, loop = shared(system), Loop()
     whole.begin(loop)
     looks(whole, system, 10, {4: 1.0})
@@ -206,6 +229,11 @@ def test_what_was_given_back_stays_so_until_the_next_activation(system):
     assert not system.urgent()
     whole.end(loop)
     assert whole.given_back
+    whole.begin(loop)
+    assert whole.given_back  # so soon it is not taken again
+    assert not system.urgent()
+    whole.end(loop)
+    system.now += 30.0
     whole.begin(loop)
     assert not whole.given_back
     assert system.urgent() == ALL
