@@ -8,7 +8,7 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
 PACKAGES = sorted(file.parent.name for file in SOURCES.glob('*/package.xml'))
-LOADERS = ('import_module', 'importlib.import_module', 'importlib.resources.files')
+LOADERS = ('import_module', 'importlib.import_module', 'importlib.resources.files', 'required')
 
 
 @cache
