@@ -16,7 +16,7 @@ class Library(NamedTuple):
 LIBRARIES = {
     'aiohttp': Library('aiohttp', 'python3-aiohttp'),
     'asammdf': Library('asammdf'),
-    'asyncssh': Library('asyncssh'),
+    'asyncssh': Library('asyncssh', 'python3-asyncssh'),
     'bitstruct': Library('bitstruct'),
     'can': Library('python-can', 'python3-can'),
     'cantools': Library('cantools', 'python3-cantools-pip'),
@@ -39,7 +39,7 @@ LIBRARIES = {
     'numpy': Library('numpy', 'python3-numpy'),
     'openpyxl': Library('openpyxl', 'python3-openpyxl'),
     'PIL': Library('pillow', 'python3-pil'),
-    'pint': Library('pint', 'python3-pint'),
+    'pint': Library('pint'),
     'pyarrow': Library('pyarrow'),
     'pytest': Library('pytest', 'python3-pytest'),
     'rich': Library('rich', 'python3-rich'),
