@@ -1,4 +1,4 @@
-"""A catalogue made or brought up to date: what did not change is not read again, whatever stopped it goes on."""
+"""A catalogue brought up to date: what did not change is not read again, what was stopped goes on."""
 
 import os
 from collections.abc import Callable, Iterable
