@@ -202,6 +202,4 @@ def _ambiguous(path: Path, possible: list[Split]) -> str:
     ways = ' or '.join(
         f'{split.told} ({", ".join(split.rows[0][:4]).replace(chr(9), " ")})' for split in possible
     )
-    return (
-        f'{path} can be read as {ways}; state the delimiter or the decimal sign, or export with semicolons'
-    )
+    return f'{path} can be read as {ways}; state the delimiter or the decimal sign, or export with semicolons'

@@ -25,7 +25,9 @@ def open_npy(path: Path, stated: Stated) -> Leaves:
         found = leaves_of('', _loaded(path), notes)
         _refuse_none(path, found, notes)
         return Leaves('NPY', 'numpy', with_dates(found), notes)
-    name = path.parent.name if times.name in {time for _, time in _PAIRS} else path.name.removesuffix(_NAMED[0])
+    name = (
+        path.parent.name if times.name in {time for _, time in _PAIRS} else path.name.removesuffix(_NAMED[0])
+    )
     return Leaves('NPY with times', 'numpy', _pair(name, path, times, notes), notes)
 
 

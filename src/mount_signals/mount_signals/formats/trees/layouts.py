@@ -57,7 +57,9 @@ def _timeseries(tree: Mapping[str, Any], notes: list[str], name: str) -> list[Le
     seconds = text_at(tree, 'TimeInfo', 'Units') in ('', 's', 'sec', 'seconds')
     if not seconds:
         return []
-    unit = text_at(tree, 'DataInfo', 'Units') or next(filter(None, (text_at(tree, key) for key in _UNITS)), '')
+    unit = text_at(tree, 'DataInfo', 'Units') or next(
+        filter(None, (text_at(tree, key) for key in _UNITS)), ''
+    )
     return _timed(leaves_of(name, values, notes, unit), time, f'times of the timeseries {name!r}')
 
 

@@ -105,7 +105,7 @@ class _Turned:
         self.attrs = dataset.attrs
 
     def __getitem__(self, key: Any) -> Any:
-        return self._dataset[...] .T if key is Ellipsis else self._dataset[key[::-1]]
+        return self._dataset[...].T if key is Ellipsis else self._dataset[key[::-1]]
 
 
 def _refuse_none(path: Path, found: list[Leaf], notes: list[str]) -> None:
