@@ -192,8 +192,8 @@ def _no_table(path: Path, lines: list[Line]) -> str:
         return f'{path} holds comments and blank lines only; needed are lines of numbers'
     line = lines[len(lines) // 2]
     return (
-        f'{path}, line {line.number}: {line.text.strip()[:80]!r} is no line of a table of numbers; expected are '
-        'lines of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, '
+        f'{path}, line {line.number}: {line.text.strip()[:80]!r} is no line of a table of numbers; expected '
+        'are lines of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, '
         'no signs between thousands'
     )
 

@@ -13,8 +13,8 @@ from mount_signals.formats.trees.layouts import leaves_in
 from mount_signals.formats.trees.leaves import Leaf, Leaves
 
 _OBJECTS = (
-    'objects of MATLAB (timeseries, timetable, table) are read by MATLAB alone, left out; save their numbers: '
-    's.time = ts.Time; s.data = ts.Data'
+    'objects of MATLAB (timeseries, timetable, table) are read by MATLAB alone, left out; save their '
+    'numbers: s.time = ts.Time; s.data = ts.Data'
 )
 _DEEPEST = 16  # levels, chosen
 _MOST = 4096  # elements of an array of structs or cells, chosen
