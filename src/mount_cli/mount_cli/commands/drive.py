@@ -1,13 +1,25 @@
 """`engine-mount drive`: the simulated car through the whole graph."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mount_bringup.graph.nodes import RESTART_LIMIT
-from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Settings, Snapshot, Split
+from mount_cli.commands.options import (
+    Columns,
+    Domain,
+    JsonFile,
+    MapFile,
+    Namespace,
+    NewFolder,
+    Rate,
+    Settings,
+    Snapshot,
+    Split,
+    TimeColumn,
+)
 from mount_cli.completion.values import faults, listed, named
+from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
@@ -24,7 +36,7 @@ Examples:
 
 `engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount in the seat
 
-`engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
+`engine-mount drive --scenario recorded --file drive.csv --column az:g --scale -1` - your own recording
 
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
@@ -60,16 +72,18 @@ def drive(
         ),
     ] = '',
     file: Annotated[
-        Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
-    ] = None,
-    column: Annotated[
-        str,
-        typer.Option(help='recorded: column (CSV, JSON), signal.number (NPY), field of the message (MCAP)'),
+        str, typer.Option(metavar='FILE', help='recorded: any file or folder of signals, or its URI')
     ] = '',
-    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV, JSON)')] = '',
-    topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
+    column: Columns = None,
+    time: TimeColumn = '',
+    rate: Rate = None,
+    map_file: MapFile = None,
+    topic: Annotated[str, typer.Option(help='recorded: topic of a bag, --column being the field')] = '',
     scale: Annotated[
-        float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
+        float | None,
+        typer.Option(
+            help='recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'
+        ),
     ] = None,
     fault: Annotated[
         list[str] | None,
@@ -144,6 +158,8 @@ def drive(
     if 'list' in (fault or []):
         _list_faults()
         raise typer.Exit
+    if not file and (column or time or rate is not None or topic or scale is not None or map_file):
+        raise typer.BadParameter('--column, --time, --rate, --topic, --scale and --map-file go with --file')
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
@@ -160,11 +176,6 @@ def drive(
         'mounts': mounts or None,
         'seed': seed,
         'timeline.duration': duration,
-        'recorded.file': str(file.absolute()) if file else None,
-        'recorded.column': column or None,
-        'recorded.time_column': time_column or None,
-        'recorded.topic': topic or None,
-        'recorded.scale': scale,
     }
     sim = parameters.setdefault('mount_sim', {})
     sim.update({name: value for name, value in given.items() if value is not None})
@@ -180,10 +191,18 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    order = DriveOrder(
-        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts
-    )
     console = terminal()
+    excitation = None
+    if file:
+        from mount_replay.drive.recorded_file import read_recorded
+
+        said = [f'{topic}.{name}' if topic else name for name in column or []]
+        excitation = read_recorded(
+            str(local(file, console)), said, time, rate, scale=scale, mapping_file=map_file
+        )
+    order = DriveOrder(
+        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, excitation
+    )
     screen = TerminalScreen(console)
     folder, run, complaints = record_drive(order, screen)
     recorder = recorder_parameters(order)
