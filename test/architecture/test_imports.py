@@ -97,6 +97,22 @@ def test_the_command_loads_what_it_needs_once_it_knows_what_is_wanted():
     assert not {'numpy', 'scipy', 'numba', 'matplotlib', 'rclpy', 'mcap'} & set(loaded.split())
 
 
+def test_no_node_loads_what_only_files_of_others_need():
+    """Where asammdf is installed, python-can loads it, and each node would start 4 s later."""
+    nodes = ', '.join(f'{package}.node' for package in MAY_TOUCH_ROS)
+    tell = f'import sys, {nodes}, mount_bags.node, mount_replay.drive.drive; print(*sys.modules)'
+    loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
+    assert not {'asammdf', 'pandas', 'pyarrow', 'fsspec', 'dask'} & set(loaded.split())
+
+
+def test_python_can_is_loaded_in_one_place():
+    files = [file for package in PACKAGES for file in (SOURCES / package).rglob('*.py')]
+    loading = {
+        file.name for file in files if {'can', 'cantools'} & {name.split('.')[0] for name in modules_of(file)}
+    }
+    assert loading == {'can_library.py'}
+
+
 def test_the_controller_never_sees_the_truth():
     truth = {
         'mount_models.actuator.reluctance',

@@ -3,10 +3,9 @@
 `python test/docs/signals_page.py` renews the page; `test_generated_pages.py` holds it against the DBC.
 """
 
-from cantools.database.can import Database, Message
-from cantools.database.can.signal import Signal
 from generated import PAGES, cell, table, written_by
 
+from mount_driver.can_library import Database, Message, Signal
 from mount_driver.codec import DATABASE_FILE
 
 PAGE = PAGES / 'signals.md'

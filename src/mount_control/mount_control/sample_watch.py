@@ -15,7 +15,8 @@ from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
 
 _NANOSECONDS = 1e9
 _COUNTED = 50  # chosen: samples from which their rate is known
-_RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses before an activation
+_LOOKED_BACK = 200  # chosen: steps between samples of which their rate is taken
+_RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside
 _CLOSEST = 0.75  # of a period, chosen: mount_driver's stamps lie 0.9 of a period apart or more
 _INTRUSIONS = 3  # chosen: samples between those of the stream
 _INTRUSION_PERIOD = 1_000_000_000  # ns, chosen: in it they are those of another sender
@@ -76,7 +77,7 @@ class SampleWatch:
         self._range = 0.0  # m
         self._period = SAMPLE_TIME_NS  # ns between two samples
         self._closest = round(_CLOSEST * SAMPLE_TIME_NS)
-        self._counted_from, self._noted = 0, 0  # stamp (ns) of a sample, and samples from it on
+        self._steps: deque[int] = deque(maxlen=_LOOKED_BACK)  # ns, between the last samples
         self._seen: int | None = None  # stamp of the last sample that was compared with those before, ns
         self.plausibility = Plausibility(ControlParameters())
 
@@ -84,14 +85,13 @@ class SampleWatch:
         """Take the stamp (ns) of a sample; one that comes a little too late changes nothing."""
         if self.last is None:
             self.first, self.last = 0 if self.measured_before else stamp, stamp
-            self._counted_from, self._noted = stamp, 1
         elif abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
             self._broken = True
-            self._counted_from, self._noted = stamp, 1
+            self._steps.clear()
         elif stamp > self.last:
+            self._steps.append(stamp - self.last)
             self.last = stamp
-            self._noted += 1
 
     def check_belongs(self, table_stamp: int | None, air_gap_stamp: int | None) -> None:
         """Raise `ForceTableError` unless the table was measured on the present uninterrupted measurements.
@@ -129,10 +129,13 @@ class SampleWatch:
         )
 
     def check_rate(self, sample_rate: float) -> None:
-        """Raise `ForceTableError` if the samples so far did not come at `sample_rate` (Hz)."""
-        if self.last is None or self._noted < _COUNTED:
+        """Raise `ForceTableError` if the last samples were not measured at `sample_rate` (Hz).
+
+        By the lower quartile of the times between them: up to three of four may be lost.
+        """
+        if len(self._steps) < _COUNTED:
             return
-        rate = 1e9 * (self._noted - 1) / (self.last - self._counted_from)
+        rate = _NANOSECONDS / sorted(self._steps)[len(self._steps) // 4]
         if abs(rate - sample_rate) > _RATE_TOLERANCE * sample_rate:
             raise ForceTableError(
                 f'displacement comes at {rate:.0f} Hz, but sample_rate of mount_control is {sample_rate:g} '

@@ -1,6 +1,7 @@
 """Each displacement sample is judged by its stamp and value before the controller sees it."""
 
 import math
+import random
 
 import pytest
 
@@ -184,6 +185,16 @@ def test_a_controller_made_for_another_rate_is_not_activated():
     with pytest.raises(ForceTableError, match='at 2000 Hz, but sample_rate of mount_control is 1000 Hz'):
         stream.check_rate(1000.0)
     stream.check_rate(2000.0)
+
+
+def test_lost_samples_are_no_other_rate():
+    stream, numbers = SampleWatch(), random.Random(1)
+    for k in range(400):
+        if numbers.random() < 0.4:  # 60 % are lost on an overloaded machine
+            stream.note(S + k * MS)
+    stream.check_rate(1000.0)
+    with pytest.raises(ForceTableError, match='at 1000 Hz'):
+        stream.check_rate(2000.0)
 
 
 def test_samples_at_2_khz_are_bridged_by_their_own_period():

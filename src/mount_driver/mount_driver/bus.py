@@ -11,9 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import can
-from can.interfaces.virtual import VirtualBus
-
+from mount_driver.can_library import VirtualBus, can
 from mount_driver.loopback import LoopbackMulticastBus
 
 MULTICAST_GROUP = '239.74.163.2'  # python-can's default IPv4 group, of administrative scope

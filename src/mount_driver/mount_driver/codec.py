@@ -8,9 +8,9 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
-from cantools.database.can import Database
 from e2e.p05 import e2e_p05_check, e2e_p05_protect
 
+from mount_driver.can_library import Database
 from mount_driver.layout import DatabaseError, MessageLayout, OutOfRangeError, Scaling
 
 __all__ = [

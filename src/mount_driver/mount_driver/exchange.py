@@ -10,9 +10,8 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 
-import can
-
 from mount_driver.bus import CanLinkError, Reception, may_have_frames, open_bus
+from mount_driver.can_library import can
 from mount_driver.clock import Clock
 from mount_driver.codec import MountCodec, Setpoint, WrongCrcError, WrongLengthError
 from mount_driver.e2e_receiver import AliveCounter

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-import can
+from mount_driver.can_library import can
 
 
 class Frame(can.Message):

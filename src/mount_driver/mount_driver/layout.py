@@ -12,8 +12,8 @@ from operator import itemgetter
 from typing import Any
 
 import bitstruct.c
-from cantools.database.can import Message
-from cantools.database.can.signal import Signal
+
+from mount_driver.can_library import Message, Signal
 
 # Steps from the DBC's units to SI; other units are kept and appear in the name of the field.
 _SI_FACTORS = {'mm': Decimal('0.001')}

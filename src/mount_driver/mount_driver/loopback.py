@@ -13,9 +13,9 @@ import socket
 import struct
 from typing import Any
 
-import can
 import msgpack
-from can.interfaces.udp_multicast.utils import pack_message
+
+from mount_driver.can_library import can, pack_message
 
 _LOOPBACK = '127.0.0.1'
 _LARGEST_DATAGRAM = 4096  # bytes; a frame takes about 200

@@ -3,9 +3,8 @@
 import threading
 import time
 
-import can
-
 from mount_driver.bus import open_bus
+from mount_driver.can_library import can
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter
 from mount_ros.testing import LIMIT, wait_until

@@ -4,11 +4,11 @@ import os
 import socket
 import time
 
-import can
 import msgpack
 import pytest
 
 from mount_driver.bus import CanLinkError, Reception, _check_socketcan, open_bus
+from mount_driver.can_library import can
 
 
 def frame(number, data=b'\x01' * 24, **options):

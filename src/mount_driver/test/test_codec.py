@@ -2,11 +2,11 @@
 
 import math
 
-import cantools
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mount_driver.can_library import cantools
 from mount_driver.codec import (
     DATABASE_FILE,
     DatabaseError,

@@ -5,11 +5,11 @@ import subprocess
 import sys
 import textwrap
 
-import can
 import pytest
 from far_end import CODEC, FarEnd, sample
 
 from mount_driver import exchange as exchange_module
+from mount_driver.can_library import can
 from mount_driver.clock import CounterClock, ElectronicsClock
 from mount_driver.codec import Setpoint, Status
 from mount_driver.exchange import Exchange

@@ -3,11 +3,11 @@
 import contextlib
 
 import msgpack
-from can.interfaces.udp_multicast.utils import pack_message
 from far_end import CODEC, sample
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mount_driver.can_library import pack_message
 from mount_driver.clock import CounterClock
 from mount_driver.codec import Status, WrongCrcError, WrongLengthError
 from mount_driver.frame import Frame

@@ -2,11 +2,11 @@
 
 import itertools
 
-import can
 import pytest
 from far_end import CODEC, FarEnd, sample
 
 from mount_driver import exchange as exchange_module
+from mount_driver.can_library import can
 from mount_driver.clock import ElectronicsClock
 from mount_driver.exchange import Exchange
 from mount_driver.parameters import DriverParameters

@@ -314,6 +314,8 @@ def test_diagnostics_tell_node_state_figures_and_topics_without_another_side(pro
         'other_writer': '',
         'data_node': '/mount_right/probe_io',
         'path_errors': '0',
+        'real_time_priority': '0',
+        'memory_locked': 'False',
     }
 
 

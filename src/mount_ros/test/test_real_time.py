@@ -89,6 +89,15 @@ def test_the_threads_of_the_data_have_the_priority_while_a_node_is_active(system
     assert whole.held == 0
 
 
+def test_the_memory_of_a_process_in_real_time_stays_in_place(system, monkeypatch):
+    for permitted in (True, False):
+        monkeypatch.setattr(real_time, 'lock_memory', lambda permitted=permitted: permitted)
+        whole, ordinary = shared(system), shared(system, priority=0)
+        whole.keep_memory()
+        ordinary.keep_memory()
+        assert (whole.memory_locked, ordinary.memory_locked) == (permitted, False)
+
+
 def test_who_can_wait_for_the_interpreter_leaves_the_others_ordinary(system):
     whole = shared(system, priority=5)
     whole.begin(Loop(interpreter=False))
@@ -198,7 +207,7 @@ def test_a_thread_that_the_system_says_does_not_sleep_ends_it_at_once(system):
     assert not system.urgent()
 
 
-def test_what_was_given_back_stays_so_until_the_next_activation(system):
+def test_what_was_given_back_stays_so_until_an_activation_30_s_later(system):
     whole, loop = shared(system), Loop()
     whole.begin(loop)
     looks(whole, system, 10, {4: 1.0})
@@ -206,6 +215,11 @@ def test_what_was_given_back_stays_so_until_the_next_activation(system):
     assert not system.urgent()
     whole.end(loop)
     assert whole.given_back
+    whole.begin(loop)
+    assert whole.given_back  # so soon it is not taken again
+    assert not system.urgent()
+    whole.end(loop)
+    system.now += 30.0
     whole.begin(loop)
     assert not whole.given_back
     assert system.urgent() == ALL

@@ -7,13 +7,13 @@ from copy import deepcopy
 from functools import partial
 from typing import Any
 
-import can
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
+from mount_driver.can_library import can
 from mount_driver.parameters import DriverParameters
 from mount_models.arithmetic.compiled import compilation_told
 from mount_models.quantity import ParameterError, flattened

@@ -2,10 +2,10 @@
 
 import math
 
-import can
 import numpy as np
 import pytest
 
+from mount_driver.can_library import can
 from mount_driver.codec import MountCodec, Status
 from mount_models.quantity import ParameterError
 from mount_sim.electronics.can_end import CanEnd

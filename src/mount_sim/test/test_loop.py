@@ -7,10 +7,10 @@ import threading
 import time
 from types import SimpleNamespace
 
-import can
 import numpy as np
 import pytest
 
+from mount_driver.can_library import can
 from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.quantisation import quantised_displacement

@@ -1,6 +1,5 @@
 """The simulator's node: what ends its thread is told."""
 
-import can
 import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -8,6 +7,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
+from mount_driver.can_library import can
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.testing import wait_until
 from mount_sim.node import INJECT, MountSim

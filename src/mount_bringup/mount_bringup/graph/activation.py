@@ -11,13 +11,10 @@ from rclpy.client import Client
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import DRIVER, SIM, GraphNode
 from mount_bringup.graph.pace import Pace, pace
+from mount_bringup.graph.transitions import FRESH_DIAGNOSTICS, TRANSITION_LIMIT
 from mount_bringup.graph.verdicts import Verdicts
 from mount_models.sampling import SAMPLE_RATE
 
-FRESH_DIAGNOSTICS = 1.5
-"""Seconds (chosen): every node tells its figures once a second."""
-TRANSITION_LIMIT = 60.0
-"""Seconds (chosen): activation of mount_init includes its current ramp."""
 _LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
 
 

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import groupby, zip_longest
+from itertools import groupby
 from typing import Any
 
 import rclpy
@@ -15,14 +15,13 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph.activation import FRESH_DIAGNOSTICS, TRANSITION_LIMIT, Activation
+from mount_bringup.graph.activation import Activation
 from mount_bringup.graph.errors import GraphError, Interrupted
 from mount_bringup.graph.liveliness import silence_sentence
-from mount_bringup.graph.matches import unmatched
+from mount_bringup.graph.matches import crowded, waiting
 from mount_bringup.graph.nodes import (
     DRIVER,
     RECORDER,
@@ -36,10 +35,10 @@ from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
 from mount_bringup.graph.reinitialisation import initialise_anew, offer
 from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
+from mount_bringup.graph.transitions import TRANSITION_LIMIT, Transitions
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
 from mount_ros.messages.event import read_mark
-from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.leaving import leave_middleware
 from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_ros.qos import publisher_qos, recording_qos
@@ -48,7 +47,7 @@ from mount_sim.diagnosis import FINISHED
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
-_CONFIGURE = Transition.TRANSITION_CONFIGURE
+_MOMENT = 0.05  # s, chosen
 
 
 class Bringup:
@@ -72,6 +71,7 @@ class Bringup:
         self._mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
         self._interrupted = False  # no lock: a second signal may come amid the first
         self._context = Context()
+        self._transitions = Transitions(self)
         self._activation = Activation(self)
         self._recovery = Recovery(self, settings.restart_limit)
         self._makes_good = False
@@ -97,9 +97,7 @@ class Bringup:
         self._node.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self.verdicts.take, recording_qos(DIAGNOSTICS)
         )
-        for mount in dict.fromkeys(
-            ['', *self._mounts]
-        ):  # the recorder of several mounts marks in their common
+        for mount in dict.fromkeys(['', *self._mounts]):  # the recorder of several mounts marks for all
             name, take = f'{mount}/{EVENT.name}'.lstrip('/'), partial(self._take_event, mount)
             self._node.create_subscription(String, name, take, recording_qos(EVENT))
         qos = publisher_qos(SESSION)
@@ -110,7 +108,7 @@ class Bringup:
         offer(self._node, self._mounts, self._begin_anew)
         say('starting the nodes')
         self.start_nodes()
-        self._configure()
+        self._transitions.configure(self._groups)
         self.parameters = {node.full_name: parameters_of(node.full_name, self.call) for node in self.nodes}
         for mount, publisher in publishers.items():
             publisher.publish(String(data=session(settings_of_mount(self.parameters, mount))))
@@ -139,16 +137,6 @@ class Bringup:
         """Whether the drive is over; the simulator tells it."""
         return self.figures(SIM).get('sentence') == FINISHED
 
-    def _configure(self) -> None:
-        """Configure the processes' nodes, those of one process in their order.
-
-        It counts there: the data thread serves those first that came last.
-        """
-        for side_by_side in zip_longest(*self._groups):
-            asked = [(node, self._ask(node, _CONFIGURE)) for node in side_by_side if node is not None]
-            for node, question in asked:
-                self._take_answer(node, _CONFIGURE, question)
-
     def start_again(self, nodes: Sequence[GraphNode]) -> None:
         """End what is left of the processes of `nodes`, and start them again."""
         raise GraphError(f'{" + ".join(node.name for node in nodes)} cannot be started again from here')
@@ -161,6 +149,10 @@ class Bringup:
     def activate(self, node: GraphNode, say: Callable[[str], None]) -> None:
         """Activate a node; one that refuses is asked as often as the graph declares."""
         self._activation.activate(node, say)
+
+    def serve_once(self) -> None:
+        """Serve what arrives within a moment, whatever it tells."""
+        self._executor.spin_once(_MOMENT)
 
     def serve_for(self, duration: float) -> None:
         """Serve the graph for so many s."""
@@ -188,7 +180,7 @@ class Bringup:
                 self._make_good(lost.loss)
             if time.monotonic() - begin > limit:
                 raise GraphError(f'{what} did not happen within {limit:g} s; {self.verdicts.complaints()}')
-            self._executor.spin_once(0.05)
+            self.serve_once()
 
     def _check_work(self) -> None:
         """Raise `NodesLostError` if a node hangs, or the electronics have lost their initialisation."""
@@ -243,21 +235,7 @@ class Bringup:
 
     def transition(self, node: GraphNode, transition: int) -> None:
         """Take a node through a lifecycle transition, or raise `GraphError` with the node's own reason."""
-        self._take_answer(node, transition, self._ask(node, transition))
-
-    def _ask(self, node: GraphNode, transition: int) -> tuple[Client, Future]:
-        client = self.wait_for_service(node)
-        return client, client.call_async(ChangeState.Request(transition=Transition(id=transition)))
-
-    def _take_answer(self, node: GraphNode, transition: int, asked: tuple[Client, Future]) -> None:
-        client, answer = asked
-        label = {1: 'configure', 3: 'activate', 4: 'deactivate'}.get(transition, str(transition))
-        self.wait_until(answer.done, TRANSITION_LIMIT, f'{label} of {node.full_name}')
-        self._node.destroy_client(client)
-        if not answer.result().success:
-            raise self.refusal(node, label)
-        if transition == _CONFIGURE:
-            self.verdicts.witness.state(node, 'configured')
+        self._transitions.make(node, transition)
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
@@ -279,20 +257,13 @@ class Bringup:
 
     def wait_for_service(self, node: GraphNode) -> Client:
         """Return a client of the transitions of a node when it is there; to be destroyed by who asked."""
-        client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
+        client = self.client(ChangeState, f'{node.full_name}/change_state')
         self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.full_name}')
         return client
 
     def refusal(self, node: GraphNode, label: str) -> GraphError:
         """Return the error of a refused transition with the node's own reason."""
-        return GraphError(f'{node.full_name} refused to {label}: {self._reason(node)}')
-
-    def _reason(self, node: GraphNode) -> str:
-        """Return what the node says of its refusal; it may come after the answer."""
-        end = time.monotonic() + FRESH_DIAGNOSTICS
-        while int(self.figures(node).get('level', Level.OK)) < Level.ERROR and time.monotonic() < end:
-            self._executor.spin_once(0.05)
-        return self.figures(node).get('sentence', '(it said nothing)')
+        return self._transitions.refusal(node, label)
 
     def _try_to_deactivate(self, node: GraphNode) -> bool:
         """Return whether the node is not active any more; if not, a signal has the same effect."""
@@ -312,35 +283,23 @@ class Bringup:
         """Raise `GraphError` if there are more than `own` nodes of the same name."""
         end = time.monotonic() + 0.5  # discovery of a running graph takes less with the shipped profile
         while time.monotonic() < end:
-            self._executor.spin_once(0.05)
-            space = self._node.get_namespace()
-            present = self._node.get_node_names_and_namespaces()
-            for node in self.nodes:
-                own_space = f'{space.rstrip("/")}/{node.mount}'.rstrip('/') or '/'
-                if present.count((node.name, own_space)) > own:
-                    raise GraphError(
-                        f'{node.name} already runs in ROS domain {self._settings.domain}, namespace '
-                        f'{own_space}: end that graph, or choose another domain or namespace'
-                    )
+            self.serve_once()
+            if space := crowded(self.nodes, self._node, own):
+                raise GraphError(
+                    f'{space} already runs in ROS domain {self._settings.domain}: end that graph, or choose '
+                    'another domain or namespace'
+                )
 
     def wait_for_matches(self) -> None:
         """Return when every topic that a node needs has found its other side."""
 
-        def all_matched() -> bool:
-            return all(not self._unmatched(node) for node in self.nodes)
+        def alone() -> list[str]:
+            return waiting(self.nodes, self.figures, self._node.get_namespace())
 
         try:
-            self.wait_until(all_matched, _MATCH_LIMIT, 'connection of all topics')
+            self.wait_until(lambda: not alone(), _MATCH_LIMIT, 'connection of all topics')
         except GraphError as error:
-            alone = '; '.join(
-                f'{node.full_name} waits for {", ".join(self._unmatched(node))}'
-                for node in self.nodes
-                if self._unmatched(node)
-            )
-            raise GraphError(f'{error}: {alone}') from None
-
-    def _unmatched(self, node: GraphNode) -> list[str]:
-        return unmatched(node, self.figures(node), self.nodes, self._node.get_namespace())
+            raise GraphError(f'{error}: {"; ".join(alone())}') from None
 
     def client(self, kind: Any, service: str) -> Client:
         """Return a client of a service; to be destroyed by who asked for it."""

@@ -1,9 +1,30 @@
-"""Which topics that a node cannot do without have no other side yet."""
+"""Which nodes have no other side yet for a topic that they cannot do without, and which are there twice."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+
+from rclpy.node import Node
 
 from mount_bringup.graph.nodes import RECORDER, GraphNode
 from mount_ros.topics import SESSION
+
+
+def waiting(
+    nodes: Sequence[GraphNode], figures: Callable[[GraphNode], Mapping[str, str]], namespace: str
+) -> list[str]:
+    """Return in words which of `nodes`, those of a graph, wait for which topics, by their own figures."""
+    lacking = {node: unmatched(node, figures(node), nodes, namespace) for node in nodes}
+    return [f'{node.full_name} waits for {", ".join(names)}' for node, names in lacking.items() if names]
+
+
+def crowded(nodes: Sequence[GraphNode], seen_by: Node, own: int) -> str:
+    """Return name and namespace of the first of `nodes` that is there more than `own` times; '' if none."""
+    space = seen_by.get_namespace().rstrip('/')
+    present = seen_by.get_node_names_and_namespaces()
+    for node in nodes:
+        own_space = f'{space}/{node.mount}'.rstrip('/') or '/'
+        if present.count((node.name, own_space)) > own:
+            return f'{node.name} in namespace {own_space}'
+    return ''
 
 
 def unmatched(

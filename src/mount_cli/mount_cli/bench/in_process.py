@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import cantools
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
@@ -16,6 +15,7 @@ from mount_bringup.chosen import chosen_control
 from mount_cli.bench.comparison import Comparison, in_turn
 from mount_control.controller import ControlLaw, Controller
 from mount_control.force_to_current import resample
+from mount_driver.can_library import cantools
 from mount_driver.codec import DATABASE_FILE, Measurement, MountCodec
 from mount_models.sampling import SAMPLE_TIME
 from mount_replay.loop.run import run_core

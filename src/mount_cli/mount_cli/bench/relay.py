@@ -14,13 +14,14 @@ import threading
 import time
 from collections.abc import Iterator
 
-import can
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
+
+from mount_driver.can_library import can
 
 GROUP = '239.74.163.3'  # chosen: a multicast group beside that of the graph
 SPIN, EVENTS = 'spin', 'events'

@@ -14,7 +14,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-import can
 import numpy as np
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
@@ -22,6 +21,7 @@ from std_msgs.msg import String
 
 from mount_bringup.graph.domain import can_port
 from mount_driver.bus import MULTICAST_GROUP, open_bus
+from mount_driver.can_library import can
 from mount_driver.codec import Measurement, MountCodec, Setpoint
 from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.frame import Frame

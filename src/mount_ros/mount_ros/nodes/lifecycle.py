@@ -295,6 +295,8 @@ class SafeLifecycleNode(DeclaringNode):
             'other_writer': other,
             'path_errors': path.refused if path is not None else 0,
             'data_node': path.name if path is not None else '',
+            'real_time_priority': self.real_time.held,
+            'memory_locked': self.real_time.memory_locked,
         }
         return Verdict(verdict.level, verdict.sentence, figures)
 

@@ -1,11 +1,12 @@
 """Real-time priority of the threads that carry the 1 kHz data of a process, and what bounds it.
 
-They have it while a node is active, and behind them those that take turns with them: a thread that holds the
-interpreter and waits for a processor holds up the loop, whatever the loop's priority. (Sixteen threads wanted
-to run on two cores; the loop came up to 140 ms late beside an ordinary thread of its process, 97 ms beside
-one of niceness -15, and 5 ms beside one in real time.)
+The threads have it while a node is active, and behind them those that take turns with them: a thread that
+holds the interpreter and waits for a processor holds up the loop, whatever the loop's priority. (Sixteen
+threads wanted to run on two cores; the loop came up to 140 ms late beside an ordinary thread of its process,
+97 ms beside one of niceness -15, and 5 ms beside one in real time.) The memory of the process is kept in
+place from its start on (`locked_memory`).
 
-A watch gives the priority back, for all of them until the next activation, when
+A watch gives the priority back, for all of them until an activation after 30 s or more, when
 
 - one of them used more than its share of a core (a loop that spins, or more work than the machine carries);
 - an ordinary thread of the process wanted to run and could not (the loops of all graphs take the machine);
@@ -26,6 +27,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
+from mount_ros.nodes.locked_memory import lock_memory
 from mount_ros.nodes.scheduling import Threads
 
 HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
@@ -33,7 +35,7 @@ WATCH_PERIOD = 0.2  # s, chosen
 _WINDOW = 5  # periods, chosen: 1 s
 _SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
 _MISSED = 0.5  # of the periods of a window, chosen: a stall of the machine for 0.2 s is not meant
-_PULSE_PERIOD = 0.1  # s, chosen
+_REST = 30.0  # s, chosen: no activation takes it again meanwhile, else restarts keep the machine busy
 _PATIENCE = (
     3  # periods of the watch without a pulse, chosen: 0.6 s; Linux leaves 50 ms of each second at least
 )
@@ -84,11 +86,13 @@ class RealTime:
         self.permitted = True
         self.given_back = ''
         """Why the priority was given back since the last activation, with value, limit and remedy."""
+        self.memory_locked = False
+        """Whether the system may not take memory of this process away."""
         self._threads = threads or Threads()
         self._clock = clock
         self._watcher = self._threads.own
         self._loops: list[RealTimeLoop] = []
-        self._stepped_down = False
+        self._stepped_down, self._ordinary_until = False, -math.inf  # s
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
         self._past: deque[_Look] = deque(maxlen=_WINDOW + 1)
@@ -99,6 +103,13 @@ class RealTime:
         """The priority at which threads run at present; 0: none does."""
         return self.priority if self._held else 0
 
+    def keep_memory(self) -> None:
+        """Keep the process's memory in place if its loops will have a priority and the system permits it.
+
+        While nothing is active: all threads that want new memory wait for it, 14 ms on a quiet machine.
+        """
+        self.memory_locked = bool(self.priority) and lock_memory()
+
     def begin(self, loop: RealTimeLoop) -> None:
         """Give the threads of `loop` their priority, those too that it will make while it is active."""
         if not self.priority:
@@ -107,7 +118,8 @@ class RealTime:
             if loop in self._loops:
                 return
             self._loops.append(loop)
-            self._stepped_down, self.given_back = False, ''
+            if self._clock() >= self._ordinary_until:
+                self._stepped_down, self.given_back = False, ''
             self._past.clear()
             bound(_WITHOUT_SLEEP, _LAST)
             self._give()
@@ -169,8 +181,12 @@ class RealTime:
 
     def _give_back(self, reason: str) -> str:
         if reason:
-            remedy = 'lower the load of this machine or the number of graphs on it, then activate again'
-            self._stepped_down = True
+            remedy = (
+                'lower the load of this machine or the number of graphs on it, then activate again, not '
+                f'before {_REST:g} s'
+            )
+            self._stepped_down, self._ordinary_until = True, self._clock() + _REST
+            self._past.clear()
             self._give()
             bound(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
             self.given_back = f'real-time priority {self.priority} given back: {reason}; {remedy}'

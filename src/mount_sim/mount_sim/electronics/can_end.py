@@ -6,9 +6,8 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 
-import can
-
 from mount_driver.bus import Reception, may_have_frames
+from mount_driver.can_library import can
 from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.e2e_receiver import AliveCounter, E2EReceiver
 from mount_driver.frame import Frame

@@ -1,4 +1,4 @@
-"""The samples of a text table: in bulk by pyarrow, and cell by cell where that is missing or finds a fault."""
+"""The samples of a text table: by pyarrow, and cell by cell where that is missing or finds a fault."""
 
 import csv
 import re

@@ -2,8 +2,7 @@
 
 from collections import deque
 
-import can
-
+from mount_driver.can_library import can
 from mount_driver.codec import MountCodec
 from mount_driver.frame import Frame
 from mount_models.arithmetic.random_numbers import RandomNumbers

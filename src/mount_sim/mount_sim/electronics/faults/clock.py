@@ -1,7 +1,6 @@
 """Faults of the electronics' clock and counters."""
 
-import can
-
+from mount_driver.can_library import can
 from mount_sim.electronics.faults.contract import Fault, Occasion
 
 _JUMP = 10_000_000  # us, chosen: farther than any pause of the frames
