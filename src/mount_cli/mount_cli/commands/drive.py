@@ -1,12 +1,13 @@
 """`engine-mount drive`: the simulated car through the whole graph."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mount_bringup.graph.nodes import RESTART_LIMIT
 from mount_cli.commands.options import (
     Columns,
+    Dbc,
     Domain,
     JsonFile,
     MapFile,
@@ -18,9 +19,23 @@ from mount_cli.commands.options import (
     Split,
     TimeColumn,
 )
+from mount_cli.commands.road_arguments import (
+    ContactLength,
+    Distance,
+    Lateral,
+    Repeat,
+    SpeedText,
+    brought_road,
+    check_scenario,
+    given_without_road,
+    height_column,
+)
 from mount_cli.completion.values import faults, listed, named
 from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
+
+if TYPE_CHECKING:
+    from mount_replay.drive.brought import Brought
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
 control was active, no fault, and the recording whole; 1 when one of these did not hold, or nothing was
@@ -38,6 +53,8 @@ Examples:
 
 `engine-mount drive --scenario recorded --file drive.csv --column az:g --scale -1` - your own recording
 
+`engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
+
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
 `engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
@@ -52,7 +69,7 @@ def drive(
     scenario: Annotated[
         str,
         typer.Option(
-            metavar='NAME', help='motorway, bench, sweep or recorded', autocompletion=named('scenario')
+            metavar='NAME', help='motorway, bench, sweep, recorded or road', autocompletion=named('scenario')
         ),
     ] = 'motorway',
     mount: Annotated[
@@ -78,6 +95,7 @@ def drive(
     time: TimeColumn = '',
     rate: Rate = None,
     map_file: MapFile = None,
+    dbc: Dbc = None,
     topic: Annotated[str, typer.Option(help='recorded: topic of a bag, --column being the field')] = '',
     scale: Annotated[
         float | None,
@@ -85,6 +103,14 @@ def drive(
             help='recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'
         ),
     ] = None,
+    road: Annotated[
+        str, typer.Option(metavar='FILE', help='measured road: height over distance, CSV or OpenCRG')
+    ] = '',
+    speed: SpeedText = '',
+    lateral: Lateral = 0.0,
+    distance: Distance = '',
+    contact_length: ContactLength = None,
+    repeat: Repeat = False,
     fault: Annotated[
         list[str] | None,
         typer.Option(
@@ -158,14 +184,22 @@ def drive(
     if 'list' in (fault or []):
         _list_faults()
         raise typer.Exit
-    if not file and (column or time or rate is not None or topic or scale is not None or map_file):
-        raise typer.BadParameter('--column, --time, --rate, --topic, --scale and --map-file go with --file')
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
     if composed and (lockstep or core):
         raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
+    of_files = {'time': time, 'rate': rate, 'map-file': map_file, 'dbc': dbc, 'topic': topic, 'scale': scale}
+    if not file:
+        given_without_file(**of_files, column=None if road else column)
+    if road:
+        check_scenario(scenario, file)
+        scenario = 'road'
+    else:
+        given_without_road(
+            speed=speed, lateral=lateral, distance=distance, contact_length=contact_length, repeat=repeat
+        )
     try:
         parameters = settings_of_options(settings or [])
     except SettingError as error:
@@ -191,17 +225,22 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
+    brought: tuple[Brought, ...] = ()
     console = terminal()
-    excitation = None
-    if file:
-        from mount_replay.drive.recorded_file import read_recorded
+    if road:
+        how = {'lateral': lateral, 'column': height_column(column or []), 'distance': distance}
+        how |= {'contact_length': contact_length, 'repeat': repeat, 'sim': parameters['mount_sim']}
+        brought = (brought_road(road, speed, **how),)
+    elif file:
+        from mount_replay.drive.recorded_file import recorded_acceleration
 
         said = [f'{topic}.{name}' if topic else name for name in column or []]
-        excitation = read_recorded(
-            str(local(file, console)), said, time, rate, scale=scale, mapping_file=map_file
-        )
+        how = {'time': time, 'rate': rate, 'scale': scale, 'mapping_file': map_file, 'dbc': dbc}
+        recorded, factor = recorded_acceleration(str(local(file, console)), said, **how)
+        brought = (recorded,)
+        parameters['mount_sim']['recorded.scale'] = factor
     order = DriveOrder(
-        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, excitation
+        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, brought
     )
     screen = TerminalScreen(console)
     folder, run, complaints = record_drive(order, screen)
@@ -223,6 +262,13 @@ def drive(
         note(console, complaint)
     if complaints:
         raise typer.Exit(1)
+
+
+def given_without_file(**options: object) -> None:
+    """Refuse options that say something of a recording where there is none."""
+    for name, value in options.items():
+        if value not in (None, '', []):
+            raise typer.BadParameter(f'--{name} is for a recording: name it with --file FILE')
 
 
 def _list_faults() -> None:
