@@ -16,7 +16,7 @@ class Library(NamedTuple):
 LIBRARIES = {
     'aiohttp': Library('aiohttp', 'python3-aiohttp'),
     'asammdf': Library('asammdf'),
-    'asyncssh': Library('asyncssh'),
+    'asyncssh': Library('asyncssh', 'python3-asyncssh'),
     'bitstruct': Library('bitstruct'),
     'can': Library('python-can', 'python3-can'),
     'cantools': Library('cantools', 'python3-cantools-pip'),
