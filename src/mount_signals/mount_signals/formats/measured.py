@@ -1,17 +1,24 @@
 """What any file of measured signals is read into: columns as the file holds them, none converted."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.signals.signal import SignalError
+
 FloatArray = NDArray[np.float64]
+
+_LISTED = 40  # names in a refusal, chosen
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a recording came from: URI, SHA-256 of its bytes, size in bytes, format, and what read it."""
+    """Where a recording came from: URI, SHA-256 of its bytes, size in bytes, format, and what read it.
+
+    Of a folder the SHA-256 is that of the lines `sha256  relative path` of its files, sorted by path.
+    """
 
     uri: str
     sha256: str
@@ -24,7 +31,8 @@ class Provenance:
 class TimeBase:
     """When the samples of a column were taken: s after `begin` (ns since 1970, or 0), shape (n,).
 
-    `told` says in words where these times come from.
+    `told` says in words where these times come from. Columns that were sampled together share one. With
+    `begin` 0 the times are those of the file's own clock, with its own zero.
     """
 
     times: FloatArray
@@ -32,25 +40,97 @@ class TimeBase:
     told: str
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredColumn:
-    """One column: its values (n,) in the file's own unit, NaN where the file holds none.
+@dataclass(frozen=True)
+class Heading:
+    """A column before its values are read: `name` without the unit, `header` as the file writes it.
 
-    `header` is its title as the file writes it, `name` that without the unit, `unit` as told there or ''.
-    `time` is the time base where the format itself tells one, in s; None where a column holds it.
+    `name` is the only one of its file: `group/name`, `topic.field` or `Message.Signal` where the format has
+    such. `unit` is as told there or ''. `number` is the place in the file from 0 on. `timed` says that the
+    format itself tells when the column was sampled, `date` that the values are s since 1970 made of a date.
     """
 
     name: str
     header: str
     unit: str
+    number: int
+    timed: bool = False
+    date: bool = False
+
+    def measured(self, values: FloatArray, time: 'TimeBase | None' = None) -> 'MeasuredColumn':
+        """Return the column with its `values` (n,)."""
+        own = {field.name: getattr(self, field.name) for field in fields(Heading)}
+        return MeasuredColumn(**own, values=values, time=time)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MeasuredColumn(Heading):
+    """One column: its values (n,) in the file's own unit, NaN where the file holds none.
+
+    `time` is the time base where the format itself tells one, in s; None where a column holds it.
+    """
+
     values: FloatArray
     time: TimeBase | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A file as named columns, with what a reader must know: `notes` are sentences."""
+    """A file as named columns, with what a reader must know: `notes` are sentences.
+
+    `others` are the headings of columns that were not asked for.
+    """
 
     columns: Mapping[str, MeasuredColumn]
     provenance: Provenance
     notes: tuple[str, ...] = ()
+    others: tuple[Heading, ...] = ()
+
+    def column(self, wanted: str) -> MeasuredColumn:
+        """Return the column meant by `wanted`, see `found`; raises `SignalError` with what there is."""
+        heading = found(wanted, [*self.columns.values(), *self.others], self.provenance.uri)
+        if heading.name not in self.columns:
+            raise SignalError(f'{self.provenance.uri}: column {heading.name!r} was not read; ask for it too')
+        return self.columns[heading.name]
+
+
+def found(wanted: str, headings: Sequence[Heading], uri: str) -> Heading:
+    """Return the heading meant by `wanted`: its name, header, last part of the name, or number from 0 on.
+
+    Names are tried in this order, then once more without regard to capitals; raises `SignalError`.
+    """
+    for fitting in _fitting(wanted, headings):
+        if len(fitting) == 1:
+            return fitting[0]
+        if fitting:
+            raise SignalError(
+                f'{uri}: column {wanted!r} is ambiguous: {listed(fitting)}; name one of these in full'
+            )
+    raise SignalError(f'{uri} has no column {wanted!r}; its columns are {listed(headings)}')
+
+
+def listed(headings: Sequence[Heading]) -> str:
+    """Return names with units in one line, as many as a person reads."""
+    texts = [f'{one.name} [{one.unit}]' if one.unit else one.name for one in headings[:_LISTED]]
+    more = [f'{len(headings) - _LISTED} more'] if len(headings) > _LISTED else []
+    return ', '.join(texts + more) or 'none'
+
+
+def unique(headings: Sequence[Heading]) -> list[Heading]:
+    """Return the headings with `#2`, `#3`, ... behind a name that stood before, numbered from 0 on."""
+    seen: dict[str, int] = {}
+    result = []
+    for number, heading in enumerate(headings):
+        seen[heading.name] = seen.get(heading.name, 0) + 1
+        count = seen[heading.name]
+        name = heading.name if count == 1 else f'{heading.name}#{count}'
+        result.append(replace(heading, name=name, number=number))
+    return result
+
+
+def _fitting(wanted: str, headings: Sequence[Heading]) -> Iterator[list[Heading]]:
+    for text in (str, str.casefold):
+        word = text(wanted.strip())
+        yield [one for one in headings if text(one.name) == word]
+        yield [one for one in headings if text(one.header) == word]
+        yield [one for one in headings if text(one.name).endswith(('/' + word, '.' + word))]
+    yield [one for one in headings if wanted.isdecimal() and one.number == int(wanted)]

@@ -1,0 +1,1 @@
+"""Units and times of measured columns: said, checked for plausibility, and turned into signals in SI."""

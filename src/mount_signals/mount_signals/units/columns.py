@@ -1,0 +1,68 @@
+"""The columns of a file that a user means, and reading no others."""
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from mount_bags.signals.signal import SignalError
+from mount_signals.formats.content import Stated
+from mount_signals.formats.measured import Heading, Measured, MeasuredColumn, found, listed
+from mount_signals.formats.reading import headings, read
+from mount_signals.units.mapping import Mapping
+from mount_signals.units.unit import unit_of
+
+TITLES = (
+    't', 'time', 'times', 'timestamp', 'timestamps', 'time_s', 't_s', 'seconds', 'zeit', 'zeitstempel',
+    'elapsed', 'elapsed_time', 'time_stamp', 'seconds_elapsed',
+)  # fmt: skip
+"""Titles of columns that hold times, in small letters."""
+
+
+def read_chosen(uri: str | Path, mapping: Mapping, stated: Stated | None = None) -> Measured:
+    """Return what `mapping` names of the file or folder at `uri`, with the columns that may hold its times.
+
+    Raises `SignalError`, `SourceError` or `UnitError`.
+    """
+    there = headings(uri, stated)
+    wanted = [choice.column for choice in (*mapping.columns.values(), *mapping.others.values())]
+    chosen = {heading_of(there, text, str(uri)).name for text in wanted}
+    if mapping.time.column:
+        chosen.add(heading_of(there, mapping.time.column, str(uri)).name)
+    elif mapping.time.rate is None:
+        chosen |= {heading.name for heading in there if is_time(heading)}
+        chosen |= {heading.name for heading in there[:1] if not heading.timed}
+    return read(uri, [heading.name for heading in there if heading.name in chosen], stated)
+
+
+def column_of(measured: Measured, wanted: str) -> MeasuredColumn:
+    """Return the column that `wanted` names; raises `SignalError`, or `UnitError` for an unknown unit."""
+    there = [*measured.columns.values(), *measured.others]
+    return measured.column(heading_of(there, wanted, measured.provenance.uri).name)
+
+
+def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
+    """Return the heading that `wanted` names; raises `SignalError`, or `UnitError` for an unknown unit."""
+    name, colon, unit = wanted.rpartition(':')
+    try:
+        return found(wanted, there, uri)
+    except SignalError:
+        if colon:
+            with contextlib.suppress(SignalError):
+                found(name, there, uri)
+                unit_of(unit)  # it is no unit, else it would not stand in the name
+        raise
+
+
+def is_time(heading: Heading) -> bool:
+    """Return whether a column is called as one of times is."""
+    return heading.date or heading.name.lower().replace(' ', '_') in TITLES
+
+
+def known(measured: Measured) -> str:
+    """Return the names of the columns of a file, for sentences."""
+    return listed([*measured.columns.values(), *measured.others])
+
+
+def place(measured: Measured) -> str:
+    """Return the name of the file, for sentences."""
+    return measured.provenance.uri.rstrip('/').rpartition('/')[2] or measured.provenance.uri
