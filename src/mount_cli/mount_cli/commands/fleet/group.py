@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from mount_cli.commands.fleet import example
+from mount_cli.commands.fleet import example, replay
 from mount_cli.help import Command, Group
 
 app = typer.Typer(
@@ -15,7 +15,10 @@ app = typer.Typer(
     rich_markup_mode='markdown',
 )
 
-_COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (('example', example.example, example.EPILOG),)
+_COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (
+    ('replay', replay.replay, replay.EPILOG),
+    ('example', example.example, example.EPILOG),
+)
 """Name, function and epilog of each sub-command."""
 
 
