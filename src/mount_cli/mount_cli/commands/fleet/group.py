@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from mount_cli.commands.fleet import example, index
+from mount_cli.commands.fleet import example, index, replay
 from mount_cli.help import Command, Group
 
 app = typer.Typer(
@@ -17,6 +17,7 @@ app = typer.Typer(
 
 _COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (
     ('index', index.index, index.EPILOG),
+    ('replay', replay.replay, replay.EPILOG),
     ('example', example.example, example.EPILOG),
 )
 """Name, function and epilog of each sub-command."""
