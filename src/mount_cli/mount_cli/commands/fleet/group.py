@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from mount_cli.commands.fleet import example
+from mount_cli.commands.fleet import example, query, report, worst
 from mount_cli.help import Command, Group
 
 app = typer.Typer(
@@ -15,7 +15,12 @@ app = typer.Typer(
     rich_markup_mode='markdown',
 )
 
-_COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (('example', example.example, example.EPILOG),)
+_COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (
+    ('example', example.example, example.EPILOG),
+    ('query', query.query, query.EPILOG),
+    ('worst', worst.worst, worst.EPILOG),
+    ('report', report.report, report.EPILOG),
+)
 """Name, function and epilog of each sub-command."""
 
 
