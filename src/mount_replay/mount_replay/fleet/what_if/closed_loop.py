@@ -141,9 +141,9 @@ class _Drive:
         """Return the figures of the motion as columns, with `changed` before their unit."""
         now = self._motion.view(_MOTION)[0]
         return {
-            f'displacement_peak{changed}_m': float(now['peak']),
-            f'displacement_rms{changed}_m': math.sqrt(float(now['square']) / float(now['count'])),
-            f'mount_force_peak{changed}_n': float(now['force_peak']),
+            f'peak_displacement{changed}_m': float(now['peak']),
+            f'rms_displacement{changed}_m': math.sqrt(float(now['square']) / float(now['count'])),
+            f'peak_mount_force{changed}_n': float(now['force_peak']),
         }
 
     def _take(self, samples: Samples, part: slice) -> None:

@@ -69,12 +69,12 @@ class AnswerFigures:
         mean = float(sums['current_sum']) / answered if answered else math.nan
         rms = math.sqrt(float(sums['force_square']) / samples) if samples else math.nan
         return {
-            f'current_peak{changed}_a': float(sums['current_peak']) if answered else math.nan,
-            f'current_mean{changed}_a': mean,
+            f'peak_current{changed}_a': float(sums['current_peak']) if answered else math.nan,
+            f'mean_current{changed}_a': mean,
             f'damping{changed}_s': int(sums['damping']) * sample_time,
-            f'friction_peak{changed}_n': float(sums['force_peak']),
-            f'friction_rms{changed}_n': rms,
-            f'pads_energy{changed}_j': float(sums['power_sum']) * sample_time,
+            f'peak_friction{changed}_n': float(sums['force_peak']),
+            f'rms_friction{changed}_n': rms,
+            f'pad_energy{changed}_j': float(sums['power_sum']) * sample_time,
         }
 
     @property
