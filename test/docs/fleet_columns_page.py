@@ -17,7 +17,8 @@ PAGE = PAGES / 'fleet_columns.md'
 HEAD = f"""# Columns of a fleet
 
 What `engine-mount fleet query` can be asked: the tables `recordings` and `events` of a catalogue, `result` of
-a replay, each a Parquet file of that name. {written_by(__file__)} How they are made and asked: [fleet](../how-to/fleet.md). What is unknown is null.
+a replay, each a Parquet file of that name. {written_by(__file__)}
+How they are made and asked: [fleet](../how-to/fleet.md). What is unknown is null.
 """
 TYPES = {
     TEXT: 'text',

@@ -59,9 +59,7 @@ def tables_of(folder: str | os.PathLike[str]) -> dict[str, 'pyarrow.dataset.Data
     dataset = required('pyarrow.dataset', TABLES)
     there = _files(Path(folder))
     if not there and (Path(folder) / ORDER).is_file():
-        raise QueryError(
-            f'{folder} is not finished; the same engine-mount fleet replay goes on with it'
-        )
+        raise QueryError(f'{folder} is not finished; the same engine-mount fleet replay goes on with it')
     if not there:
         raise QueryError(
             f'{folder} holds no table of a fleet ({", ".join(f"{name}.parquet" for name in NAMES)}); '
