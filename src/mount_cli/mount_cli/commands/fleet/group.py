@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from mount_cli.commands.fleet import example, index, query, report, worst
+from mount_cli.commands.fleet import example, index, query, replay, report, worst
 from mount_cli.help import Command, Group
 
 app = typer.Typer(
@@ -17,6 +17,7 @@ app = typer.Typer(
 
 _COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (
     ('index', index.index, index.EPILOG),
+    ('replay', replay.replay, replay.EPILOG),
     ('query', query.query, query.EPILOG),
     ('worst', worst.worst, worst.EPILOG),
     ('report', report.report, report.EPILOG),

@@ -75,6 +75,7 @@ class FleetOutcome:
     busy: float
     replayed: float
     workers: int
+    not_fetched: Sequence[Row] = ()  # what the same order tries again
 
     def figures(self) -> dict[str, Any]:
         """Return what `--json` writes; rates are those of this run, unknown is null."""
@@ -124,6 +125,7 @@ def replay_fleet(
         busy=run.busy,
         replayed=run.replayed,
         workers=len(run.workers),
+        not_fetched=run.not_fetched,
     )
 
 
