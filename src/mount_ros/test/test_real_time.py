@@ -58,10 +58,7 @@ def system(monkeypatch):
     system = FakeThreads()
     system.bounds = []
     system.now = 0.0
-    system.locked = []
     monkeypatch.setattr(real_time, 'bound', lambda *limits: system.bounds.append(limits))
-    monkeypatch.setattr(real_time, 'lock_memory', lambda: system.locked.append(True) or True)
-    monkeypatch.setattr(real_time, 'unlock_memory', lambda: system.locked.append(False))
     return system
 
 
@@ -92,24 +89,13 @@ def test_the_threads_of_the_data_have_the_priority_while_a_node_is_active(system
     assert whole.held == 0
 
 
-def test_the_memory_stays_in_place_while_a_node_of_the_process_is_active(system):
-    whole, first, second = shared(system), Loop(), Loop()
-    whole.begin(first)
-    whole.begin(second)
-    whole.end(first)
-    assert whole.memory_locked
-    assert system.locked == [True]
-    whole.end(second)
-    assert not whole.memory_locked
-    assert system.locked == [True, False]
-
-
-def test_without_priority_no_memory_is_kept(system):
-    system.permitted = False
-    for whole in (shared(system), shared(system, priority=0)):
-        whole.begin(Loop())
-        assert not whole.memory_locked
-    assert not system.locked
+def test_the_memory_of_a_process_in_real_time_stays_in_place(system, monkeypatch):
+    for permitted in (True, False):
+        monkeypatch.setattr(real_time, 'lock_memory', lambda permitted=permitted: permitted)
+        whole, ordinary = shared(system), shared(system, priority=0)
+        whole.keep_memory()
+        ordinary.keep_memory()
+        assert (whole.memory_locked, ordinary.memory_locked) == (permitted, False)
 
 
 def test_who_can_wait_for_the_interpreter_leaves_the_others_ordinary(system):

@@ -20,6 +20,7 @@ from mount_sim.excitation.scenario import (
     IdleForce,
     MotorwayScenario,
     RecordedScenario,
+    RoadScenario,
     SweepScenario,
     Timeline,
     TipIn,
@@ -50,6 +51,7 @@ class SimParameters(NamedTuple):
     motorway: MotorwayScenario = MotorwayScenario()
     sweep: SweepScenario = SweepScenario()
     recorded: RecordedScenario = RecordedScenario()
+    road: RoadScenario = RoadScenario()
     idle: IdleForce = IdleForce()
     tip_in: TipIn = TipIn()
     actuator: ReluctanceActuator = ReluctanceActuator()

@@ -16,7 +16,7 @@ def _refusal(chosen):
 
 def test_an_unknown_scenario_is_refused_with_the_known_ones(parameters):
     assert _refusal(parameters(scenario='race')) == (
-        "scenario 'race' is unknown; known are motorway, bench, sweep, recorded"
+        "scenario 'race' is unknown; known are motorway, bench, sweep, recorded, road"
     )
 
 

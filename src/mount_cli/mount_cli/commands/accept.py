@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.completion.values import recordings, references
+from mount_cli.commands.options import recording_argument
+from mount_cli.completion.values import references
+from mount_cli.fetching import local
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when the reference is made, 1 when it was refused, with the reason.
@@ -20,10 +22,8 @@ Examples:
 
 def accept(
     run: Annotated[
-        Path,
-        typer.Argument(
-            help='folder of a run, a recording, or a replay of the reference', autocompletion=recordings
-        ),
+        str,
+        recording_argument(instead='run, recording, or replay of the reference: its folder, a file or a URI'),
     ],
     reference: Annotated[
         str, typer.Option(metavar='NAME', help='name of the reference', autocompletion=references)
@@ -37,8 +37,8 @@ def accept(
     from mount_bags.run.place import open_run
     from mount_bags.run.versions import versions
 
-    accepted = accept_run(open_run(run), reference, reason, folder, versions())
     console = terminal()
+    accepted = accept_run(open_run(local(run, console)), reference, reason, folder, versions())
     for change in accepted.changes or ('new reference',):
         console.print(f'- {change}', soft_wrap=True)
     console.print(

@@ -1,12 +1,9 @@
 """`engine-mount audit`: was anything lost in a recording?"""
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
 
-from mount_cli.commands.options import JsonFile
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import JsonFile, RecordingPlace
+from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
@@ -18,6 +15,8 @@ Examples:
 
 `engine-mount audit /data/rosbag2_2024_05_02 --json audit.json` - any rosbag2 recording
 
+`engine-mount audit s3://bucket/drives/first` - fetched first; sftp, gs, http(s) and file too
+
 A topic with a rate is judged by its stamps, every topic by what the recorder, the file or its
 metadata counted. Expected = present - duplicated + lost. Jitter is the rms deviation of the steps between
 neighbouring stamps. Samples lost, samples unanswered and faults are the figures of `drive` and `report`.
@@ -27,12 +26,7 @@ The JSON holds them, and below `topics` for each topic `expected`, `present`, `l
 
 
 def audit(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            help='folder of a run or of a recording, or one of its files', autocompletion=recordings
-        ),
-    ],
+    recording: RecordingPlace,
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
@@ -44,8 +38,9 @@ def audit(
     from mount_report.json_file import write_json
 
     console = terminal()
+    place = local(recording, console)
     with console.status('reading'):
-        opened = open_run(recording)
+        opened = open_run(place)
         audits = audited(opened)
         found = losses(opened, audits)
     TerminalScreen(console).table(as_table(audits))

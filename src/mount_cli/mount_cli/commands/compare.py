@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.commands.options import JsonFile
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import JsonFile, recording_argument
+from mount_cli.fetching import local
 from mount_cli.terminal import note, refuse, terminal
 
 EPILOG = """Examples:
@@ -21,13 +21,8 @@ _NOT_COMPARED = 2
 
 
 def compare(
-    a: Annotated[
-        Path,
-        typer.Argument(
-            metavar='A', help='folder of a recording or run, or an MCAP file', autocompletion=recordings
-        ),
-    ],
-    b: Annotated[Path, typer.Argument(metavar='B', help='the other one', autocompletion=recordings)],
+    a: Annotated[str, recording_argument('A')],
+    b: Annotated[str, recording_argument('B', 'the other one')],
     tolerances: Annotated[
         list[str] | None,
         typer.Option(
@@ -58,7 +53,7 @@ def compare(
 
 
 def _told(
-    a: Path, b: Path, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
+    a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
     from mount_bags.compare.compare import compare as compare_recordings
@@ -69,7 +64,7 @@ def _told(
     from mount_report.json_file import write_json
 
     console = terminal()
-    recordings = open_run(a), open_run(b)
+    recordings = open_run(local(a, console)), open_run(local(b, console))
     comparison = compare_recordings(*recordings, Tolerances(tolerances), common_only=common)
     console.print(f'A {comparison.name_a}, B {comparison.name_b}', soft_wrap=True)
     for sentence in sentences(comparison):

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import RecordingPlace
+from mount_cli.fetching import beside, local
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the piece is written and nothing of it was unreadable, 1 when something was.
@@ -21,9 +22,7 @@ Examples:
 
 
 def cut(
-    recording: Annotated[
-        Path, typer.Argument(help='folder of a recording or run, or an MCAP file', autocompletion=recordings)
-    ],
+    recording: RecordingPlace,
     begin: Annotated[
         str, typer.Option('--from', metavar='TIME', help='from the first displacement sample, such as 12s')
     ] = '',
@@ -36,7 +35,10 @@ def cut(
     before: Annotated[str, typer.Option(metavar='TIME', help='with --event: how much before it')] = '5s',
     after: Annotated[str, typer.Option(metavar='TIME', help='with --event: how much after it')] = '10s',
     out: Annotated[
-        Path | None, typer.Option(help='folder to create; default: beside the recording, named by the times')
+        Path | None,
+        typer.Option(
+            help='folder to create; default: beside the recording, of a URI here, named by the times'
+        ),
     ] = None,
 ) -> None:
     """Cut a piece out of a recording; session and other latched topics come with it.
@@ -49,7 +51,8 @@ def cut(
 
     if bool(event) == bool(begin or end):
         raise typer.BadParameter('give --from and --to (or one of them), or --event')
-    opened = open_run(recording)
+    console = terminal()
+    opened = open_run(local(recording, console))
     first, last = (_seconds(text) if text else None for text in (begin, end))
     reason = ''
     if event:
@@ -59,7 +62,6 @@ def cut(
         reason = f'{found.kind} at {time:.3f} s' + (f': {found.text}' if found.text else '')
     target = out or _beside(opened.path, first, last)
     done = cut_recording(opened, target, first, last, reason)
-    console = terminal()
     around = f' around {reason}' if reason else ''
     console.print(
         f'{done.messages} messages from {done.begin:.3f} s to {done.end:.3f} s{around}, '
@@ -80,6 +82,6 @@ def _seconds(text: str) -> float:
 
 
 def _beside(recording: Path, begin: float | None, end: float | None) -> Path:
-    path = recording.absolute()
     times = f'{0.0 if begin is None else begin:g}s_' + ('end' if end is None else f'{end:g}s')
-    return path.with_name(f'{path.stem if path.is_file() else path.name}_{times}')
+    name = recording.absolute()
+    return beside(recording) / f'{name.stem if name.is_file() else name.name}_{times}'

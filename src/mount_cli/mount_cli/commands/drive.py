@@ -1,14 +1,27 @@
 """`engine-mount drive`: the simulated car through the whole graph."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mount_bringup.graph.nodes import RESTART_LIMIT
 from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Settings, Snapshot, Split
+from mount_cli.commands.road_arguments import (
+    ContactLength,
+    Distance,
+    Lateral,
+    Repeat,
+    SpeedText,
+    brought_road,
+    check_scenario,
+    given_without_road,
+)
 from mount_cli.completion.values import faults, listed, named
 from mount_cli.terminal import note, terminal
+
+if TYPE_CHECKING:
+    from mount_replay.drive.brought import Brought
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
 control was active, no fault, and the recording whole; 1 when one of these did not hold, or nothing was
@@ -26,6 +39,8 @@ Examples:
 
 `engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
 
+`engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
+
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
 `engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
@@ -40,7 +55,7 @@ def drive(
     scenario: Annotated[
         str,
         typer.Option(
-            metavar='NAME', help='motorway, bench, sweep or recorded', autocompletion=named('scenario')
+            metavar='NAME', help='motorway, bench, sweep, recorded or road', autocompletion=named('scenario')
         ),
     ] = 'motorway',
     mount: Annotated[
@@ -64,13 +79,24 @@ def drive(
     ] = None,
     column: Annotated[
         str,
-        typer.Option(help='recorded: column (CSV, JSON), signal.number (NPY), field of the message (MCAP)'),
+        typer.Option(
+            help='recorded: column (CSV, JSON), signal.number (NPY), field of the message (MCAP); '
+            'road: NAME[:UNIT] of the height'
+        ),
     ] = '',
     time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV, JSON)')] = '',
     topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
     scale: Annotated[
         float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
     ] = None,
+    road: Annotated[
+        str, typer.Option(metavar='FILE', help='measured road: height over distance, CSV or OpenCRG')
+    ] = '',
+    speed: SpeedText = '',
+    lateral: Lateral = 0.0,
+    distance: Distance = '',
+    contact_length: ContactLength = None,
+    repeat: Repeat = False,
     fault: Annotated[
         list[str] | None,
         typer.Option(
@@ -150,6 +176,13 @@ def drive(
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
     if composed and (lockstep or core):
         raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
+    if road:
+        check_scenario(scenario, file)
+        scenario = 'road'
+    else:
+        given_without_road(
+            speed=speed, lateral=lateral, distance=distance, contact_length=contact_length, repeat=repeat
+        )
     try:
         parameters = settings_of_options(settings or [])
     except SettingError as error:
@@ -161,7 +194,7 @@ def drive(
         'seed': seed,
         'timeline.duration': duration,
         'recorded.file': str(file.absolute()) if file else None,
-        'recorded.column': column or None,
+        'recorded.column': (column or None) if not road else None,
         'recorded.time_column': time_column or None,
         'recorded.topic': topic or None,
         'recorded.scale': scale,
@@ -180,8 +213,13 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
+    brought: tuple[Brought, ...] = ()
+    if road:
+        how = {'lateral': lateral, 'column': column, 'distance': distance}
+        how |= {'contact_length': contact_length, 'repeat': repeat, 'sim': parameters['mount_sim']}
+        brought = (brought_road(road, speed, **how),)
     order = DriveOrder(
-        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts
+        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, brought
     )
     console = terminal()
     screen = TerminalScreen(console)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from mount_cli.commands.options import JsonFile
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import JsonFile, RecordingPlace
+from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
@@ -89,12 +89,7 @@ def _print_listed(found: 'list[Listed]', console: Console) -> None:
 
 
 def info(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            help='folder of a run or of a recording, or one of its files', autocompletion=recordings
-        ),
-    ],
+    recording: RecordingPlace,
     json_file: JsonFile = None,
 ) -> None:
     """Tell what a recording is and holds: session, versions, parameters, topics, gap, losses."""
@@ -103,8 +98,9 @@ def info(
     from mount_report.recording_facts import recording_facts
 
     console = terminal()
+    place = local(recording, console)
     with console.status('reading'):
-        facts = recording_facts(open_run(recording))
+        facts = recording_facts(open_run(place))
     _print_facts(facts, console)
     if json_file is not None:
         write_json(facts.as_json(), json_file)

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import RecordingPlaces
+from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when all is written, 1 when something of the parts could not be read.
@@ -15,14 +16,7 @@ Example: `engine-mount merge bags/drive_0s_10s bags/drive_10s_end --out bags/who
 
 
 def merge(
-    recordings: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar='RECORDING...',
-            help='folders of recordings or runs, or MCAP files',
-            autocompletion=recordings,
-        ),
-    ],
+    recordings: RecordingPlaces,
     out: Annotated[Path, typer.Option(help='folder to create')],
     different_sessions: Annotated[
         bool, typer.Option('--different-sessions', help='merge recordings of different drives, too')
@@ -32,9 +26,9 @@ def merge(
     from mount_bags.edit.merge import merge as merge_recordings
     from mount_bags.run.place import open_run
 
-    opened = [open_run(path) for path in recordings]
-    done = merge_recordings(opened, out, different_sessions=different_sessions)
     console = terminal()
+    opened = [open_run(local(place, console)) for place in recordings]
+    done = merge_recordings(opened, out, different_sessions=different_sessions)
     console.print(
         f'{done.messages} messages; {done.repeated} stood in more than one part and were written once\n'
         f'recording  {done.folder}',

@@ -1,12 +1,21 @@
 """Options that several sub-commands have."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from mount_cli.completion.values import setting
+from mount_cli.completion.values import recordings, setting
 
+
+def recording_argument(metavar: str | None = None, instead: str = '') -> Any:
+    """Return the argument that takes a recording by path or URI; `fetching.local` brings it here."""
+    what = 'folder of a run or of a recording, one of its files, or the URI of either'
+    return typer.Argument(metavar=metavar, help=instead or what, autocompletion=recordings)
+
+
+RecordingPlace = Annotated[str, recording_argument()]
+RecordingPlaces = Annotated[list[str], recording_argument('RECORDING...')]
 NewFolder = Annotated[Path | None, typer.Option(help='folder to create; default: a new one in bags')]
 JsonFile = Annotated[
     Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')

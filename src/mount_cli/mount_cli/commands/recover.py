@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import RecordingPlace
+from mount_cli.fetching import beside, local
 from mount_cli.terminal import note, terminal
 
 INCOMPLETE = 3
@@ -26,14 +27,10 @@ recorder says of its own losses. A last chunk that was cut off is lost. The orig
 
 
 def recover(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            help='folder of a run or of a recording, or one of its files', autocompletion=recordings
-        ),
-    ],
+    recording: RecordingPlace,
     out: Annotated[
-        Path | None, typer.Option(help='folder of the new recording; default: beside it, `..._recovered`')
+        Path | None,
+        typer.Option(help='folder of the new recording; default: beside it, of a URI here, `..._recovered`'),
     ] = None,
 ) -> None:
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
@@ -42,7 +39,7 @@ def recover(
     from mount_cli.screen import progress_bar
 
     console = terminal()
-    source = recording_place(recording)
+    source = recording_place(local(recording, console))
     target = out if out is not None else _beside(source)
     with progress_bar(console, transient=True) as bar:
         task = bar.add_task('recovering', total=None)
@@ -56,4 +53,4 @@ def recover(
 
 def _beside(recording: Path) -> Path:
     whole = recording.absolute()
-    return whole.with_name(f'{whole.name if whole.is_dir() else whole.stem}_recovered')
+    return beside(recording) / f'{whole.name if whole.is_dir() else whole.stem}_recovered'

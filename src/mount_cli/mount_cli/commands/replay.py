@@ -6,8 +6,9 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from mount_cli.commands.options import Domain, JsonFile, NewFolder
-from mount_cli.completion.values import listed, named, recordings, setting
+from mount_cli.commands.options import Domain, JsonFile, NewFolder, recording_argument
+from mount_cli.completion.values import listed, named, setting
+from mount_cli.fetching import local
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when the setpoints are those recorded, or something was changed on purpose; 1 when
@@ -29,10 +30,9 @@ Examples:
 
 def replay(
     recording: Annotated[
-        Path,
-        typer.Argument(
-            help='folder of a run or recording, or MCAP file; with --map CSV, NPY and JSON too',
-            autocompletion=recordings,
+        str,
+        recording_argument(
+            instead='folder of a run or recording, MCAP file, or its URI; with --map CSV, NPY and JSON too'
         ),
     ],
     core: Annotated[
@@ -112,7 +112,7 @@ def replay(
         if maps or table or out or json_file:
             raise typer.BadParameter('--live only shows; --map, --table, --out and --json do not go with it')
         order = LiveOrder(
-            recording,
+            local(recording, console),
             rate,
             start,
             topic_names,
@@ -132,7 +132,8 @@ def replay(
         raise typer.BadParameter('--scale and --offset go with --map')
     foreign = _foreign(maps, scale, offset) if maps else None
     mode = LOCKSTEP if lockstep else CORE
-    order = ReplayOrder(recording, mode, changes, table, foreign, out, chosen_domain(domain), mount)
+    place, table = local(recording, console), table and str(local(table, console))
+    order = ReplayOrder(place, mode, changes, table, foreign, out, chosen_domain(domain), mount)
     _replay(order, json_file, console)
 
 

@@ -6,7 +6,9 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import RecordingPlaces
+from mount_cli.completion.values import recordings as offered
+from mount_cli.fetching import beside, is_fetched, local
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the page is written, also about a damaged recording; 1 when nothing can be read
@@ -23,25 +25,22 @@ Examples:
 
 
 def report(
-    recordings: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar='RECORDING...',
-            help='folders of recordings or runs, or MCAP files',
-            autocompletion=recordings,
-        ),
-    ],
+    recordings: RecordingPlaces,
     other: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             '--compare',
             metavar='OTHER',
-            autocompletion=recordings,
+            autocompletion=offered,
             help='draw this one too and tell how it differs from the first',
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='the page; default: report.html in or beside the run')
+        Path | None,
+        typer.Option(
+            metavar='FILE',
+            help='the page; default: report.html in or beside the run, of a URI here',
+        ),
     ] = None,
     pictures: Annotated[
         Path | None,
@@ -56,18 +55,27 @@ def report(
     """
     from mount_bags.run.place import open_run
     from mount_cli.screen import TerminalScreen
-    from mount_report.pages import default_page, default_pictures, write_report
+    from mount_report.pages import default_pictures, write_report
 
     console = terminal()
-    opened = [part for path in recordings for part in open_run(path).by_mount()]
-    compared = None if other is None else open_run(other)
-    file = out or default_page(recordings[0])
+    places = [local(recording, console) for recording in recordings]
+    opened = [part for place in places for part in open_run(place).by_mount()]
+    compared = None if other is None else open_run(local(other, console))
+    file = out or _page(places[0])
     files = write_report(opened, compared, file, pictures or default_pictures(file), TerminalScreen(console))
     for recording in (*opened, *([compared] if compared else [])):
         for warning in recording.warnings:
             note(console, f'{recording.path}: {warning}')
     console.print(f'report     {file}', soft_wrap=True)
     console.print(_pictures_line(files), soft_wrap=True)
+
+
+def _page(recording: Path) -> Path:
+    from mount_report.pages import default_page
+
+    if is_fetched(recording):
+        return beside(recording) / f'{recording.name if recording.is_dir() else recording.stem}_report.html'
+    return default_page(recording)
 
 
 def _pictures_line(files: Sequence[Path]) -> str:

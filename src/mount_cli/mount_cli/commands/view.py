@@ -1,12 +1,11 @@
 """`engine-mount view` and `status`: what the graph does now, or a recording by the clock."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mount_cli.commands.options import Domain, JsonFile, Namespace
-from mount_cli.completion.values import recordings
+from mount_cli.commands.options import Domain, JsonFile, Namespace, recording_argument
+from mount_cli.fetching import local
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 after Ctrl-C; 1 when there is nothing to look at or a port is taken, with the reason.
@@ -38,9 +37,9 @@ _REFRESHES = 4  # a second, chosen
 
 def view(
     recording: Annotated[
-        Path | None,
-        typer.Argument(
-            help='folder of a run or of a recording; without: the running graph', autocompletion=recordings
+        str | None,
+        recording_argument(
+            instead='folder of a run or of a recording, or its URI; without: the running graph'
         ),
     ] = None,
     rate: Annotated[float, typer.Option(help='recording: speed against the clock')] = 1.0,
@@ -66,9 +65,8 @@ def view(
     console = terminal()
     if foxglove_port is None:
         foxglove_port = FOXGLOVE_PORT if host == ViewOrder().host else 0  # it asks for no token
-    order = ViewOrder(
-        recording, rate, begin, chosen_domain(domain), namespace, host, port, foxglove_port, beside
-    )
+    place = None if recording is None else local(recording, console)
+    order = ViewOrder(place, rate, begin, chosen_domain(domain), namespace, host, port, foxglove_port, beside)
     serve_view(order, lambda text: console.print(text, soft_wrap=True))
 
 

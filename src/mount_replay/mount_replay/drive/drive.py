@@ -2,7 +2,8 @@
 
 import contextlib
 import math
-from dataclasses import dataclass
+import tempfile
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
+from mount_replay.drive.brought import FOLDER, Brought, provenance, written
 from mount_replay.drive.happenings import Happenings, line
 from mount_replay.drive.preflight import preflight
 from mount_replay.drive.progress import DriveProgress
@@ -55,6 +57,7 @@ class DriveOrder:
     apart: bool = False  # in lock-step too every node has a process of its own
     composed: bool = False  # in real time driver, initialisation and control share one
     restart_limit: int = RESTART_LIMIT
+    brought: tuple[Brought, ...] = ()
 
     @property
     def mounts(self) -> tuple[str, ...]:
@@ -67,10 +70,13 @@ def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str
 
     Raises `Interrupted`, `GraphError` or a `ValueError` with the reason.
     """
-    excitation = preflight(order.parameters, core=order.mode == 'core')
-    for remark in excitation.notes:
+    with tempfile.TemporaryDirectory() as scratch:
+        tried = written(order.brought, order.parameters, Path(scratch))
+        excitation = preflight(tried, core=order.mode == 'core')
+    for remark in (*(note for each in order.brought for note in each.notes), *excitation.notes):
         screen.note(remark)
     folder = make_run_folder(order.out, order.scenario)
+    order = replace(order, parameters=written(order.brought, order.parameters, folder.path / FOLDER))
     complaints: list[str] = []
     if order.mode == 'core':
         return folder, _drive_in_core(order, excitation, folder, screen, complaints), complaints
@@ -239,7 +245,14 @@ def _grouping(order: DriveOrder) -> Grouping:
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
+    told = told_parameters(parameters)
+    content = {'scenario': order.scenario, 'mode': order.mode, 'parameters': told}
+    return session_text(new_session({**content, **provenance(order.brought)}))
+
+
+def told_parameters(parameters: Parameters) -> dict[str, dict[str, Any]]:
+    """Return the parameters as the session of a drive tells them."""
     told = {node: dict(values) for node, values in parameters.items()}
     # where these are not named, a recording is an older one
     told['mount_control'] = {'policy': DEFAULT, 'sample_rate': SAMPLE_RATE, **told.get('mount_control', {})}
-    return session_text(new_session({'scenario': order.scenario, 'mode': order.mode, 'parameters': told}))
+    return told

@@ -21,11 +21,6 @@ def lock_memory() -> bool:
     return _unlimited() and _c_library().mlockall(_CURRENT | _FUTURE | _ON_FAULT) == 0
 
 
-def unlock_memory() -> None:
-    """Let the system take pages away again."""
-    _c_library().munlockall()
-
-
 def _unlimited() -> bool:
     _, highest = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if highest == resource.RLIM_INFINITY:

@@ -57,6 +57,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         logger.warning(started_in_real_time(inherited))
     over.listen(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     _freeze()
+    real_time.keep_memory()
     services = [_Service(node, over) for node in nodes]
     over.wait(real_time, logger.warning)
     for node in nodes:

@@ -3,8 +3,8 @@
 The threads have it while a node is active, and behind them those that take turns with them: a thread that
 holds the interpreter and waits for a processor holds up the loop, whatever the loop's priority. (Sixteen
 threads wanted to run on two cores; the loop came up to 140 ms late beside an ordinary thread of its process,
-97 ms beside one of niceness -15, and 5 ms beside one in real time.) Meanwhile the memory of the process is
-kept in place (`locked_memory`).
+97 ms beside one of niceness -15, and 5 ms beside one in real time.) The memory of the process is kept in
+place from its start on (`locked_memory`).
 
 A watch gives the priority back, for all of them until an activation after 30 s or more, when
 
@@ -27,7 +27,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from mount_ros.nodes.locked_memory import lock_memory, unlock_memory
+from mount_ros.nodes.locked_memory import lock_memory
 from mount_ros.nodes.scheduling import Threads
 
 HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
@@ -87,7 +87,7 @@ class RealTime:
         self.given_back = ''
         """Why the priority was given back since the last activation, with value, limit and remedy."""
         self.memory_locked = False
-        """Whether the system may not take memory of this process away at present."""
+        """Whether the system may not take memory of this process away."""
         self._threads = threads or Threads()
         self._clock = clock
         self._watcher = self._threads.own
@@ -103,6 +103,13 @@ class RealTime:
         """The priority at which threads run at present; 0: none does."""
         return self.priority if self._held else 0
 
+    def keep_memory(self) -> None:
+        """Keep the process's memory in place if its loops will have a priority and the system permits it.
+
+        While nothing is active: all threads that want new memory wait for it, 14 ms on a quiet machine.
+        """
+        self.memory_locked = bool(self.priority) and lock_memory()
+
     def begin(self, loop: RealTimeLoop) -> None:
         """Give the threads of `loop` their priority, those too that it will make while it is active."""
         if not self.priority:
@@ -116,7 +123,6 @@ class RealTime:
             self._past.clear()
             bound(_WITHOUT_SLEEP, _LAST)
             self._give()
-            self._keep_memory(True)
 
     def end(self, loop: RealTimeLoop) -> None:
         """Take it back from the threads that no other active node of the process has in it."""
@@ -124,7 +130,6 @@ class RealTime:
             if loop in self._loops:
                 self._loops.remove(loop)
                 self._give()
-                self._keep_memory(bool(self._loops))
 
     def look(self) -> str:
         """Look after the priority, once per `WATCH_PERIOD`; return why it was just given back, if it was."""
@@ -148,7 +153,6 @@ class RealTime:
         with self._guard:
             self._loops.clear()
             self._give()
-            self._keep_memory(False)
 
     # What is held.
 
@@ -163,14 +167,6 @@ class RealTime:
         for number in self._held.keys() - wanted.keys():
             self._threads.run(number, 0)
         self._held = wanted
-
-    def _keep_memory(self, wanted: bool) -> None:
-        """Keep the process's memory in place, or no more; where that is not permitted nothing changes."""
-        if wanted and not self.memory_locked:
-            self.memory_locked = self.permitted and lock_memory()
-        elif self.memory_locked and not wanted:
-            unlock_memory()
-            self.memory_locked = False
 
     def _wanted(self) -> dict[int, int]:
         """Return {thread: priority}."""

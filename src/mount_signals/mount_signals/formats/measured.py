@@ -1,7 +1,7 @@
 """What any file of measured signals is read into: columns as the file holds them, none converted."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,11 @@ class Heading:
     number: int
     timed: bool = False
     date: bool = False
+
+    def measured(self, values: FloatArray, time: 'TimeBase | None' = None) -> 'MeasuredColumn':
+        """Return the column with its `values` (n,)."""
+        own = {field.name: getattr(self, field.name) for field in fields(Heading)}
+        return MeasuredColumn(**own, values=values, time=time)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

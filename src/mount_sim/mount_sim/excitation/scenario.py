@@ -4,13 +4,15 @@ from dataclasses import replace
 from typing import Annotated, NamedTuple, Protocol
 
 from mount_bags.signals.even_grid import EvenSignal
+from mount_models.arithmetic.series import StreamedSeries
 from mount_models.quantity import ParameterError, Quantity
 from mount_models.road import Gap, RandomRoad, Sweep
 from mount_sim.excitation import excitation
 from mount_sim.excitation.excitation import Excitation, Seat
+from mount_sim.excitation.measured_road import height_at, measured_height
 from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
 
-SCENARIO_NAMES = ('motorway', 'bench', 'sweep', 'recorded')
+SCENARIO_NAMES = ('motorway', 'bench', 'sweep', 'recorded', 'road')
 STEP_TIME = 5e-5  # s, chosen: step of the plant, 20 in each sample
 
 
@@ -121,6 +123,17 @@ class RecordedScenario(NamedTuple):
     scale: AccelerationScale = 1.0
 
 
+class RoadScenario(NamedTuple):
+    """A measured road: its height under the wheel over time, upwards."""
+
+    file: Annotated[
+        str,
+        Quantity(
+            'path', 'height (m) over time (s), as engine-mount drive --road makes it of a profile: NPY, CSV'
+        ),
+    ] = ''
+
+
 _DEFAULT_DURATION = 15.0  # s, chosen
 
 
@@ -147,6 +160,9 @@ class Scenarios(Protocol):
 
     @property
     def recorded(self) -> RecordedScenario: ...
+
+    @property
+    def road(self) -> RoadScenario: ...
 
     @property
     def idle(self) -> IdleForce: ...
@@ -197,6 +213,8 @@ def _scenario(scenarios: Scenarios) -> Excitation:
         return _sweep(scenarios)
     if scenarios.scenario == 'recorded':
         return _recorded(scenarios)
+    if scenarios.scenario == 'road':
+        return _road(scenarios)
     known = ', '.join(SCENARIO_NAMES)
     raise ParameterError(f'scenario {scenarios.scenario!r} is unknown; known are {known}')
 
@@ -252,13 +270,29 @@ def _recorded(scenarios: Scenarios) -> Excitation:
         )
     signal = recorded_signal(recorded)
     values = acceleration_at(signal, recorded.scale, STEP_TIME)
-    if timeline.duration:
-        available = len(values) * STEP_TIME
-        if timeline.duration > available + 0.001:
-            raise ParameterError(
-                f'duration ({timeline.duration:g} s) is longer than the recording {signal.name} '
-                f'({available:.3f} s); ask for at most that'
-            )
-        values = values.cut(round(timeline.duration / STEP_TIME))
+    values = _cut(values, timeline.duration, f'the recording {signal.name}')
     notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
     return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, timeline.start, notes=notes)
+
+
+def _road(scenarios: Scenarios) -> Excitation:
+    timeline, file = scenarios.timeline, scenarios.road.file
+    if not file:
+        raise ParameterError(
+            'scenario road needs a measured road: engine-mount drive --road PROFILE --speed 60/3.6, or '
+            'road.file'
+        )
+    signal = measured_height(file)
+    values = _cut(height_at(signal, STEP_TIME), timeline.duration, f'the road {signal.name}')
+    notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
+    return Excitation(Seat.VEHICLE, values, STEP_TIME, timeline.start, notes=notes)
+
+
+def _cut(values: StreamedSeries, duration: float, what: str) -> StreamedSeries:
+    """Return the first `duration` (s) of `values`, all of them for 0; raises where there are not so many."""
+    available = len(values) * STEP_TIME
+    if duration > available + 0.001:
+        raise ParameterError(
+            f'duration ({duration:g} s) is longer than {what} ({available:.3f} s); ask for at most that'
+        )
+    return values.cut(round(duration / STEP_TIME)) if duration else values

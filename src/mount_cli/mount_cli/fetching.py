@@ -1,0 +1,33 @@
+"""Recordings that a command is given by URI, brought onto this machine; paths stay what they are."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from mount_signals.sources.uris import is_uri, shown
+
+
+def local(recording: str, console: Console) -> Path:
+    """Return where a recording lies: a URI is fetched whole, with a bar; raises `SourceError`."""
+    if not is_uri(recording):
+        return Path(recording)
+    from mount_cli.screen import progress_bar
+    from mount_signals.sources.stores import fetched
+
+    with progress_bar(console, transient=True) as bar:
+        task = bar.add_task(f'fetching {shown(recording)}', total=None)
+        return fetched(recording, tell=lambda done, of: bar.update(task, completed=done, total=of))
+
+
+def beside(recording: Path) -> Path:
+    """Return the folder for what is made of a recording: where it lies, if fetched the current one."""
+    if is_fetched(recording):
+        return Path.cwd()
+    return recording.absolute().parent
+
+
+def is_fetched(recording: Path) -> bool:
+    """Return whether a path is a copy that was fetched by URI, or lies in one."""
+    from mount_signals.sources.stores import uri_of
+
+    return bool(uri_of(recording))

@@ -1,0 +1,1 @@
+"""Formats that nest: arrays by their paths, whatever file they come from."""

@@ -1,0 +1,1 @@
+"""Roads: height over distance from files of others, their class, and drives over them."""
