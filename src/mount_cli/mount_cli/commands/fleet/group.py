@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from mount_cli.commands.fleet import example, index
+from mount_cli.commands.fleet import example, index, query, replay, report, worst
 from mount_cli.help import Command, Group
 
 app = typer.Typer(
@@ -17,6 +17,10 @@ app = typer.Typer(
 
 _COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (
     ('index', index.index, index.EPILOG),
+    ('replay', replay.replay, replay.EPILOG),
+    ('query', query.query, query.EPILOG),
+    ('worst', worst.worst, worst.EPILOG),
+    ('report', report.report, report.EPILOG),
     ('example', example.example, example.EPILOG),
 )
 """Name, function and epilog of each sub-command."""
