@@ -32,7 +32,7 @@ def mapped(path: Path) -> mmap.mmap:
 
 
 def unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:
-    """Unpack what is packed as `suffix` says, as far as the packed bytes go; what is cut off there is missing here."""
+    """Unpack `source`, packed as `suffix` says; what is cut off there is missing in `target`."""
     try:
         if suffix == '.lz4':
             import lz4.frame

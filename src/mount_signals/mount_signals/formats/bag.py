@@ -69,12 +69,12 @@ class Bag:
         """Yield topic, field and unit of all numbers, by the first message of each topic."""
         for topic in self._recording:
             try:
-                series = self._recording.beginning(topic)
-                names = series.names
+                series = next(self._recording.parts([topic], 1), None)
+                names = () if series is None else series.names
             except SeriesError:
                 continue
             for field in names:
-                if not field.startswith(_STAMP):
+                if series is not None and not field.startswith(_STAMP):
                     yield topic, field, series.unit(field) or _unit(series.type, field)
 
 

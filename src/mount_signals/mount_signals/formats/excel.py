@@ -113,7 +113,7 @@ class Workbook:
 
     def _numbers(self, sheet: _Sheet, place: int) -> Iterator[float]:
         for number, row in enumerate(sheet.rows, sheet.first):
-            cell = row[place] if place < len(row) else None
+            cell: Any = row[place] if place < len(row) else None
             if _is_number(cell):
                 yield float(cell)
             elif _is_date(cell):

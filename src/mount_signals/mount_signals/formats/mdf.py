@@ -23,7 +23,8 @@ class Mdf:
 
     def __init__(self, path: Path, stated: Stated):
         asammdf = required('asammdf', 'reading MDF files')
-        self.format, self.reader, self.notes = 'MDF', 'asammdf', []
+        self.format, self.reader = 'MDF', 'asammdf'
+        self.notes: list[str] = []
         self._path = path
         with reading(path, 'MDF file'):
             self._file = asammdf.MDF(path, raise_on_multiple_occurrences=False)

@@ -197,8 +197,8 @@ def _missing(columns: list[MeasuredColumn]) -> Iterator[str]:
 def _hashed(path: Path) -> tuple[str, int]:
     """Return SHA-256 and size in bytes of a file, or of a folder as `Provenance` says."""
     if path.is_file():
-        with path.open('rb') as file:
-            return hashlib.file_digest(file, 'sha256').hexdigest(), path.stat().st_size
+        with path.open('rb') as stream:
+            return hashlib.file_digest(stream, 'sha256').hexdigest(), path.stat().st_size
     whole, size = hashlib.sha256(), 0
     for file in sorted(one for one in path.rglob('*') if one.is_file()):
         digest, bytes_of_file = _hashed(file)
