@@ -39,7 +39,6 @@ LIBRARIES = {
     'numpy': Library('numpy', 'python3-numpy'),
     'openpyxl': Library('openpyxl', 'python3-openpyxl'),
     'PIL': Library('pillow', 'python3-pil'),
-    'pint': Library('pint'),
     'pyarrow': Library('pyarrow'),
     'pytest': Library('pytest', 'python3-pytest'),
     'rich': Library('rich', 'python3-rich'),
