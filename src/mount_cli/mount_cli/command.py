@@ -25,6 +25,7 @@ from mount_cli.commands import (
     recover,
     replay,
     report,
+    road,
     version,
     view,
 )
@@ -102,6 +103,7 @@ for _panel, _name, _function, _epilog in _COMMANDS:
     app.command(name=_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
 app.add_typer(identify.app, rich_help_panel=_MOUNT)
+app.add_typer(road.app, rich_help_panel=_RECORDINGS)
 
 
 def main(arguments: list[str] | None = None) -> None:
