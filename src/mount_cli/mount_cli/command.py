@@ -29,6 +29,7 @@ from mount_cli.commands import (
     version,
     view,
 )
+from mount_cli.commands.fleet import group as fleet
 from mount_cli.commands.identify_arguments import with_repeated_options
 from mount_cli.help import Command, Group
 from mount_cli.terminal import refuse, terminal
@@ -101,6 +102,7 @@ _COMMANDS: tuple[tuple[str, str, Callable[..., None], str | None], ...] = (
 
 for _panel, _name, _function, _epilog in _COMMANDS:
     app.command(name=_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
+app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
 app.add_typer(identify.app, rich_help_panel=_MOUNT)
 app.add_typer(road.app, rich_help_panel=_RECORDINGS)

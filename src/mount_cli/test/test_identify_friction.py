@@ -14,6 +14,7 @@ from mount_cli.commands.identify_arguments import with_repeated_options
 from mount_experiments.harness.rack_recording import record_friction_rack
 from mount_identification.friction import ladder
 from mount_identification.friction.files import parsed_channels, read_recording
+from mount_identification.friction.looks.force_zero import zeroed
 from mount_identification.friction.recording import IdentificationError
 from mount_identification.rack.recordings import described
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
@@ -270,7 +271,11 @@ def rig_file(folder):
 
 
 def test_the_damper_json_is_converted_to_si_and_its_force_zero_removed(tmp_path):
-    read = read_recording(rig_file(tmp_path))
+    read, look = zeroed(read_recording(rig_file(tmp_path)), 'rest')
+    by_law, _ = zeroed(read_recording(rig_file(tmp_path)))
+    assert by_law.force[:400] == pytest.approx(0.0, abs=40.0)  # of +- 8896 N
+    assert 'from the loop; the rest before the motion agrees' in by_law.notes[-1]
+    assert abs(look.zero) < 40.0
     assert read.displacement.max() == pytest.approx(0.0254, rel=1e-3)
     assert read.force.max() == pytest.approx(2 * 4448.2216, rel=1e-6)
     assert read.force[:400] == pytest.approx(0.0, abs=1e-6)
@@ -283,7 +288,7 @@ def test_the_measured_damper_is_predicted_at_another_clamp():
     from mount_identification.friction.ladder import fit_ladder
     from mount_identification.friction.laws.elastic_play import ElasticPlay
 
-    first, second = (read_recording(RIG / name) for name in (
+    first, second = (zeroed(read_recording(RIG / name))[0] for name in (
         'ds1_1Hz80lbtension.json', 'ds2_0.5Hz36lbtension0.5amplitude.json'))  # fmt: skip
     (rung,) = fit_ladder([first], [second], laws=[ElasticPlay()])
     assert rung.held_out_error < 0.20

@@ -11,7 +11,8 @@ import numpy as np
 
 from mount_identification.actuator.fit import ForceLawFit
 from mount_identification.coil.gap_calibration import CurveFit, GapCalibration
-from mount_identification.friction.identify import Identification, chosen_fit
+from mount_identification.friction.found import Identification, chosen_fit
+from mount_identification.friction.recording import IdentificationError
 from mount_identification.rack.columns import RackRecordingError
 from mount_identification.rack.recordings import described
 from mount_models.coil.temperature import TemperatureCompensation
@@ -90,11 +91,15 @@ def with_gap_curves(
 def with_friction(base: Specimen, name: str, found: Identification) -> Specimen:
     """Return `base` under `name` with the identified contact and coefficients; raises `SpecimenError`.
 
-    Raises `IdentificationError` where the recordings did not give both.
+    Raises `IdentificationError` where the recordings did not give both, or one of them tells no coefficient.
     """
-    from mount_identification.friction.ramp_hold import mean_covariance
+    from mount_identification.friction.steps.ramp_hold import mean_covariance
 
     fit = chosen_fit(found)
+    if found.cases:
+        raise IdentificationError(
+            'no coefficient of friction is written: ' + '; '.join(case.sentence for case in found.cases)
+        )
     assert found.contact is not None  # or there were no lines, and no fit
     speeds = [abs(line.velocity) for line in found.lines]
     covariance: dict[str, Any] = {', '.join(part.names): _matrix(part.covariance) for part in fit.covariances}

@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from mount_identification.friction.coefficient_fit import fit_coefficients
 from mount_identification.friction.kind import RAMP, SAWTOOTH, recognised
 from mount_identification.friction.ladder import best_rung, fit_ladder, law_error
 from mount_identification.friction.laws.coulomb import Coulomb
 from mount_identification.friction.laws.dahl import Dahl
 from mount_identification.friction.laws.elastic_play import ElasticPlay
-from mount_identification.friction.ramp_hold import fit_ramp_hold, ramp_response
 from mount_identification.friction.recording import IdentificationError, checked_recording
-from mount_identification.friction.sawtooth import stroke_lines
+from mount_identification.friction.steps.coefficient_fit import fit_coefficients
+from mount_identification.friction.steps.ramp_hold import fit_ramp_hold
+from mount_identification.friction.steps.ramp_response import ramp_response
+from mount_identification.friction.steps.sawtooth import stroke_lines
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_response

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mount_identification.friction.ramp_hold import contact_of_response, printed_formulas
-from mount_identification.friction.relaxation import fit_relaxation
+from mount_identification.friction.steps.ramp_response import contact_of_response, printed_formulas
+from mount_identification.friction.steps.relaxation import fit_relaxation
 from mount_models.friction.contact import FrictionContact
 
 C_RE, C_R, D_R, P = 4.0e6, 1.0e7, 5.0e6, 2.0e6

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mount_identification.friction.recording import checked_recording
-from mount_identification.friction.sawtooth import stroke_lines
-from mount_identification.friction.slip_regions import slip_regions
+from mount_identification.friction.steps.sawtooth import stroke_lines
+from mount_identification.friction.steps.slip_regions import slip_regions
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_response

@@ -107,23 +107,50 @@ def run_control(
 
     `changes` of its parameters act from the sample of their stamp on.
     """
-    begun = changed(parameters, [change for change in changes if change.time <= run.stamps[0]])
-    later = _changed_later(run, begun, [change for change in changes if change.time > run.stamps[0]])
-    answering = answering_from(gap, begun, activation_before(run))
-    answers = answering.answer_many(run.stamps, run.displacement, later)
-    counts, refusal = answering.watch.counts, answering.refusal
-    return ControlAnswers(
-        run.stamps, answers.currents, answers.traced, answers.traces, counts, refusal and f'0 A: {refusal}'
-    )
+    return ControlReplay(int(run.stamps[0]), gap, parameters, changes).answer(run.stamps, run.displacement)
 
 
-def activation_before(run: ControlRun) -> int:
-    """Return the stamp (ns) by which a run is activated: 1 ms before its first sample.
+class ControlReplay:
+    """mount_control in one run, whose samples come in parts: the answers are those to all at once."""
+
+    def __init__(
+        self,
+        first: int,
+        gap: MeasuredGap,
+        parameters: Parameters,
+        changes: Sequence[ParametersChanged] = (),
+    ):
+        """Activate with `gap` before the sample of stamp `first` (ns); `changes` as for `run_control`."""
+        self._begun = changed(parameters, [change for change in changes if change.time <= first])
+        self._later = [change for change in changes if change.time > first]
+        self._made = 0
+        self._answering = answering_from(gap, self._begun, activation_before(first))
+
+    def answer(self, stamps: Times, displacement: Column) -> ControlAnswers:
+        """Return the answers to the samples that follow (ns, m); counts and refusal are those until now."""
+        answers = self._answering.answer_many(stamps, displacement, self._changed_in(stamps))
+        counts, refusal = self._answering.watch.counts, self._answering.refusal
+        refusal = refusal and f'0 A: {refusal}'
+        return ControlAnswers(stamps, answers.currents, answers.traced, answers.traces, counts, refusal)
+
+    def _changed_in(self, stamps: Times) -> dict[int, list[ControlSettings]]:
+        """Return the settings by the places of the samples that are the first to be answered by them."""
+        found: dict[int, list[ControlSettings]] = {}
+        while self._made < len(self._later) and self._later[self._made].time <= stamps[-1]:
+            place = int(np.searchsorted(stamps, self._later[self._made].time))
+            self._made += 1
+            settings = chosen_control(changed(self._begun, self._later[: self._made]))
+            found.setdefault(place, []).append(settings)
+        return found
+
+
+def activation_before(first: int) -> int:
+    """Return the stamp (ns) by which a run is activated: 1 ms before its `first` sample (ns).
 
     The recording may begin long after the activation; the controller asks whether the measurements went on
     from there without a break.
     """
-    return int(run.stamps[0]) - SAMPLE_TIME_NS
+    return first - SAMPLE_TIME_NS
 
 
 def answering_from(gap: MeasuredGap, parameters: Parameters, activation: int) -> Answering:
@@ -133,15 +160,3 @@ def answering_from(gap: MeasuredGap, parameters: Parameters, activation: int) ->
     answering.watch.note(activation)
     answering.begin(settings, table, activation)
     return answering
-
-
-def _changed_later(
-    run: ControlRun, parameters: Parameters, changes: Sequence[ParametersChanged]
-) -> dict[int, list[ControlSettings]]:
-    """Return the settings by the places of the samples that are the first to be answered by them."""
-    later: dict[int, list[ControlSettings]] = {}
-    for count, change in enumerate(changes, 1):
-        place = int(np.searchsorted(run.stamps, change.time))
-        if place < len(run.stamps):
-            later.setdefault(place, []).append(chosen_control(changed(parameters, changes[:count])))
-    return later

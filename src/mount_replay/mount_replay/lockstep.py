@@ -126,7 +126,7 @@ class _Player:
             dialogue = _Dialogue(send, run.stamps, messages)
             path.subscribe(topics.CURRENT_SETPOINT, dialogue.take_setpoint)
             path.subscribe(topics.CONTROL_TRACE, dialogue.take_trace)
-            stamp = activation_before(run)
+            stamp = activation_before(int(run.stamps[0]))
             gap_layout = ScalarsLayout(topics.AIR_GAP)
             table = np.stack([gap.table.current, gap.table.normal_force])
             send_gap, send_table = path.sender(topics.AIR_GAP), path.sender(topics.CURRENT_FORCE_TABLE)

@@ -195,13 +195,14 @@ def _load_displacement(recording: Recording) -> float:
 def _changed(given: ReplayInput, order: ReplayOrder) -> dict[str, dict[str, Any]]:
     changes = order.changes
     if order.foreign is None:
-        _refuse_other_rate(given.parameters, changes)
+        refuse_other_rate(given.parameters, changes)
     if 'mount_init' in changes and not any(part not in given.controls for part in given.parts):
         raise ReplayError('there is no initialisation to replay, so parameters of mount_init change nothing')
     return with_changes(given.parameters, changes)
 
 
-def _refuse_other_rate(recorded: Parameters, changes: Mapping[str, Mapping[str, Any]]) -> None:
+def refuse_other_rate(recorded: Parameters, changes: Mapping[str, Mapping[str, Any]]) -> None:
+    """Raise `ReplayError` for another sample rate than the recorded one."""
     rate = control_parameters(recorded).sample_rate
     for node, values in changes.items():
         if values.get('sample_rate', rate) != rate:

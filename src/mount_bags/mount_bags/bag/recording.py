@@ -170,6 +170,28 @@ class Recording:
                 name, partial(self._payloads, name), head, columns={**known, **found}, stamps=stamps
             )
 
+    def parts(self, names: Iterable[str], size: int) -> Iterator[Series]:
+        """Yield the messages of topics in the order of the files; at most their ends have fewer than `size`.
+
+        In memory are no more than that of each topic. Raises `ReadingError`.
+        """
+        waiting: dict[str, list[StoredMessages]] = {self.resolve(name): [] for name in names}
+        counts = dict.fromkeys(waiting, 0)
+        for name, block in self._blocks(list(waiting)):
+            waiting[name].append(block)
+            counts[name] += len(block)
+            if sum(map(len, waiting[name])) >= size:
+                yield self._part(name, waiting[name])
+                waiting[name] = []
+        for name, blocks in waiting.items():
+            self._note_damage(name, counts[name])
+            if blocks:
+                yield self._part(name, blocks)
+
+    def axis_from(self, first: Series) -> TimeAxis:
+        """Return the time axis by the first messages of its topic alone, as they come from `parts`."""
+        return self._axis_of({first.topic: first}.__getitem__)
+
     def latched(self, name: str) -> Any:
         """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
         series = self[name]
@@ -291,8 +313,11 @@ class Recording:
         return {name: self._series_of(name, found) for name, found in blocks.items()}
 
     def _series_of(self, name: str, blocks: list[StoredMessages]) -> Series:
+        self._note_damage(name, sum(map(len, blocks)))
+        return self._part(name, blocks)
+
+    def _part(self, name: str, blocks: list[StoredMessages]) -> Series:
         head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, HEAD)
-        self._note_damage(name, len(head))
         return self._made(name, Payloads([block.payloads() for block in blocks]), head)
 
     def _is_loaded(self, name: str) -> bool:

@@ -47,14 +47,15 @@ def cut(
     begin: float | None = None,
     end: float | None = None,
     reason: str = '',
+    made: str = '',
 ) -> Cut:
     """Write what was logged from `begin` on and before `end` to the new recording `out`.
 
     Times are in s on the time axis of `recording`, which the piece keeps; None is its beginning, or its end
     with the last message. Messages keep their bytes, log and publish times. Of latched topics and of `event`
     the last message before `begin` comes with it, and so do attachments and metadata. What the recorder lost
-    is told of the piece too: when that was is not known. `reason` goes into the note of origin. Raises
-    `CutError`.
+    is told of the piece too: when that was is not known. `reason` and `made`, the time of the cut
+    (by default now), go into the note of origin. Raises `CutError`.
     """
     span = _checked_span(recording, recording.time_axis, begin, end)
     parts, losses, carried, read = [], [], 0, {}
@@ -69,7 +70,7 @@ def cut(
     if not count:
         raise CutError(f'{recording.path} has no message {span}; it ends at {span.whole:.3f} s')
     distro = recording.information.ros_distro if recording.information else ''
-    custom = with_step([recording.information], _step(recording, span, reason))
+    custom = with_step([recording.information], _step(recording, span, reason, made or time_text()))
     write_messages(out, parts, [recording], sources_of(recording, read), custom, distro)
     losses += [f'{name} is lost by damage' for name in lost_beside_messages([recording])]
     return Cut(Path(out), span.begin, span.end, count, carried, tuple(losses))
@@ -139,13 +140,13 @@ def _carried(topic: TopicInformation) -> slice:
     return _NONE
 
 
-def _step(recording: Recording, span: _Span, reason: str) -> dict[str, Any]:
+def _step(recording: Recording, span: _Span, reason: str, made: str) -> dict[str, Any]:
     return {
         'did': 'cut',
         'recording': recording.short_name,
         'from_s': span.begin,
         'to_s': span.end,
         ZERO_KEY: span.zero,
-        'made': time_text(),
+        'made': made,
         **({'reason': reason} if reason else {}),
     }

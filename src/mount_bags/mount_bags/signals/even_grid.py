@@ -12,6 +12,7 @@ bursts. So stamps are taken, in this order, as
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,24 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
         )
         return _checked(signal, first, period, values, lowest_rate, (note,))
     return _by_stamps(signal, rising, values[order], longest_gap, lowest_rate)
+
+
+def gaps(signal: Signal, longest_gap: float) -> NDArray[np.intp]:
+    """Return behind which samples of `signal` no next one comes for more than `longest_gap` (s).
+
+    Pauses between the bursts of a logger are none, as `evenly_spaced` sees them. Raises `SignalError` for
+    time that goes back.
+    """
+    _refuse_time_that_goes_back(signal)
+    steps = np.diff(signal.times)
+    certain = np.flatnonzero(steps > max(longest_gap, LONGEST_BURST))
+    edges = np.concatenate([[0], certain + 1, [signal.times.size]])
+    found = [certain]
+    for first, behind in pairwise(edges.tolist()):
+        places = first + np.flatnonzero(steps[first : behind - 1] > longest_gap)
+        if places.size and not _in_bursts(np.sort(signal.times[first:behind])):
+            found.append(places)
+    return np.sort(np.concatenate(found))
 
 
 def _refuse_time_that_goes_back(signal: Signal) -> None:

@@ -1,18 +1,15 @@
 """`engine-mount calibrate`: from rack recordings to the specimen file that init and control load."""
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
+from mount_cli.calibration.given import columns_of, given_ripple, orders_of, per_file, positive
+from mount_cli.calibration.written import write_results
 from mount_cli.help import Command, Group
 from mount_cli.terminal import note, terminal
-
-if TYPE_CHECKING:
-    from mount_models.specimen import Specimen
 
 app = typer.Typer(
     cls=Group,
@@ -105,11 +102,11 @@ def actuator(
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
-    given = GivenValues(_per_file(gaps or [], files, '--gap', 1e-6), {})
-    chosen_orders = _orders(orders)
+    given = GivenValues(per_file(gaps or [], files, '--gap', 1e-6), {})
+    chosen_orders = orders_of(orders)
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=None)
-        points = read_force(files, _columns(columns or []), given)
+        points = read_force(files, columns_of(columns or []), given)
         progress.update(task, description='fitting')
         fit = fit_force_law(
             points.gap,
@@ -139,25 +136,12 @@ def actuator(
         f'{law.gap_high * 1e6:.1f} um and 0 .. {law.current_high:.2f} A; refused beyond',
         soft_wrap=True,
     )
-    figures: dict[str, Any] = {
-        'specimen': specimen.name,
-        'parameters': {part: list(getattr(law, part)) for part in ('a1', 'a2', 'a3', 'a4', 'a5')},
-        'parameter_std': _split(fit.covariance.diagonal().clip(0.0) ** 0.5, chosen_orders),
-        'valid_gap_m': [law.gap_low, law.gap_high],
-        'valid_current_a': [0.0, law.current_high],
-        'points': fit.points,
-        'relative_rms': _known(fit.relative_rms),
-        'relative_worst': _known(fit.worst),
-        'rms_error_n': fit.rms_error,
-        'largest_error_n': fit.largest_error,
-        'rms_by_gap': [{'gap_m': g, 'rms_n': r} for g, r in zip(fit.gaps, fit.gap_rms, strict=True)],
-    }
     if figure is not None:
         from mount_identification.calibration_pictures import draw_force_law
 
         draw_force_law(points, law, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
-    _write(console, specimen, figures, json_file, out)
+    write_results(console, specimen, {'specimen': specimen.name, **fit.figures()}, json_file, out)
 
 
 @app.command(cls=Command, epilog=_INDUCTANCE_EPILOG)
@@ -208,17 +192,17 @@ def inductance(
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     order = GapOrder(
-        rest_current=_positive(rest_current, '--rest-current', 'A') or starting.rest_current,
-        crossing_inductance=1e-3 * (_positive(crossing_inductance, '--crossing-inductance', 'mH') or 0.0)
+        rest_current=positive(rest_current, '--rest-current', 'A') or starting.rest_current,
+        crossing_inductance=1e-3 * (positive(crossing_inductance, '--crossing-inductance', 'mH') or 0.0)
         or starting.crossing_inductance,
         coefficient=CONDUCTIVITY_COEFFICIENT if coefficient is None else coefficient,
         held_out=tuple(held_out or ()),
     )
-    area = _positive(turns_area, '--turns-area', 'm^2') or starting.turns_area
-    given = _given_ripple(files, gaps or [], temperatures or [])
+    area = positive(turns_area, '--turns-area', 'm^2') or starting.turns_area
+    given = given_ripple(files, gaps or [], temperatures or [])
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=2)
-        recordings = read_ripple(files, _columns(columns or []), given, area)
+        recordings = read_ripple(files, columns_of(columns or []), given, area)
         progress.update(task, description='fitting', completed=1)
         result = calibrate_inductance(recordings, starting.force_law, order)
         progress.update(task, completed=2)
@@ -229,7 +213,7 @@ def inductance(
         rest_current=order.rest_current,
         crossing_inductance=order.crossing_inductance,
         bridge=starting.bridge._replace(
-            link_voltage=_positive(supply, '--supply', 'V') or starting.bridge.link_voltage
+            link_voltage=positive(supply, '--supply', 'V') or starting.bridge.link_voltage
         ),
     )
     specimen = with_gap_curves(
@@ -247,7 +231,7 @@ def inductance(
 
         draw_gap_curves(result, order, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
-    _write(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)
+    write_results(console, specimen, {'specimen': specimen.name, **result.figures()}, json_file, out)
 
 
 @app.command(cls=Command, epilog=_RACK_EPILOG)
@@ -289,121 +273,3 @@ def rack(
 
 
 _FLOOR = 0.006  # chosen: weights as 2 N of 330 N
-
-
-def _orders(text: str) -> tuple[int, int, int, int, int]:
-    parts = text.replace(' ', '').split(',')
-    if len(parts) != 5 or not all(part.isdigit() for part in parts):
-        raise typer.BadParameter(f'--orders {text}: write five numbers, as in 4,4,4,2,4')
-    a, b, c, d, e = (int(part) for part in parts)
-    return a, b, c, d, e
-
-
-def _columns(settings: list[str]) -> dict[str, str]:
-    chosen = {}
-    for setting in settings:
-        name, equals, header = setting.partition('=')
-        if not (equals and name and header):
-            raise typer.BadParameter(f'--column {setting}: write NAME=HEADER:UNIT, as in gap=Spalt:um')
-        if name not in _CHANNELS:
-            raise typer.BadParameter(f'--column {setting}: {name!r} is none of {", ".join(_CHANNELS)}')
-        chosen[name] = header
-    return chosen
-
-
-_CHANNELS = ('gap', 'current', 'force', 'inductance', 'current_rate', 'flux_rate', 'coil_temperature')
-
-
-def _per_file(settings: list[str], files: list[Path], option: str, factor: float) -> dict[Path, float]:
-    """Return {file: value} of FILE=VALUE settings; files are meant by path or by name."""
-    values = {}
-    for setting in settings:
-        named, equals, text = setting.rpartition('=')
-        meant = [file for file in files if str(file) == named or file.name == named]
-        if not equals or len(meant) != 1:
-            what = 'no file' if not meant else f'{len(meant)} files'
-            raise typer.BadParameter(
-                f'{option} {setting}: {named!r} is {what} of those given; write FILE=VALUE'
-            )
-        values[meant[0]] = _number(text, f'{option} {setting}') * factor
-    for file, value in values.items():
-        if option == '--gap' and not 20e-6 <= value <= 5e-3:
-            guess = '; was it meant in mm?' if 20e-6 <= value * 1e3 <= 5e-3 else ''
-            raise typer.BadParameter(
-                f'--gap {file.name}={value / factor:g}: an air gap must lie within 20 .. 5000 um{guess}'
-            )
-    return values
-
-
-def _given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) -> Any:
-    from mount_identification.rack.recordings import GivenValues
-
-    single = [setting for setting in temperatures if '=' in setting]
-    common = [_number(text, f'--coil-temperature {text}') for text in temperatures if '=' not in text]
-    if len(common) > 1:
-        raise typer.BadParameter('--coil-temperature without FILE= holds for all files: give it once')
-    celsius = _per_file(single, files, '--coil-temperature', 1.0)
-    for value in (*celsius.values(), *common):
-        if not -60.0 <= value <= 250.0:
-            raise typer.BadParameter(
-                f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
-            )
-    return GivenValues(_per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None)
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise typer.BadParameter(f'{where}: {text!r} is no number')
-    return value
-
-
-def _positive(value: float | None, option: str, unit: str) -> float | None:
-    if value is not None and not (math.isfinite(value) and value > 0.0):
-        raise typer.BadParameter(f'{option} ({value:g} {unit}) must be above 0')
-    return value
-
-
-def _split(values: Any, orders: tuple[int, ...]) -> dict[str, list[float]]:
-    parts, start = {}, 0
-    for number, order in enumerate(orders, 1):
-        parts[f'a{number}'] = [float(value) for value in values[start : start + order]]
-        start += order
-    return parts
-
-
-def _known(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _write(
-    console: Console, specimen: 'Specimen', figures: dict[str, Any], json_file: Path | None, out: Path | None
-) -> None:
-    """Write figures and specimen where they are wanted, and say which parts are of other specimens."""
-    from mount_identification.specimen import foreign_parts
-    from mount_models.specimen import save_specimen
-    from mount_report.json_file import write_json
-
-    if json_file is not None:
-        write_json(figures, json_file)
-    if out is not None:
-        save_specimen(specimen, out)
-        console.print(f'specimen   {out}', soft_wrap=True)
-    note_foreign(console, foreign_parts(specimen), specimen.name)
-
-
-def note_foreign(console: Console, parts: list[str], name: str) -> None:
-    command = {
-        'force_law': 'calibrate actuator',
-        'gap_curves': 'calibrate inductance',
-        'friction': 'identify friction',
-    }
-    for part in parts:
-        note(
-            console,
-            f'{part} is not yet that of {name!r} but of its base; run engine-mount {command[part]} with this '
-            'file as --base',
-        )

@@ -1,18 +1,13 @@
 """`engine-mount identify`: from recordings of a rack to parameters."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from mount_cli.completion.values import recordings
 from mount_cli.help import Command, Group
-from mount_cli.terminal import note, terminal
-
-if TYPE_CHECKING:
-    from mount_identification.friction.identify import Identification
+from mount_cli.terminal import terminal
 
 app = typer.Typer(
     cls=Group,
@@ -64,6 +59,13 @@ def friction(
         str,
         typer.Option(help="JSON: normal force from the band's pull while sliding, at rest, or none"),
     ] = 'sliding',
+    zero: Annotated[
+        str,
+        typer.Option(
+            help='zero of the force: law (from the loop), rest (before the motion), recorded; default: law for '
+            'JSON of a damper, else recorded'
+        ),
+    ] = '',
     seed: Annotated[int, typer.Option(help='seed of the starts of the searches')] = 0,
     json_file: Annotated[
         Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
@@ -80,10 +82,13 @@ def friction(
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
-    from mount_cli.commands.calibrate import note_foreign
+    from mount_cli.calibration.friction_screen import print_friction
+    from mount_cli.calibration.written import note_foreign
     from mount_cli.screen import progress_bar
+    from mount_identification.friction.figures import figures
     from mount_identification.friction.files import parsed_channels
-    from mount_identification.friction.identify import IdentifyOrder, figures, identify
+    from mount_identification.friction.found import IdentifyOrder
+    from mount_identification.friction.identify import identify
     from mount_identification.specimen import check_targets, foreign_parts, with_friction
     from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
     from mount_report.json_file import write_json
@@ -92,14 +97,14 @@ def friction(
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     order = IdentifyOrder(
-        train or [], held_out or [], file or [], step, clamp, parsed_channels(channel or []), seed,
+        train or [], held_out or [], file or [], step, clamp, zero, parsed_channels(channel or []), seed,
         friction_contact(starting.friction),
     )  # fmt: skip
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
         found = identify(order, lambda law, share: progress.update(task, description=law, completed=share))
     specimen = with_friction(starting, name, found) if out is not None else None
-    _print(found, console)
+    print_friction(found, console)
     if figure is not None:
         from mount_identification.friction.picture import draw_identification
 
@@ -193,91 +198,3 @@ def drift(
         ),
         soft_wrap=True,
     )
-
-
-def _print(found: 'Identification', console: Console) -> None:
-    from mount_identification.friction.identify import chosen_fit, figures
-
-    for sentence in found.notes:
-        note(console, sentence)
-    result = figures(found)
-    if found.ramps:
-        console.print(_step_1(result['step_1']))
-    if found.coefficients is not None:
-        fit = chosen_fit(found)
-        console.print(
-            f'steps 2, 3: {len(found.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} (a) '
-            f'and {fit.b_rms_mm:.2f} 1/mm (b) rms',
-            soft_wrap=True,
-        )
-        for variant, values in result['variants'].items():
-            if values['held_out_error'] is not None:
-                console.print(
-                    f'  form of b: {variant}: {_percent(values["held_out_error"])} held out',
-                    soft_wrap=True,
-                )
-    for each in result.get('validation', []):
-        console.print(
-            f'held out {each["recording"]}: full model {_percent(each["full_error"])}, simplified '
-            f'{_percent(each["simplified_error"])}; macroslip {_percent(each["full_macroslip_error"])}, '
-            f'{_percent(each["simplified_macroslip_error"])}',
-            soft_wrap=True,
-        )
-    if 'pairs' in result:
-        console.print(_pairs(result['pairs']))
-    if 'ladder' in result:
-        console.print(_ladder(result['ladder']))
-        console.print(f'best: {result["best"]}', soft_wrap=True)
-
-
-def _step_1(ramps: list[dict]) -> Table:
-    table = Table('step 1', 'c_Re (N/m)', 'c_R (N/m)', 'd_R (N s/m)', 'p (N/m)', 'T (s)')
-    for each in ramps:
-        contact, spread, printed = each['contact'], each['deviation'], each['printed']
-        table.add_row(
-            each['recording'],
-            *(
-                f'{contact[name]:.4g} ± {spread[name]:.1g}'
-                for name in ('contact_stiffness', 'tangential_stiffness', 'tangential_damping')
-            ),
-            f'{each["machine_stiffness"]:.4g}',
-            f'{each["time_constant"]:.4f}',
-        )
-        with_p, without = (printed[f'tangential_stiffness_c_xi_{which}'] for which in ('with_p', 'without_p'))
-        table.add_row(
-            '  Eqs (10), (11) as printed',
-            _printed(printed['contact_stiffness']),
-            f'{_printed(with_p)}, {_printed(without)} (c_xi with, without p)',
-            _printed(printed['tangential_damping']),
-            style='dim',
-        )
-    return table
-
-
-def _printed(entry: dict[str, float]) -> str:
-    return f'{entry["value"]:.4g} ({100 * entry["error"]:+.1f} %)'
-
-
-def _pairs(pairs: list[dict]) -> Table:
-    names = list(dict.fromkeys(pair['train'] for pair in pairs))
-    table = Table('held-out error', *(name for name in pairs[0]['ladder']))
-    table.caption = ', '.join(f'{number}: {name}' for number, name in enumerate(names, 1))
-    for pair in pairs:
-        table.add_row(
-            f'{names.index(pair["train"]) + 1} -> {names.index(pair["held_out"]) + 1}',
-            *(_percent(entry['held_out_error']) for entry in pair['ladder'].values()),
-        )
-    return table
-
-
-def _ladder(ladder: dict[str, dict]) -> Table:
-    table = Table('law', 'held out', 'training', 'parameters')
-    for name, entry in ladder.items():
-        first = next(iter(entry['parameters'].values()))
-        count = len(first) if isinstance(first, dict) else len(entry['parameters'])
-        table.add_row(name, _percent(entry['held_out_error']), _percent(entry['train_error']), str(count))
-    return table
-
-
-def _percent(value: float | None) -> str:
-    return '-' if value is None else f'{100 * value:.1f} %'

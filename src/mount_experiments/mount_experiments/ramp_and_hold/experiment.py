@@ -24,9 +24,9 @@ from mount_experiments.harness.rack_recording import (
 )
 from mount_experiments.ramp_and_hold import REFERENCE, TITLE
 from mount_identification.friction.files import read_recording
-from mount_identification.friction.ramp_hold import contact_of_response, printed_formulas
 from mount_identification.friction.recording import FloatArray, FrictionRecording
-from mount_identification.friction.relaxation import Relaxation, fit_relaxation
+from mount_identification.friction.steps.ramp_response import contact_of_response, printed_formulas
+from mount_identification.friction.steps.relaxation import Relaxation, fit_relaxation
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import Quantity, flattened

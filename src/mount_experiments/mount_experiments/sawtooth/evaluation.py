@@ -8,7 +8,7 @@ import numpy as np
 from mount_experiments.harness.rack_recording import SUBSTEPS
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.recording import FloatArray, FrictionRecording
-from mount_identification.friction.sawtooth import StrokeLine, deflection_from_force, stroke_lines
+from mount_identification.friction.steps.sawtooth import StrokeLine, deflection_from_force, stroke_lines
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_response

@@ -25,7 +25,7 @@ from mount_experiments.harness.rack_recording import (
 from mount_experiments.sawtooth import REFERENCE, TITLE
 from mount_experiments.sawtooth.evaluation import Run, evaluate
 from mount_identification.friction.recording import FloatArray
-from mount_identification.friction.slip_regions import slip_regions
+from mount_identification.friction.steps.slip_regions import slip_regions
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import FADED_BELOW

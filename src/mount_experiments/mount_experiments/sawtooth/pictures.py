@@ -7,7 +7,7 @@ from matplotlib.ticker import MaxNLocator
 
 from mount_experiments.harness.drawing import BLUE, GREY, RED, family, finish, new_figure
 from mount_experiments.sawtooth.evaluation import Run
-from mount_identification.friction.sawtooth import StrokeLine
+from mount_identification.friction.steps.sawtooth import StrokeLine
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 
 

@@ -1,9 +1,6 @@
 """Many runs of the closed loop side by side, each in a process of its own; nothing is recorded."""
 
-import multiprocessing
-import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -14,6 +11,7 @@ from mount_bringup.chosen import Parameters
 from mount_experiments.sweep.evaluation import peak_and_rms
 from mount_init.initialisation import InitialisationResult
 from mount_models.sampling import SAMPLE_TIME
+from mount_replay.fleet.runner import run_tasks
 from mount_replay.loop.messages import Samples
 from mount_replay.loop.run import run_core_into
 from mount_report.sections.periodic import harmonics, whole_periods
@@ -22,7 +20,6 @@ from mount_sim.plant.plant import TRUTH
 FloatArray = npt.NDArray[np.float64]
 J = TypeVar('J')
 
-_NICENESS = 10  # chosen: who works at the machine comes first
 _ORDERS = 8
 _PERIODS = 16
 
@@ -69,19 +66,13 @@ def run_all(
 
     `work` returns key and figures of one job, as `run_job` does.
     """
-    count = min(workers or len(os.sched_getaffinity(0)), len(jobs))
     found: dict[tuple[Any, ...], Any] = {}
-    # spawned, not forked: this process may hold threads of middleware and compiler
-    context = multiprocessing.get_context('spawn')
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=os.nice, initargs=(_NICENESS,))
-    try:
-        waiting = [pool.submit(work, job) for job in jobs]
-        for done in as_completed(waiting):
-            key, figures = done.result()
-            found[key] = figures
-            told(len(found))
-    finally:
-        pool.shutdown(cancel_futures=True)
+    for done in run_tasks(work, jobs, workers=workers):
+        if done.result is None:
+            raise done.error or ChildProcessError(done.reason)
+        key, figures = done.result
+        found[key] = figures
+        told(len(found))
     return found
 
 

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -49,6 +50,25 @@ class ForceLawFit:
     gap_rms: FloatArray
     covariance: FloatArray
     points: int
+    lowest_current: float
+
+    def figures(self) -> dict[str, Any]:
+        """Return parameters and errors for JSON, SI units; None where one is not known."""
+        law = self.law
+        parts = {part: list(getattr(law, part)) for part in ('a1', 'a2', 'a3', 'a4', 'a5')}
+        stds = iter(self.covariance.diagonal().clip(0.0) ** 0.5)
+        return {
+            'parameters': parts,
+            'parameter_std': {part: [float(next(stds)) for _ in values] for part, values in parts.items()},
+            'valid_gap_m': [law.gap_low, law.gap_high],
+            'valid_current_a': [0.0, law.current_high],
+            'points': self.points,
+            'relative_rms': _known(self.relative_rms),
+            'relative_worst': _known(self.worst),
+            'rms_error_n': self.rms_error,
+            'largest_error_n': self.largest_error,
+            'rms_by_gap': [{'gap_m': g, 'rms_n': r} for g, r in zip(self.gaps, self.gap_rms, strict=True)],
+        }
 
 
 @single_threaded
@@ -228,6 +248,10 @@ def _unmapping(domain: tuple[float, float], order: int) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
 def _judged(
     law: ForceLaw, gap: FloatArray, current: FloatArray, force: FloatArray, covariance: FloatArray
 ) -> ForceLawFit:
@@ -245,4 +269,5 @@ def _judged(
         gap_rms=np.array([np.sqrt(np.mean(error[group] ** 2)) for group in groups]),
         covariance=covariance,
         points=int(force.size),
+        lowest_current=float(current.min()),
     )

@@ -15,6 +15,7 @@ from mount_bags.signals.json_file import read_json
 from mount_bags.signals.table import Table
 from mount_identification.friction.recording import (
     COEFFICIENT_RANGE,
+    DIRECTION_SPREAD,
     FloatArray,
     FrictionRecording,
     IdentificationError,
@@ -37,7 +38,8 @@ _DESIRED = 'desired_displacement'
 _RIG_HEADER = ('time_s', 'displacement_in', 'friction_force_kip', 'velocity_in_per_s')
 _RIG_PULLS = ('actuator_1_lb', 'actuator_2_lb')
 _REST = 0.1  # s at the beginning
-_AT_REST = 0.01  # of the range of displacement
+_BAND_SPREAD = 0.8
+"""Deviation of ln(mu_p / mu_n) of a band whose taut ends are not told (chosen): it tightens itself."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,7 @@ def _rig(path: Path, channels: dict[str, Channel], clamp: str) -> FrictionRecord
     """Return a test of the measured friction damper: a band round a drum, an actuator pulls at either end.
 
     Columns: `_RIG_HEADER`, others by their number, and last `_RIG_PULLS`; `channels` may name others, by name
-    or number. The force's zero is that of the rest before the motion.
+    or number. The zero of its cell is not known; the loop tells it (`looks/force_zero.py`).
 
     What presses the band onto the drum is its tension. At rest that is the clamp that was set, but a band
     tightens itself while it slides: the taut end then carries the friction force, with a factor that depends
@@ -197,12 +199,6 @@ def _rig(path: Path, channels: dict[str, Channel], clamp: str) -> FrictionRecord
     time, displacement, force = columns['time'], columns['displacement'], columns['friction_force']
     notes = []
     quiet = time <= time[0] + _REST
-    if np.ptp(displacement[quiet]) <= _AT_REST * np.ptp(displacement):
-        zero = float(force[quiet].mean())
-        force = force - zero
-        notes.append(f'force zero {zero:.1f} N, from the {_REST:g} s of rest at the beginning')
-    else:
-        notes.append('force zero as recorded: there is no rest at the beginning')
     measured = columns.get('normal_force')
     if measured is None:
         pulls = UNITS['lb'] * table.columns(*map(table.place, _RIG_PULLS)).T
@@ -211,7 +207,7 @@ def _rig(path: Path, channels: dict[str, Channel], clamp: str) -> FrictionRecord
             f'normal force ({clamp}): {normal[0]:.0f} N to the positive, {normal[1]:.0f} N to the negative '
             'side'
         )
-    return checked_recording(
+    recording = checked_recording(
         path.stem,
         time,
         displacement,
@@ -220,6 +216,11 @@ def _rig(path: Path, channels: dict[str, Channel], clamp: str) -> FrictionRecord
         columns.get(_DESIRED),
         notes=tuple(notes),
         coefficient_range=COEFFICIENT_RANGE if measured is not None or clamp == 'sliding' else (0.0, np.inf),
+    )
+    return replace(
+        recording,
+        zero_from='law',
+        direction_spread=DIRECTION_SPREAD if measured is not None or clamp == 'sliding' else _BAND_SPREAD,
     )
 
 

@@ -7,7 +7,7 @@ from mount_identification.friction.recording import (
     IdentificationError,
     smoothed_displacement,
 )
-from mount_identification.friction.sawtooth import strokes, turning_points
+from mount_identification.friction.steps.sawtooth import strokes, turning_points
 
 RAMP, SAWTOOTH, OTHER = 'ramp', 'sawtooth', 'other motion'
 _HELD = 0.4  # of the recording within a quarter of the range of its end

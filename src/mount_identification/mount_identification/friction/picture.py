@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mount_identification.friction.identify import Identification
+from mount_identification.friction.found import Identification, mean_ladder
 from mount_identification.friction.ladder import best_rung, predicted_force
 from mount_models.friction.coefficient import offset_coefficient, slope_coefficient
 
@@ -119,8 +119,6 @@ def _validation(axes: Axes, found: Identification) -> None:
 
 
 def _errors(axes: Axes, found: Identification) -> None:
-    from mount_identification.friction.identify import mean_ladder
-
     if found.pairs:
         ladder = mean_ladder(found.pairs)
         names = list(ladder)

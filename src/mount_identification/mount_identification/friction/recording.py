@@ -1,7 +1,7 @@
 """A friction recording as identification wants it: checked, in SI units, on an even time grid."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ STROKE_RANGE = (1e-6, 1.0)
 FORCE_RANGE = (0.05, 1e7)
 COEFFICIENT_RANGE = (0.02, 10.0)
 """Plausible largest |F| / F_N (chosen): a brake lining has 0.2 .. 2.5, a wrapped band more."""
+DIRECTION_SPREAD = 0.3
+"""Standard deviation of ln(mu_p / mu_n), chosen: of the paper's pads it is -0.43 to -0.58 (Eq 14)."""
 _NOISE_SHARE = 0.05  # of the rms speed, chosen: as much velocity noise as smoothing may leave
 _LONGEST_WINDOW = 61  # samples
 
@@ -31,6 +33,8 @@ class FrictionRecording:
 
     The columns of `normal_force` count for sliding to positive and to negative side; of a simple clamp they
     are equal. `desired_displacement` x_d (m) is what a rack's position control was asked for, where recorded.
+    `zero_from` is where the zero of the force is to be had where nobody says (see `looks/force_zero.py`);
+    `direction_spread` the standard deviation of ln(mu_p / mu_n) that is to be expected.
     """
 
     name: str
@@ -40,6 +44,8 @@ class FrictionRecording:
     normal_force: FloatArray
     desired_displacement: FloatArray | None = None
     notes: tuple[str, ...] = ()
+    zero_from: str = 'recorded'
+    direction_spread: float = DIRECTION_SPREAD
 
     @property
     def time(self) -> FloatArray:
@@ -126,14 +132,13 @@ def thinned(recording: FrictionRecording, samples: int) -> FrictionRecording:
         return np.asarray(values[:count].reshape(-1, factor, *values.shape[1:]).mean(axis=1))
 
     desired = recording.desired_displacement
-    return FrictionRecording(
-        recording.name,
-        recording.dt * factor,
-        means(smoothed_displacement(recording)),
-        means(recording.force),
-        means(recording.normal_force),
-        None if desired is None else means(desired),
-        recording.notes,
+    return replace(
+        recording,
+        dt=recording.dt * factor,
+        displacement=means(smoothed_displacement(recording)),
+        force=means(recording.force),
+        normal_force=means(recording.normal_force),
+        desired_displacement=None if desired is None else means(desired),
     )
 
 

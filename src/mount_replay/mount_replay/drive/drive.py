@@ -245,8 +245,14 @@ def _grouping(order: DriveOrder) -> Grouping:
 
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
+    told = told_parameters(parameters)
+    content = {'scenario': order.scenario, 'mode': order.mode, 'parameters': told}
+    return session_text(new_session({**content, **provenance(order.brought)}))
+
+
+def told_parameters(parameters: Parameters) -> dict[str, dict[str, Any]]:
+    """Return the parameters as the session of a drive tells them."""
     told = {node: dict(values) for node, values in parameters.items()}
     # where these are not named, a recording is an older one
     told['mount_control'] = {'policy': DEFAULT, 'sample_rate': SAMPLE_RATE, **told.get('mount_control', {})}
-    content = {'scenario': order.scenario, 'mode': order.mode, 'parameters': told}
-    return session_text(new_session({**content, **provenance(order.brought)}))
+    return told

@@ -1,32 +1,122 @@
-"""Many independent tasks, whose results come as they are done."""
+"""Many independent tasks on Dask's `distributed`, whose results come as they are done."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from mount_replay.fleet.cluster import LOCAL, SchedulerLostError, connected
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 Item = TypeVar('Item')
 Result = TypeVar('Result')
 
+LOSSES = 3
+"""So many workers may be lost with a task before it is given up; chosen."""
+_AHEAD = (
+    4  # tasks per thread that are handed over at a time, chosen: those that run, and as many again that wait
+)
+
 
 @dataclass(frozen=True)
 class Done(Generic[Result]):
-    """The task at `place` of what was given: its result, or the reason why there is none."""
+    """The task at `place` of what was given: its result, or the reason why there is none.
+
+    `error` is what it raised; None where its workers were lost.
+    """
 
     place: int
     result: Result | None
     reason: str = ''
+    error: BaseException | None = None
 
 
 def run_tasks(
-    work: Callable[[Item], Result], items: Sequence[Item], *, scheduler: str = 'local', workers: int = 0
+    work: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    scheduler: str = LOCAL,
+    workers: int = 0,
+    memory: int = 0,
 ) -> Iterator[Done[Result]]:
     """Return each task as it is done, in any order: `work` is a function of a module, without state.
 
-    `scheduler` is `local` (processes of this machine, `workers` of them, 0 for one on each core) or the
-    address of a Dask cluster, tcp://HOST:PORT.
+    `scheduler` is `local` (processes of this machine, `workers` of them, 0 for one on each core, each of
+    which is replaced beyond `memory` bytes, 0 for its share of the machine's) or the address of a Dask
+    cluster, tcp://HOST:PORT. A task that raises is a `Done` with its reason; one whose worker is lost is run
+    again, at the end and alone, and given up when `LOSSES` workers were lost with it. Few tasks are handed
+    over at a time: who takes results slowly holds the others up. Raises `SchedulerLostError` where the
+    cluster does not answer or no longer does; what was returned until then stands.
     """
-    for place, item in enumerate(items):
+    if not items:
+        return
+    with connected(scheduler, workers, len(items), memory) as client:
+        stream = _Stream(client, work, items)
         try:
-            yield Done(place, work(item))
-        except Exception as error:  # a task that fails is a result of its own
-            yield Done(place, None, f'{type(error).__name__}: {error}')
+            yield from stream.results()
+        except OSError as error:
+            raise SchedulerLostError(
+                f'the scheduler ({scheduler}) was lost with {stream.under_way} tasks under way; what was '
+                f'done until then stands ({error})'
+            ) from None
+
+
+class _Stream(Generic[Item, Result]):
+    """The tasks of one call on one cluster."""
+
+    def __init__(self, client: 'Client', work: Callable[[Item], Result], items: Sequence[Item]):
+        from distributed import as_completed
+
+        self._client, self._work, self._items = client, work, items
+        self._arriving = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        self._under_way: dict[Any, int] = {}  # future: place of its item
+        self._losses: dict[int, int] = {}  # place: workers lost with it
+
+    @property
+    def under_way(self) -> int:
+        """Tasks that were handed over and are not done."""
+        return len(self._under_way)
+
+    def results(self) -> Iterator[Done[Result]]:
+        """Return all tasks as they are done, those last whose worker was lost."""
+        waiting = iter(range(len(self._items)))
+        self._submit(islice(waiting, self._room()))
+        while self._under_way:
+            yield from self._arrived()
+            self._submit(islice(waiting, self._room()))
+        # alone, so that no task is blamed for the worker that another one took along
+        for place in sorted(self._losses):
+            done: list[Done[Result]] = []
+            while not done:
+                self._submit([place])
+                done = list(self._arrived())
+            yield from done
+
+    def _room(self) -> int:
+        threads = sum(self._client.nthreads().values())
+        return max(_AHEAD * max(threads, 1) - len(self._under_way), 0)
+
+    def _submit(self, places: Any) -> None:
+        for place in places:
+            future = self._client.submit(self._work, self._items[place], pure=False)
+            self._under_way[future] = place
+            self._arriving.add(future)
+
+    def _arrived(self) -> Iterator[Done[Result]]:
+        from distributed import KilledWorker
+
+        for future, result in self._arriving.next_batch():
+            if future.status not in ('finished', 'error'):
+                raise ConnectionError(f'the task is {future.status}')
+            place = self._under_way.pop(future)
+            if future.status == 'finished':
+                yield Done(place, result)
+            elif not isinstance(error := result[1], KilledWorker):
+                yield Done(place, None, f'{type(error).__name__}: {error}', error)
+            else:
+                self._losses[place] = self._losses.get(place, 0) + 1
+                if self._losses[place] >= LOSSES:
+                    reason = f'{LOSSES} workers were lost with it: killed, or out of memory'
+                    yield Done(place, None, reason)

@@ -28,13 +28,14 @@ def record_core(
     excitation: Excitation | None = None,
     namespace: str = '',
     split: SplitRule = WHOLE,
+    begin: int | None = None,
 ) -> CoreOutcome:
     """Run the scenario in `parameters`, write it to the recording `folder`, and return what happened.
 
     `session` is the text of the session message; `progress` takes the share that is done. `excitation`
     is that of the scenario where it is built already.
     """
-    writer, begin = BagWriter(folder, split=split), time.time_ns()
+    writer, begin = BagWriter(folder, split=split), time.time_ns() if begin is None else begin
     mount = _MountWriter(writer, namespace, begin, set())
     try:
         mount.begin(session)
@@ -52,13 +53,14 @@ def record_car(
     excitation: Excitation | None = None,
     namespace: str = '',
     split: SplitRule = WHOLE,
+    begin: int | None = None,
 ) -> CoreOutcome:
     """Run and record the scenario of a car with several mounts, as `record_core` does for one.
 
     `sessions` are the texts of the session messages by the names of the mounts, which are namespaces within
     `namespace`.
     """
-    writer, begin = BagWriter(folder, split=split), time.time_ns()
+    writer, begin = BagWriter(folder, split=split), time.time_ns() if begin is None else begin
     declared: set[str] = set()
     mounts = {name: _MountWriter(writer, f'{namespace}/{name}', begin, declared) for name in sessions}
     sinks: dict[str, CoreMessages] = {}

@@ -33,8 +33,11 @@ def filesystem(uri: str) -> tuple[Any, str]:
         required('sshfs', what)
         return _ssh(scheme, uri, fsspec)
     kind = fsspec.get_filesystem_class(scheme)
-    options = {**kind._get_kwargs_from_urls(uri), 'use_listings_cache': False, **_options(scheme)}
-    return kind(**options), kind._strip_protocol(uri)
+    options = {**kind._get_kwargs_from_urls(uri), 'use_listings_cache': False, **_options(scheme, fsspec)}
+    files = kind(**options)
+    if scheme == 's3':
+        files.retries = 1
+    return files, kind._strip_protocol(uri)
 
 
 def forget_connections(uri: str) -> None:
@@ -72,10 +75,14 @@ def _ssh(scheme: str, uri: str, fsspec: Any) -> tuple[Any, str]:
     return importlib.import_module('sshfs').SSHFileSystem(**options), f'/{path.rstrip("/")}'
 
 
-def _options(scheme: str) -> dict[str, Any]:
+def _options(scheme: str, fsspec: Any) -> dict[str, Any]:
     """Return limits of time; how often is tried again is told in one place for all stores, `patience.py`."""
     if scheme in _HTTP:
         aiohttp = importlib.import_module('aiohttp')
         timeout = aiohttp.ClientTimeout(total=None, sock_connect=_CONNECT, sock_read=_SILENCE)
-        return {'client_kwargs': {'timeout': timeout}}
+        own = fsspec.config.conf.get(scheme, {}).get('client_kwargs', {})
+        return {'client_kwargs': {'timeout': timeout, **own}}
+    if scheme == 's3':
+        once = {'connect_timeout': _CONNECT, 'read_timeout': _SILENCE, 'retries': {'total_max_attempts': 1}}
+        return {'config_kwargs': {**once, **fsspec.config.conf.get('s3', {}).get('config_kwargs', {})}}
     return {}

@@ -31,13 +31,13 @@ class ColumnChoice:
 
     `unit` is '' where none is said. `scale` is a factor on the value in its unit, as -1 of an axis that
     points down, or a calibration; where no unit is said, it leads to SI. `offset`, in SI, is subtracted:
-    a number, or `mean`.
+    a number, `mean`, or None where nothing is said of it.
     """
 
     column: str
     unit: str = ''
     scale: float | None = None
-    offset: float | str = 0.0
+    offset: float | str | None = None
 
 
 @dataclass(frozen=True)
@@ -200,11 +200,11 @@ def _column(value: Any, name: str) -> ColumnChoice:
     found = _keys(value, _COLUMN_KEYS, name)
     if 'column' not in found:
         raise MappingError(f'{name} names no column; write {name}: {{column: NAME, unit: UNIT}}')
-    unit, offset = str(found.get('unit', '')), found.get('offset', 0.0)
+    unit, offset = str(found.get('unit', '')), found.get('offset')
     if unit:
         unit_of(unit)
     scale = None if 'scale' not in found else checked_scale(found['scale'], f'scale of {name}')
-    if offset != MEAN:
+    if offset is not None and offset != MEAN:
         offset = _number(offset, f'offset of {name}')
     return ColumnChoice(str(found['column']), unit, scale, offset)
 

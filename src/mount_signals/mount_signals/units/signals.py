@@ -18,14 +18,14 @@ from mount_signals.units.unit import Unit, UnitError, unit_of
 class ChosenSignal:
     """A signal in the unit of its file, and what leads to SI: `unit`, then `scale`, then `offset` subtracted.
 
-    `offset` is in SI, a number or `mean`.
+    `offset` is in SI, a number, `mean` or None.
     """
 
     quantity: Quantity
     signal: Signal
     unit: Unit
     scale: float
-    offset: float | str
+    offset: float | str | None
 
     @property
     def factor(self) -> float:
@@ -36,7 +36,7 @@ class ChosenSignal:
         """Return the signal in SI."""
         values = self.unit.to_si(self.signal.values)
         values = values * self.scale if self.scale != 1.0 else values
-        offset = float(np.mean(values)) if self.offset == MEAN else float(self.offset)
+        offset = float(np.mean(values)) if self.offset == MEAN else float(self.offset or 0.0)
         if not offset:
             return replace(self.signal, values=values)
         which = 'its mean' if self.offset == MEAN else 'as said'

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mount_identification.friction.coefficient_fit import NORMALISED_AT
 from mount_identification.friction.laws.law import LawParameter, levels, typical_force
 from mount_identification.friction.recording import FloatArray, FrictionRecording
+from mount_identification.friction.steps.coefficient_fit import NORMALISED_AT
 from mount_models.arithmetic.compiled import compiled
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact

@@ -1,17 +1,7 @@
 """Step 1: springs and damper of the contact from ramp and hold in microslip (Fig. 7, Eqs 10, 11).
 
-The rack's position control acts like a spring p between desired displacement x_d and displacement x, in
-series with c_Re and with c_R parallel to d_R. After a step X of x_d (derived; Eq (10) is printed without the
-"1 -" in the bracket):
-
-    c_xi = c_Re c_R / (c_Re + c_R) = F(inf) / x(inf)              K = X p / (p + c_xi)
-    x(t) = K [1 - (1 - kappa) exp(-t/T)]                          kappa = T_v / T = x(0+) / x(inf)
-    T = d_R / (c_R + p c_Re / (p + c_Re))                         T_v = d_R / (c_Re + c_R)
-
-    c_Re = (p + c_xi) / kappa - p;  c_R = c_xi c_Re / (c_Re - c_xi);  d_R = T (c_R + p c_Re / (p + c_Re))
-
-A real ramp lasts t_r; its response is the mean of the step response over the last t_r, in closed form. All of
-x, F and, where recorded, x_d are fitted at once, so neither the beginning nor the end of the ramp is told.
+The formulas are those of `ramp_response`. All of x, F and, where recorded, x_d are fitted at once, so neither
+the beginning nor the end of the ramp is told.
 """
 
 from dataclasses import dataclass
@@ -25,6 +15,7 @@ from mount_identification.friction.recording import (
     FrictionRecording,
     IdentificationError,
 )
+from mount_identification.friction.steps.ramp_response import PrintedFormulas, as_printed, inverted, response
 from mount_identification.single_threaded import single_threaded
 from mount_models.friction.contact import FrictionContact
 
@@ -33,20 +24,6 @@ LARGEST_MISFIT = 0.08
 LARGEST_UNCERTAINTY = 0.25
 SHORTEST_HOLD = 3.0
 """Time constants (chosen): 5 % of the creep is left then, so its end is measured, not extrapolated."""
-
-
-@dataclass(frozen=True)
-class PrintedFormulas:
-    """What Eqs (10), (11) give as they are printed, N/m and N s/m, under both readings of c_xi.
-
-    The print leaves open whether c_xi contains the spring p: for c_Re it must (k is then F(0+) / F(inf)), for
-    c_R it must not. d_R = c_R T neglects p beside c_R.
-    """
-
-    contact_stiffness: float
-    tangential_stiffness_with_p: float
-    tangential_stiffness_without_p: float
-    tangential_damping: float
 
 
 @dataclass(frozen=True)
@@ -95,7 +72,7 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
 
     def residuals(unknowns: FloatArray) -> FloatArray:
         values = unknowns * scale
-        model = _response(values[:7], time)
+        model = response(values[:7], time)
         parts = [(model[0] + values[7] - x) / noise[0], (model[1] + values[8] - force) / noise[1]]
         # without x_d its zero has nothing to hold it
         parts.append(
@@ -112,7 +89,7 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     )  # fmt: skip
     values = found.x * scale
     covariance = (_covariance(found.jac, found.fun) * np.outer(scale, scale))[:7, :7]
-    model = _response(values[:7], time)
+    model = response(values[:7], time)
     model = model[0] + values[7], model[1] + values[8], model[2]
     values = values[:7]
     misfits = _relative(model[0] - x, x), _relative(model[1] - force, force)
@@ -134,41 +111,12 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
         desired=float(sign * values[4]),
         ramp_start=float(values[5]),
         ramp_time=float(values[6]),
-        printed=_as_printed(values),
+        printed=as_printed(values),
         displacement_misfit=misfits[0],
         force_misfit=misfits[1],
         displacement=sign * model[0] + zero_x,
         force=sign * model[1] + zero_force,
     )
-
-
-def contact_of_response(
-    joint_stiffness: float, machine_stiffness: float, kappa: float, time_constant: float
-) -> FrictionContact:
-    """Return the contact from c_xi, p (N/m), kappa = T_v / T and T (s): Eq (11) put right (derived)."""
-    c_re = (machine_stiffness + joint_stiffness) / kappa - machine_stiffness
-    c_r = joint_stiffness * c_re / (c_re - joint_stiffness)
-    d_r = time_constant * (c_r + machine_stiffness * c_re / (machine_stiffness + c_re))
-    return FrictionContact(c_r, d_r, c_re)
-
-
-def printed_formulas(
-    joint_stiffness: float,
-    stiffness_with_p: float,
-    machine_stiffness: float,
-    first_over_last: float,
-    time_constant: float,
-) -> PrintedFormulas:
-    """Return Eq (11) word for word, k being the first force over the last.
-
-    `joint_stiffness` is c_xi without the spring p, `stiffness_with_p` (the last force over the desired
-    displacement) contains it; N/m, T in s.
-    """
-    k, p = first_over_last, machine_stiffness
-    c_re = k * stiffness_with_p * p / (p - k * stiffness_with_p)
-    without_p = joint_stiffness * c_re / (c_re - joint_stiffness)
-    with_p = stiffness_with_p * c_re / (c_re - stiffness_with_p)
-    return PrintedFormulas(c_re, with_p, without_p, without_p * time_constant)
 
 
 def mean_contact(fits: list[RampHoldFit]) -> FrictionContact:
@@ -184,38 +132,6 @@ def mean_covariance(fits: list[RampHoldFit]) -> FloatArray:
     shares = weights / weights.sum(axis=0)
     parts = [np.outer(share, share) * fit.covariance for share, fit in zip(shares, fits, strict=True)]
     return np.asarray(sum(parts))
-
-
-def ramp_response(
-    contact: FrictionContact,
-    machine_stiffness: float,
-    desired: float,
-    start: float,
-    ramp: float,
-    time: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (x, F, x_d) of a ramp of x_d to `desired` (m) in `ramp` s from `start` s, in closed form."""
-    c_re, c_r, d_r, p = (
-        contact.contact_stiffness,
-        contact.tangential_stiffness,
-        contact.tangential_damping,
-        (machine_stiffness),
-    )
-    c_xi = c_re * c_r / (c_re + c_r)
-    lag = d_r / (c_r + p * c_re / (p + c_re))
-    kappa = d_r / (c_re + c_r) / lag
-    asymptote = desired * p / (p + c_xi)
-    return _response(np.array([asymptote, kappa, lag, p, desired, start, ramp]), time)
-
-
-def _response(values: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    asymptote, kappa, lag, stiffness, desired, start, ramp = values
-    since = np.maximum(time - start, 0.0)
-    rise = np.minimum(since / ramp, 1.0)
-    # mean of exp(-s/T) over the part of the ramp that has happened, times that part
-    fading = (lag / ramp) * (np.exp(-np.maximum(since - ramp, 0.0) / lag) - np.exp(-since / lag))
-    x = asymptote * (rise - (1.0 - kappa) * fading)
-    return x, stiffness * (desired * rise - x), desired * rise
 
 
 def _start(
@@ -258,7 +174,7 @@ def _start(
 
 
 def _contact(name: str, values: FloatArray) -> FrictionContact:
-    contact = _inverted(values)
+    contact = inverted(values)
     if not all(value > 0.0 and np.isfinite(value) for value in contact):
         raise IdentificationError(
             f'{name}: c_R {contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} N '
@@ -269,18 +185,6 @@ def _contact(name: str, values: FloatArray) -> FrictionContact:
     return contact
 
 
-def _inverted(values: FloatArray) -> FrictionContact:
-    asymptote, kappa, lag, p, desired = (float(value) for value in values[:5])
-    return contact_of_response(p * (desired - asymptote) / asymptote, p, kappa, lag)
-
-
-def _as_printed(values: FloatArray) -> PrintedFormulas:
-    asymptote, kappa, lag, p, desired = (float(value) for value in values[:5])
-    joint = p * (desired - asymptote) / asymptote
-    first_over_last = (desired - kappa * asymptote) / (desired - asymptote)
-    return printed_formulas(joint, joint * p / (joint + p), p, first_over_last, lag)
-
-
 def _contact_covariance(values: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return the covariance (3, 3) of c_R, d_R, c_Re by linear propagation."""
     slopes = np.zeros((3, values.size))
@@ -289,7 +193,7 @@ def _contact_covariance(values: FloatArray, covariance: FloatArray) -> FloatArra
         up, down = values.copy(), values.copy()
         up[place] += step
         down[place] -= step
-        slopes[:, place] = (np.array(_inverted(up)) - np.array(_inverted(down))) / (2.0 * step)
+        slopes[:, place] = (np.array(inverted(up)) - np.array(inverted(down))) / (2.0 * step)
     return np.asarray(slopes @ covariance @ slopes.T)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from mount_identification.friction.recording import FloatArray, IdentificationError
-from mount_identification.friction.sawtooth import StrokeLine
+from mount_identification.friction.steps.sawtooth import StrokeLine
 from mount_identification.single_threaded import single_threaded
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_identification.friction.recording import FrictionRecording
-from mount_identification.friction.sawtooth import sliding_window, strokes
+from mount_identification.friction.steps.sawtooth import sliding_window, strokes
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import FADED_BELOW
 

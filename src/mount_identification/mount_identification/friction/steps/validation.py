@@ -12,7 +12,7 @@ from mount_identification.friction.recording import (
     FrictionRecording,
     smoothed_displacement,
 )
-from mount_identification.friction.slip_regions import slip_regions
+from mount_identification.friction.steps.slip_regions import slip_regions
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import simplified_response

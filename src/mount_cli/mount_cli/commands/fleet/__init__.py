@@ -1,0 +1,1 @@
+"""`engine-mount fleet`: many recordings, one file for each sub-command."""

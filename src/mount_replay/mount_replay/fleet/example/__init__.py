@@ -1,0 +1,1 @@
+"""A fleet to try things on: short simulated drives, varied, a few of them damaged."""

@@ -1,0 +1,91 @@
+"""Questions to the tables of a fleet, in SQL, answered by DuckDB from the Parquet files of a folder."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mount_replay.fleet.columns import TABLES
+from mount_signals.extras import required
+
+if TYPE_CHECKING:
+    import duckdb
+    import pyarrow
+    import pyarrow.dataset
+
+NAMES = ('recordings', 'events', 'result')
+"""The tables that a folder can hold, each a file NAME.parquet."""
+
+_MEMORY = '1GB'  # chosen: what a question may take, before it is refused
+_LOCKS = (
+    'SET python_enable_replacements = false',  # no variable of this program is a table
+    'SET enable_external_access = false',  # no other file, no network, no extension
+    'SET allow_community_extensions = false',
+    'SET lock_configuration = true',  # and no question undoes this
+)
+
+
+class QueryError(ValueError):
+    """A question cannot be answered; the text says why, and what could be asked."""
+
+
+def query(folder: str | os.PathLike[str], sql: str) -> 'pyarrow.Table':
+    """Return the answer to one SELECT about the tables of a catalogue or result.
+
+    Their columns and units: docs/reference/fleet_columns.md. Nothing can be written, and no other file be
+    read. Raises `QueryError`.
+    """
+    engine = required('duckdb', 'a question to a fleet')
+    tables = tables_of(folder)
+    connection = _locked(engine, tables)
+    try:
+        statements = connection.extract_statements(sql)
+        if len(statements) != 1 or statements[0].type != engine.StatementType.SELECT:
+            raise QueryError('a question is one SELECT statement; tables: ' + ', '.join(tables))
+        return connection.sql(sql).to_arrow_table()
+    except engine.Error as error:
+        raise QueryError(_sentence(str(error), sql, tables)) from None
+    finally:
+        connection.close()
+
+
+def tables_of(folder: str | os.PathLike[str]) -> dict[str, 'pyarrow.dataset.Dataset']:
+    """Return the tables in a folder by their names, opened but not read; raises `QueryError`."""
+    dataset = required('pyarrow.dataset', TABLES)
+    files = {name: Path(folder) / f'{name}.parquet' for name in NAMES}
+    there = {name: file for name, file in files.items() if file.is_file()}
+    if not there:
+        raise QueryError(
+            f'{folder} holds no table of a fleet ({", ".join(file.name for file in files.values())}); '
+            'engine-mount fleet index or replay makes one'
+        )
+    try:
+        return {name: dataset.dataset(file, format='parquet') for name, file in there.items()}
+    except (OSError, ValueError) as error:
+        raise QueryError(f'{folder} cannot be read: {" ".join(str(error).split())}') from None
+
+
+def _locked(engine: Any, tables: dict[str, 'pyarrow.dataset.Dataset']) -> 'duckdb.DuckDBPyConnection':
+    """Return a connection that knows the tables, and from then on nothing else.
+
+    One thread, so that rows without ORDER BY come in the order of the file.
+    """
+    plain = {'threads': 1, 'memory_limit': _MEMORY, 'temp_directory': ''}
+    closed = {'autoinstall_known_extensions': False, 'autoload_known_extensions': False}
+    connection = engine.connect(':memory:', config={**plain, **closed})
+    for name, table in tables.items():
+        connection.register(name, table)
+    for lock in _LOCKS:
+        connection.execute(lock)
+    return connection
+
+
+def _sentence(reason: str, sql: str, tables: dict[str, 'pyarrow.dataset.Dataset']) -> str:
+    """Return DuckDB's reason as one sentence, and what there is of the tables that the question names."""
+    first = reason.split('\n')[0].rstrip(' !.')
+    if 'file system operations are disabled' in reason or 'disabled through configuration' in reason:
+        first = 'a question reads the tables of its folder and nothing else'
+    asked = [name for name in tables if name in sql] or list(tables)
+    there = [f'{name} has {", ".join(tables[name].schema.names)}' for name in asked]
+    if 'Table with name' in reason:
+        there = [f'tables: {", ".join(tables)}']
+    return '; '.join([first, *there])

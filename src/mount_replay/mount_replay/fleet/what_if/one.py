@@ -1,0 +1,100 @@
+"""One recording of a fleet: fetched, replayed as recorded and with the change, told as rows."""
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mount_bags.bag.recording import Recording
+from mount_bags.run.place import open_run, recording_hash, recording_place
+from mount_bags.run.versions import versions
+from mount_replay.fleet.what_if.closed_loop import compared_motion
+from mount_replay.fleet.what_if.columns import DISPLACEMENT, SETPOINTS
+from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
+from mount_signals.sources.stores import local_copy
+
+Changes = Mapping[str, Mapping[str, Any]]
+Row = dict[str, Any]
+
+_OF_THE_MACHINE = ('processor', 'machine', 'c_library')  # no number of a row depends on them
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One recording: where it lies, and its path below what was asked for."""
+
+    uri: str
+    path: str
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """The rows of one recording, one for each mount, and what they took.
+
+    `fetched`: whether the recording was there to be read; times in s, those of the processor in `busy`.
+    """
+
+    rows: tuple[Row, ...]
+    fetched: bool
+    busy: float
+
+
+def replay_one(asked: Asked, changes: Changes, closed_loop: bool = False) -> Replayed:
+    """Return the rows of one recording with `changes` {node: {parameter: value}}; nothing is remembered.
+
+    What cannot be replayed, and what cannot be fetched, is a row with its reason.
+    """
+    begin = time.process_time()
+    common = {'recording': asked.path, **told_of(changes, closed_loop)}
+    try:
+        with local_copy(asked.uri) as path:
+            rows = tuple({**common, **row} for row in _rows(asked, path, changes, closed_loop))
+    except OSError as error:
+        return Replayed(({**common, 'mount': '', 'reason': str(error)},), False, time.process_time() - begin)
+    return Replayed(rows, True, time.process_time() - begin)
+
+
+def told_of(changes: Changes, closed_loop: bool) -> Row:
+    """Return the columns that are the same in all rows of an order."""
+    replayed_with = {name: told for name, told in versions().items() if name not in _OF_THE_MACHINE}
+    return {
+        'asked': DISPLACEMENT if closed_loop else SETPOINTS,
+        'replayed_with': _json(replayed_with),
+        'changes': _json(changes),
+    }
+
+
+def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
+    place = recording_place(path)
+    files = [file for file in place.rglob('*') if file.is_file()] if place.is_dir() else [place]
+    whole = {'size': sum(file.stat().st_size for file in files), 'sha256': recording_hash(place)}
+    try:
+        mounts = open_run(path).by_mount()
+    except ValueError as error:
+        return [{**whole, 'mount': '', 'reason': _told(error, asked, path)}]
+    rows = []
+    for recording in mounts:
+        row = {**whole, 'mount': recording.mount}
+        try:
+            row |= _figures(recording, changes, closed_loop)
+        except ValueError as error:
+            row['reason'] = _told(error, asked, path)
+        rows.append(row)
+    return rows
+
+
+def _figures(recording: Recording, changes: Changes, closed_loop: bool) -> Row:
+    recorded = recorded_in(recording)
+    figures = compared_motion(recorded, changes) if closed_loop else compared_setpoints(recorded, changes)
+    return {'reason': '', 'recorded_with': recorded.version, **figures}
+
+
+def _told(error: ValueError, asked: Asked, path: Path) -> str:
+    """Return the reason with the path below what was asked for: the same from whatever store it comes."""
+    return str(error).replace(str(path), asked.path)
+
+
+def _json(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, sort_keys=True, default=list)

@@ -1,0 +1,75 @@
+"""Signals in SI as they are recorded: a displacement at the rate of the controller, others as sampled."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mount_bags.signals.even_grid import evenly_spaced
+from mount_bags.signals.plausibility import check_size
+from mount_bags.signals.signal import SECOND, FloatArray, Signal, SignalError
+from mount_control.parameters import ControlParameters
+from mount_models.sampling import SAMPLE_RATE
+from mount_signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE, LOWEST_RATE, displacement_on_grid
+from mount_signals.importing.pieces import LONGEST_GAP
+from mount_signals.importing.topics import recorded_as
+from mount_signals.importing.writing import Channel, Times
+from mount_signals.units.quantities import Quantity, quantity
+
+_LOWEST_ACCELERATION_RATE = 50.0  # Hz, chosen as in `mount_sim.excitation.recorded`
+
+
+def channels_of(
+    signals: Mapping[str, Signal], quantities: Mapping[str, Quantity]
+) -> tuple[list[Channel], list[str]]:
+    """Return what is recorded of `signals` (SI, without long gaps), and sentences on what was done.
+
+    Raises `SignalError` for what no command could follow.
+    """
+    notes: list[str] = []
+    channels = []
+    pair = [name for name in (DISPLACEMENT, ENGINE, CHASSIS) if name in signals]
+    if DISPLACEMENT in pair:
+        channels.append(_displacement({DISPLACEMENT: signals[DISPLACEMENT]}, notes))
+    elif len(pair) == 2:
+        channels.append(_displacement({name: signals[name] for name in pair}, notes))
+    for name, signal in signals.items():
+        if name == DISPLACEMENT:
+            continue
+        stamps, values = _acceleration(signal, notes) if name == 'acceleration' else _as_sampled(signal)
+        channels.append(Channel(recorded_as(quantities[name]), quantities[name].unit.symbol, stamps, values))
+    return channels, notes
+
+
+def _displacement(signals: Mapping[str, Signal], notes: list[str]) -> Channel:
+    even = {name: evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE) for name, signal in signals.items()}
+    for one in even.values():
+        notes += [note for note in one.notes if note not in notes]
+    stamps, values = displacement_on_grid(even, SAMPLE_RATE, notes)
+    limit = ControlParameters().displacement_range
+    check_size(
+        ' and '.join(one.name for one in even.values()), values, 1.0 / SAMPLE_RATE, limit, 'm',
+        'is its unit another one, its zero another offset (in a mapping file), or is this sample a fault to '
+        'cut out?',
+    )  # fmt: skip
+    wanted = quantity(DISPLACEMENT)
+    return Channel(recorded_as(wanted), wanted.unit.symbol, stamps, values)
+
+
+def _acceleration(signal: Signal, notes: list[str]) -> tuple[Times, FloatArray]:
+    """Return the samples on an even grid of their own rate: what drives a car must be one."""
+    even = evenly_spaced(signal, LONGEST_GAP, _LOWEST_ACCELERATION_RATE)
+    notes += [note for note in even.notes if note not in notes]
+    number = np.arange(even.values.size)
+    return even.begin + np.rint(SECOND * even.period * number).astype(np.int64), even.values
+
+
+def _as_sampled(signal: Signal) -> tuple[Times, FloatArray]:
+    stamps = signal.begin + np.rint(SECOND * signal.times).astype(np.int64)
+    back = np.flatnonzero(np.diff(stamps) < 0)
+    if back.size:
+        place = int(back[0])
+        raise SignalError(
+            f'{signal.name}: time goes back at sample {place + 1}, from {signal.times[place]:.6f} s to '
+            f'{signal.times[place + 1]:.6f} s; sort the samples, or cut the file there'
+        )
+    return stamps, signal.values

@@ -1,0 +1,138 @@
+"""Files of others made into recordings that every command takes."""
+
+from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Keys
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from mount_bags.run.session import new_session
+from mount_bags.signals.signal import SECOND, Signal
+from mount_signals.formats.content import Stated
+from mount_signals.importing.channels import channels_of
+from mount_signals.importing.joined import joined
+from mount_signals.importing.pieces import Piece, pieces, within
+from mount_signals.importing.provenance import told_columns, told_mapping, told_source
+from mount_signals.importing.reading import Read, read_files
+from mount_signals.importing.writing import Channel, write_channels
+from mount_signals.units.mapping import Mapping
+
+SCENARIO = 'imported'
+"""What the session of a recording says that was made of files of others."""
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class ImportOrder:
+    """What the user orders: files (paths or URIs), what is said of them, and where the recording goes.
+
+    `first` and `last` (s after the first sample of all) choose a part; None is all.
+    """
+
+    files: Sequence[str]
+    out: Path
+    mapping: Mapping = field(default_factory=Mapping)
+    mapping_file: str = ''
+    first: float | None = None
+    last: float | None = None
+    stated: Stated | None = None
+
+
+@dataclass
+class Imported:
+    """What came of it: recordings in the order of time, with the length (s) of each, and what to know.
+
+    `samples` counts messages by topic, of all recordings.
+    """
+
+    recordings: list[Path] = field(default_factory=list)
+    lengths: list[float] = field(default_factory=list)
+    samples: dict[str, int] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def import_recording(order: ImportOrder, progress: Progress = lambda share, what: None) -> Imported:
+    """Write the recording `order.out`, or one with a number for each part between gaps.
+
+    Raises a `ValueError` or `OSError` with the reason, before anything is written.
+    """
+    progress(0.0, 'reading')
+    files = read_files(order.files, order.mapping, order.stated)
+    signals, notes = joined(
+        [(one.name, {name: chosen.in_si() for name, chosen in one.chosen.items()}) for one in files]
+    )
+    notes = [note for one in files for note in one.measured.notes] + notes
+    parts, cuts = pieces(within(signals, order.first, order.last))
+    parts, shifted = _with_room_before(parts)
+    imported = Imported(notes=[*notes, *_notes_of(signals), *cuts, *shifted])
+    quantities = {name: chosen.quantity for one in files for name, chosen in one.chosen.items()}
+    written = []
+    for part in parts:
+        channels, done = channels_of(part.signals, quantities)
+        imported.notes += [note for note in done if note not in imported.notes]
+        written.append(channels)
+    for number, (part, channels) in enumerate(zip(parts, written, strict=True)):
+        folder = _place(order.out, number, len(parts))
+        session = _session(order, files, channels, imported.notes, f'{number + 1} of {len(parts)}')
+
+        def show(share: float, begun: int = number) -> None:
+            progress((begun + share) / len(parts), 'writing')
+
+        write_channels(folder, channels, session, show)
+        _count(imported, folder, part, channels)
+    return imported
+
+
+def _place(out: Path, number: int, count: int) -> Path:
+    return out if count == 1 else out.with_name(f'{out.name}_{number + 1}')
+
+
+def _count(imported: Imported, folder: Path, part: Piece, channels: Sequence[Channel]) -> None:
+    imported.recordings.append(folder)
+    imported.lengths.append((part.end - part.begin) / SECOND)
+    for channel in channels:
+        topic = f'/{channel.place.topic.name}'
+        imported.samples[topic] = imported.samples.get(topic, 0) + int(channel.stamps.size)
+
+
+def _notes_of(signals: Keys[str, Signal]) -> list[str]:
+    return list(dict.fromkeys(note for signal in signals.values() for note in signal.notes))
+
+
+def _with_room_before(parts: Sequence[Piece]) -> tuple[list[Piece], list[str]]:
+    """Return the parts from 1 s on where they begin earlier: a replay dates the force table before them."""
+    shift = SECOND - min(part.begin for part in parts)
+    if shift <= 0:
+        return list(parts), []
+    moved = [
+        Piece(
+            part.begin + shift,
+            part.end + shift,
+            {name: replace(signal, begin=signal.begin + shift) for name, signal in part.signals.items()},
+        )
+        for part in parts
+    ]
+    return moved, [f'stamps are those of the file and {shift / SECOND:.3f} s']
+
+
+def _session(
+    order: ImportOrder, files: Sequence[Read], channels: Sequence[Channel], notes: Sequence[str], piece: str
+) -> dict[str, Any]:
+    columns = {name: told for one in files for name, told in told_columns(one.chosen).items()}
+    return new_session(
+        {
+            'scenario': SCENARIO,
+            'mode': 'import',
+            'imported': {
+                'files': [told_source(one.measured) for one in files],
+                'piece': piece,
+                'mapping': told_mapping(order.mapping, order.mapping_file),
+                'columns': columns,
+                'topics': {
+                    f'/{channel.place.topic.name}': f'{channel.place.field} in {channel.unit}'
+                    for channel in channels
+                },
+                'notes': list(notes),
+            },
+        }
+    )

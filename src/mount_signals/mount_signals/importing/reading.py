@@ -1,0 +1,93 @@
+"""Several files read with one mapping."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from mount_bags.signals.signal import SignalError
+from mount_signals.formats.content import Stated
+from mount_signals.formats.measured import Heading, Measured
+from mount_signals.formats.reading import headings
+from mount_signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
+from mount_signals.units.columns import heading_of, is_time, place, read_chosen
+from mount_signals.units.mapping import MEAN, ColumnChoice, Mapping, MappingError
+from mount_signals.units.quantities import names, quantity, titled
+from mount_signals.units.signals import ChosenSignal, chosen_signals
+from mount_signals.units.unit import is_unit, unit_of
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """A file with what was chosen of it, by quantity."""
+
+    measured: Measured
+    chosen: dict[str, ChosenSignal]
+
+    @property
+    def name(self) -> str:
+        """The name of the file, for sentences."""
+        return place(self.measured)
+
+
+def read_files(files: Sequence[str], mapping: Mapping, stated: Stated | None = None) -> list[Read]:
+    """Return what `mapping` names of each file; without columns, what titles and units tell.
+
+    Of several files each gives the columns that it has. Without another offset the mean of a displacement is
+    its rest position. Raises `MappingError`, `UnitError`, `SignalError` or `SourceError`.
+    """
+    there = {file: headings(file, stated) for file in files}
+    if not mapping.columns and not mapping.others:
+        mapping = _told_by_titles(there, mapping)
+    found = {file: _of_file(mapping, file, own, alone=len(files) == 1) for file, own in there.items()}
+    wanted = {*mapping.columns, *mapping.others}
+    missing = wanted - {name for own in found.values() for name in (*own.columns, *own.others)}
+    if missing:
+        column = {**mapping.columns, **mapping.others}[min(missing)].column
+        raise MappingError(f'no file has a column {column!r} ({min(missing)}); files are {", ".join(files)}')
+    return [_read(file, own, stated) for file, own in found.items() if own.columns or own.others]
+
+
+def _read(file: str, mapping: Mapping, stated: Stated | None) -> Read:
+    measured = read_chosen(file, mapping, stated)
+    return Read(measured, chosen_signals(measured, mapping))
+
+
+def _of_file(mapping: Mapping, file: str, there: Sequence[Heading], *, alone: bool) -> Mapping:
+    """Return what of the mapping is in a file; of one file alone all must be."""
+    rested = {
+        name: replace(choice, offset=MEAN)
+        if name in (DISPLACEMENT, ENGINE, CHASSIS) and choice.offset is None
+        else choice
+        for name, choice in mapping.columns.items()
+    }
+    if alone:
+        return replace(mapping, columns=rested)
+    columns = {name: choice for name, choice in rested.items() if _has(there, choice, file)}
+    others = {name: choice for name, choice in mapping.others.items() if _has(there, choice, file)}
+    return replace(mapping, columns=columns, others=others)
+
+
+def _has(there: Sequence[Heading], choice: ColumnChoice, file: str) -> bool:
+    try:
+        heading_of(there, choice.column, file)
+    except SignalError:
+        return False
+    return True
+
+
+def _told_by_titles(there: dict[str, tuple[Heading, ...]], mapping: Mapping) -> Mapping:
+    """Return a mapping of the columns whose title tells the quantity and whose header tells the unit."""
+    columns: dict[str, ColumnChoice] = {}
+    for own in there.values():
+        for heading in own:
+            found = titled(heading.name.rpartition('/')[2].rpartition('.')[2])
+            if found is None or is_time(heading) or not is_unit(heading.unit):
+                continue
+            if unit_of(heading.unit).dimension == quantity(found.name).dimension:
+                columns.setdefault(found.name, ColumnChoice(heading.name))
+    if not columns:
+        listing = '; '.join(f'{file}: {", ".join(one.name for one in own)}' for file, own in there.items())
+        raise MappingError(
+            'no column tells by its title and unit what it is; say it with --column QUANTITY=COLUMN:UNIT or '
+            f'a mapping file. Quantities: {names()}. Columns: {listing}'
+        )
+    return replace(mapping, columns=columns)
