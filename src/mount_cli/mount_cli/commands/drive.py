@@ -1,12 +1,23 @@
 """`engine-mount drive`: the simulated car through the whole graph."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mount_bringup.graph.nodes import RESTART_LIMIT
-from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Settings, Snapshot, Split
+from mount_cli.commands.options import (
+    Columns,
+    Domain,
+    JsonFile,
+    MapFile,
+    Namespace,
+    NewFolder,
+    Rate,
+    Settings,
+    Snapshot,
+    Split,
+    TimeColumn,
+)
 from mount_cli.commands.road_arguments import (
     ContactLength,
     Distance,
@@ -18,6 +29,7 @@ from mount_cli.commands.road_arguments import (
     given_without_road,
 )
 from mount_cli.completion.values import faults, listed, named
+from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
@@ -37,7 +49,7 @@ Examples:
 
 `engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount in the seat
 
-`engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
+`engine-mount drive --scenario recorded --file drive.csv --column az:g --scale -1` - your own recording
 
 `engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
 
@@ -75,19 +87,18 @@ def drive(
         ),
     ] = '',
     file: Annotated[
-        Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
-    ] = None,
-    column: Annotated[
-        str,
-        typer.Option(
-            help='recorded: column (CSV, JSON), signal.number (NPY), field of the message (MCAP); '
-            'road: NAME[:UNIT] of the height'
-        ),
+        str, typer.Option(metavar='FILE', help='recorded: any file or folder of signals, or its URI')
     ] = '',
-    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV, JSON)')] = '',
-    topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
+    column: Columns = None,
+    time: TimeColumn = '',
+    rate: Rate = None,
+    map_file: MapFile = None,
+    topic: Annotated[str, typer.Option(help='recorded: topic of a bag, --column being the field')] = '',
     scale: Annotated[
-        float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
+        float | None,
+        typer.Option(
+            help='recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'
+        ),
     ] = None,
     road: Annotated[
         str, typer.Option(metavar='FILE', help='measured road: height over distance, CSV or OpenCRG')
@@ -170,6 +181,10 @@ def drive(
     if 'list' in (fault or []):
         _list_faults()
         raise typer.Exit
+    if column and not file and not road:
+        raise typer.BadParameter('--column goes with --file or --road')
+    if not file and (time or rate is not None or topic or scale is not None or map_file):
+        raise typer.BadParameter('--time, --rate, --topic, --scale and --map-file go with --file')
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
@@ -193,11 +208,6 @@ def drive(
         'mounts': mounts or None,
         'seed': seed,
         'timeline.duration': duration,
-        'recorded.file': str(file.absolute()) if file else None,
-        'recorded.column': (column or None) if not road else None,
-        'recorded.time_column': time_column or None,
-        'recorded.topic': topic or None,
-        'recorded.scale': scale,
     }
     sim = parameters.setdefault('mount_sim', {})
     sim.update({name: value for name, value in given.items() if value is not None})
@@ -213,15 +223,22 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    brought: tuple[Brought, ...] = ()
+    brought: Brought | None = None
     if road:
-        how = {'lateral': lateral, 'column': column, 'distance': distance}
+        how = {'lateral': lateral, 'column': (column or [''])[0], 'distance': distance}
         how |= {'contact_length': contact_length, 'repeat': repeat, 'sim': parameters['mount_sim']}
-        brought = (brought_road(road, speed, **how),)
+        brought = brought_road(road, speed, **how)
+    console = terminal()
+    if file:
+        from mount_replay.drive.recorded_file import read_recorded
+
+        said = [f'{topic}.{name}' if topic else name for name in column or []]
+        brought = read_recorded(
+            str(local(file, console)), said, time, rate, scale=scale, mapping_file=map_file
+        )
     order = DriveOrder(
         scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, brought
     )
-    console = terminal()
     screen = TerminalScreen(console)
     folder, run, complaints = record_drive(order, screen)
     recorder = recorder_parameters(order)

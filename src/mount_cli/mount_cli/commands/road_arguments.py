@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from mount_replay.drive.brought import Brought
+    from mount_signals.roads.driving import WheelHeight
     from mount_signals.roads.profile import RoadProfile
 
 Lateral = Annotated[
@@ -55,12 +54,13 @@ def brought_road(
     contact_length: float | None,
     repeat: bool,
     sim: Mapping[str, Any],
-) -> 'Brought':
+) -> 'WheelHeight':
     """Return the road that the options name, driven at their speed, as the simulator takes it.
 
     `sim` are the parameters of mount_sim, for the duration.
     """
-    from mount_replay.drive.brought import Brought
+    from dataclasses import replace
+
     from mount_signals.roads.driving import wheel_height
     from mount_signals.roads.iso8608 import unevenness
     from mount_signals.roads.speed import speed_of
@@ -78,7 +78,7 @@ def brought_road(
         repeat=repeat,
     )
     notes = (f'{profile.name}: {sentence}' for sentence in (*unevenness(profile).sentences(), *over.notes))
-    return Brought('road.file', over.write, over.told, tuple(notes))
+    return replace(over, notes=tuple(notes))
 
 
 def given_without_road(**options: Any) -> None:
@@ -88,10 +88,10 @@ def given_without_road(**options: Any) -> None:
             raise typer.BadParameter(f'--{name.replace("_", "-")} is for a road: name it with --road FILE')
 
 
-def check_scenario(scenario: str, file: Path | None) -> None:
+def check_scenario(scenario: str, file: str) -> None:
     """Refuse a road together with another scenario."""
-    if scenario not in ('motorway', 'road') or file is not None:
-        other = '--file' if file is not None else f'--scenario {scenario}'
+    if scenario not in ('motorway', 'road') or file:
+        other = '--file' if file else f'--scenario {scenario}'
         raise typer.BadParameter(f'--road is a scenario of its own; leave out {other}')
 
 

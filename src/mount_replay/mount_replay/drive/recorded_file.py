@@ -1,0 +1,106 @@
+"""A recorded acceleration of others as what the simulator reads: a plain file, its origin told beside it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mount_bags.signals.even_grid import evenly_spaced
+from mount_signals.formats.measured import Heading, Measured
+from mount_signals.formats.reading import headings
+from mount_signals.importing.provenance import told_columns, told_mapping, told_source
+from mount_signals.importing.topics import recorded_as
+from mount_signals.units.columns import read_chosen
+from mount_signals.units.mapping import (
+    ColumnChoice,
+    Mapping,
+    MappingError,
+    checked_scale,
+    mapping_in_file,
+    with_options,
+)
+from mount_signals.units.quantities import quantity
+from mount_signals.units.signals import ChosenSignal, chosen_signals
+from mount_sim.excitation.recorded import LONGEST_GAP, LOWEST_RATE
+
+_ACCELERATION = 'acceleration'
+_OWN = recorded_as(quantity(_ACCELERATION))
+_OWN_COLUMN = f'/{_OWN.topic.name}.{_OWN.field}'
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFile:
+    """A chosen acceleration, checked, and what the session tells of its origin."""
+
+    measured: Measured
+    chosen: ChosenSignal
+    told: dict[str, Any]
+    kind: str = 'recorded'
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was taken for granted, in sentences."""
+        return (*self.measured.notes, *self.chosen.signal.notes)
+
+    def write(self, folder: Path) -> dict[str, Any]:
+        """Write the samples as a pair of NPY files to `folder`; return the parameters that read them.
+
+        The values are those of the file, in its unit, and the factor to m/s^2 is a parameter: what the
+        simulator computes does not depend on who reads the file.
+        """
+        name = _plain(self.chosen.signal.name)
+        values = folder / f'{name}_value.npy'
+        np.save(values, self.chosen.signal.values)
+        np.save(folder / f'{name}_t.npy', self.chosen.signal.times)
+        return {'recorded.file': str(values.absolute()), 'recorded.scale': self.chosen.factor}
+
+
+def read_recorded(
+    file: str,
+    columns: Sequence[str],
+    time: str = '',
+    rate: float | None = None,
+    *,
+    scale: float | None = None,
+    mapping_file: Path | None = None,
+) -> RecordedFile:
+    """Return the acceleration that the options of the command name in `file`, a path or URI.
+
+    `columns` are `COLUMN[:UNIT]`, one where a mapping file names none; of a recording of this project it may
+    be left out. Raises `MappingError`, `UnitError`, `SignalError` or `SourceError`, for values too that could
+    be in another unit.
+    """
+    mapping = mapping_in_file(mapping_file) if mapping_file else Mapping()
+    mapping = with_options(mapping, columns, time, rate, default=_ACCELERATION)
+    if _ACCELERATION not in mapping.columns:
+        mapping = replace(mapping, columns={_ACCELERATION: _own_column(headings(file), file)})
+    choice = mapping.columns[_ACCELERATION]
+    if scale is not None:
+        choice = replace(choice, scale=checked_scale(scale, '--scale'))
+    mapping = replace(mapping, columns={_ACCELERATION: choice}, others={})
+    measured = read_chosen(file, mapping)
+    chosen = chosen_signals(measured, mapping)
+    evenly_spaced(chosen[_ACCELERATION].signal, LONGEST_GAP, LOWEST_RATE)  # refuses by the names of the file
+    told = {
+        **told_source(measured),
+        'mapping': told_mapping(mapping, mapping_file.name if mapping_file else ''),
+        'columns': told_columns(chosen),
+    }
+    return RecordedFile(measured, chosen[_ACCELERATION], told)
+
+
+def _own_column(there: Sequence[Heading], file: str) -> ColumnChoice:
+    """Return the column of an acceleration that this project recorded; raises `MappingError`."""
+    if any(heading.name == _OWN_COLUMN for heading in there):
+        return ColumnChoice(_OWN_COLUMN)
+    raise MappingError(
+        f'{file}: say which column is the acceleration, upwards, with --column COLUMN:UNIT; there are '
+        + ', '.join(f'{one.name} [{one.unit}]' if one.unit else one.name for one in there)
+    )
+
+
+def _plain(name: str) -> str:
+    """Return a name for files: letters, digits and _ of a name in sentences."""
+    return '_'.join(''.join(sign if sign.isalnum() else ' ' for sign in name).split()) or _ACCELERATION
