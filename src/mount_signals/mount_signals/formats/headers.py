@@ -2,21 +2,25 @@
 
 import re
 
-_SYMBOLS = frozenset(
-    's ms us µs μs ns min h '
-    'm mm um µm μm nm cm km in inch ft mil '
-    'N kN mN MN lb lbf kip kips kgf '
-    'g mg G kg t '
-    'A mA V mV kV T mT H mH uH µH Ohm ohm Ω W kW J Wb '
-    'Hz kHz MHz deg rad mrad degree degrees ° K degC °C C °F degF % - '
-    'Pa kPa MPa GPa hPa bar mbar psi Nm '
-    'kmh kph mph mps knots rpm U'.split()
-)
+_SYMBOLS = {
+    's', 'ms', 'us', 'µs', 'μs', 'ns', 'min', 'h',
+    'm', 'mm', 'um', 'µm', 'μm', 'nm', 'cm', 'km', 'in', 'inch', 'ft', 'mil',
+    'N', 'kN', 'mN', 'MN', 'lb', 'lbf', 'kip', 'kips', 'kgf', 'Nm',
+    'g', 'mg', 'G', 'kg', 't',
+    'A', 'mA', 'V', 'mV', 'kV', 'T', 'mT', 'Wb', 'H', 'mH', 'uH', 'µH', 'Ohm', 'ohm', 'Ω', 'W', 'kW', 'J',
+    'Hz', 'kHz', 'MHz', 'rpm', 'U', 'deg', 'degree', 'degrees', '°', 'rad', 'mrad',
+    'K', 'degC', '°C', 'C', '°F', 'degF', '%', '-',
+    'Pa', 'kPa', 'MPa', 'GPa', 'hPa', 'bar', 'mbar', 'psi',
+    'kmh', 'kph', 'mph', 'mps', 'knots',
+}  # fmt: skip
 """What counts as a unit where a title does not bracket it: SI with its prefixes, and those of rigs."""
-_SUFFIXES = frozenset(
-    's ms us ns m mm um cm km in inch ft n N kn kN lb lbf kip g mg A ma mA V mv mV T mt mT H mh mH '
-    'hz Hz khz kHz deg rad K degc degC C pa Pa kpa kPa mpa MPa bar psi kmh kph mph rpm kg nm Nm'.split()
-) - {'n'}
+_SUFFIXES = {
+    's', 'ms', 'us', 'ns', 'm', 'mm', 'um', 'cm', 'km', 'in', 'inch', 'ft', 'N', 'kn', 'kN',
+    'lb', 'lbf', 'kip', 'g', 'mg', 'kg', 'A', 'ma', 'mA', 'V', 'mv', 'mV', 'T', 'mt', 'mT', 'H', 'mh', 'mH',
+    'hz', 'Hz', 'khz', 'kHz', 'deg', 'rad', 'K', 'C', 'degc', 'degC', 'pa', 'Pa', 'kpa', 'kPa', 'mpa', 'MPa',
+    'bar', 'psi', 'kmh', 'kph', 'mph', 'rpm', 'nm', 'Nm',
+}  # fmt: skip
+"""What counts as a unit behind an underscore; of single small letters those that name no axis or phase."""
 _WRITTEN = {'m_s2': 'm/s2', 'mps2': 'm/s2', 'ms2': 'm/s2', 'm_s': 'm/s', 'mps': 'm/s', 'km_h': 'km/h'}
 """Suffixes that leave out the stroke of a fraction."""
 _POWER = r'(?:\^?-?\d|\*\*-?\d|[²³])?'

@@ -56,7 +56,7 @@ def _titles(
 ) -> tuple[list[str], list[str], int, list[str]]:
     """Return names, units or [], the first line of the samples, and notes."""
     plain = [(number, split.cells(text)) for number, text in above if not is_comment(text)]
-    lines = {number: text for number, text in above}
+    lines = dict(above)
     found = [(number, _as_wide(cells, lines[number], split)) for number, cells in plain]
     last = found[-1][1] if found else None
     if last is not None and len(found) > 1 and found[-2][1] is not None and _is_unit_row(last, split):

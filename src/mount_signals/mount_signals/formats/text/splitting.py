@@ -192,8 +192,8 @@ def _no_table(path: Path, lines: list[Line]) -> str:
         return f'{path} holds comments and blank lines only; needed are lines of numbers'
     line = lines[len(lines) // 2]
     return (
-        f'{path}, line {line.number}: {line.text.strip()[:80]!r} is no line of a table of numbers; expected are '
-        'lines of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, '
+        f'{path}, line {line.number}: {line.text.strip()[:80]!r} is no line of a table of numbers; expected '
+        'are lines of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, '
         'no signs between thousands'
     )
 
@@ -202,6 +202,4 @@ def _ambiguous(path: Path, possible: list[Split]) -> str:
     ways = ' or '.join(
         f'{split.told} ({", ".join(split.rows[0][:4]).replace(chr(9), " ")})' for split in possible
     )
-    return (
-        f'{path} can be read as {ways}; state the delimiter or the decimal sign, or export with semicolons'
-    )
+    return f'{path} can be read as {ways}; state the delimiter or the decimal sign, or export with semicolons'
