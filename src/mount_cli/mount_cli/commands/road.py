@@ -64,7 +64,7 @@ def show(
     profile = road_of_options(file, lateral, column, distance)
     found, driven = unevenness(profile), speed_of(speed) if speed else None
     TerminalScreen(console).table(Table(profile.name, 'll', as_rows(profile, found, driven)))
-    for sentence in (*found.sentences(), *profile.notes):
+    for sentence in profile.notes:
         note(console, sentence)
     if figure is not None:
         from mount_report.road_picture import draw_road

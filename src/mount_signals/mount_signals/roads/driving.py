@@ -95,7 +95,7 @@ def wheel_height(
 
 def kept_frequency(profile: RoadProfile, speed: Speed) -> float:
     """Return up to which frequency (Hz) a road holds its unevenness at the mean speed."""
-    return _KEPT * speed.mean / profile.spacing
+    return _KEPT * min(speed.mean / profile.spacing, 1.0 / STEP_TIME)
 
 
 def _needed(speed: Speed, duration: float) -> float:

@@ -18,6 +18,7 @@ from mount_sim.excitation.recorded import LONGEST_GAP, LOWEST_RATE, acceleration
 from mount_sim.excitation.scenario import STEP_TIME as PLANT_STEP
 
 _SLOWEST = 1.0  # m/s, chosen: slower, many samples fall on one place of the road
+_PAUSE = 4.0  # s, chosen: four periods of the body
 _DIGITS = 7  # of distance and height in m
 
 UNKNOWN = (
@@ -58,9 +59,11 @@ def inverted(signal: Signal, speed: Speed, vehicle: Vehicle | None = None) -> In
     vehicle = vehicle or Vehicle()
     even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
     acceleration = acceleration_at(even, 1.0, STEP_TIME)[:]
-    height = road_of(acceleration, STEP_TIME, vehicle)
-    places = _places(speed, height.size)
-    again = _driven(height, vehicle)
+    # the road is as if repeated for ever: a pause keeps its end from its beginning
+    pause = np.zeros(round(_PAUSE / STEP_TIME))
+    height = road_of(np.concatenate([acceleration, pause]), STEP_TIME, vehicle)
+    places = _places(speed, acceleration.size)
+    again = _driven(height, vehicle)[: acceleration.size]
     result = kept(acceleration, again, STEP_TIME)
     notes = [*even.notes, *speed.notes()]
     reached = 0.4 * even.rate
@@ -70,7 +73,7 @@ def inverted(signal: Signal, speed: Speed, vehicle: Vehicle | None = None) -> In
         f'driven without friction it gives the acceleration back within {100.0 * result.error:.2g} % rms '
         f'from {BAND[0]:g} to {BAND[1]:g} Hz, where {100.0 * result.share:.3g} % of its rms lie'
     )
-    return InvertedRoad(places, height, result, tuple(notes))
+    return InvertedRoad(places, height[: acceleration.size], result, tuple(notes))
 
 
 def _places(speed: Speed, count: int) -> FloatArray:
