@@ -23,7 +23,7 @@ _PEAK = 5.0  # chosen: of eight averages one in 10^8 is so far above its neighbo
 _NEIGHBOURS = 0.75  # octaves to either side
 _FEWEST_BANDS = 4
 _LONG = 0.3  # cycles/m, chosen: a road's density has its maximum below
-_CLIFF = 30.0  # chosen: from band to band no road falls so far, but a filter does
+_CLIFF = 30.0  # chosen: no road falls so far below all that it was before, but a filter does
 _FADED = 3  # bands, chosen: what a filter took before that
 _HANN_WIDTH = 1.5  # lines of the spectrum: what a sine is spread over
 _LOWEST_WAVE = 1e-4  # m, chosen: less is not felt beside the roughness of asphalt
@@ -103,7 +103,9 @@ def _held(frequency: FloatArray, density: FloatArray) -> tuple[float, float]:
     """Return the band that a road holds: filters, and inversion, leave nothing below or above."""
     long = max(int(np.count_nonzero(frequency <= _LONG)), 1)
     first = int(np.argmax(density[:long]))
-    cliffs = np.flatnonzero(density[first + 1 :] * _CLIFF < density[first:-1])
+    before = np.minimum.accumulate(density[first:])[:-1]
+    behind = np.maximum.accumulate(density[:first:-1])[::-1]
+    cliffs = np.flatnonzero(behind * _CLIFF < before)
     last = first + int(cliffs[0]) - _FADED if cliffs.size else frequency.size - 1
     return float(frequency[first]), float(frequency[max(last, first)])
 
