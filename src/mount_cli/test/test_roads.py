@@ -99,8 +99,8 @@ def test_a_drive_over_a_road_tells_its_origin_and_rolls_over_its_stones(blocks, 
     )
     session = yaml.safe_load(recorded_session(open_recording(tmp_path / 'run' / 'recording')))
     assert session['scenario'] == 'road'
-    assert session['road']['format'] == 'OpenCRG'
-    assert session['road']['speed'] == '8.333 m/s (30 km/h)'
+    assert session['given']['road.file']['format'] == 'OpenCRG'
+    assert session['given']['road.file']['speed'] == '8.333 m/s (30 km/h)'
     assert session['parameters']['mount_sim']['road.file'].startswith(str(tmp_path / 'run'))
 
 

@@ -9,17 +9,11 @@ from typing import Any
 
 from mount_bags.bag.metadata import METADATA_NAME
 from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.messages.series import SeriesError
 from mount_bags.run.folder import RunFolder
 from mount_bags.run.place import open_run
-from mount_bags.run.session import (
-    SessionError,
-    recorded_session,
-    recorded_sessions,
-    session_content,
-    session_parameters,
-    session_sample_rate,
-)
+from mount_bags.run.session import session_parameters
+from mount_bags.run.told import duration_of, started_of, told_session
+from mount_bringup.recorded_mount import simulated_mounts
 
 _SOUND = 'nothing lost, no faults'
 _COUNTS = {
@@ -82,42 +76,11 @@ def listed_one(path: Path) -> Listed:
         duration_of(content, recording),
         _scenario(content),
         str(content.get('mode', '')),
-        _mount(parameters),
+        simulated_mounts(parameters),
         str(parameters.get('mount_control', {}).get('policy', '')),
         verdict,
         sound,
     )
-
-
-def told_session(recording: Recording) -> dict[str, Any]:
-    """Return the content of the session, of several mounts that of the first, {} where none can be read."""
-    try:
-        text = recorded_session(recording) or next(iter(recorded_sessions(recording).values()), '')
-        return session_content(text)
-    except (SessionError, SeriesError, ReadingError):
-        return {}
-
-
-def started_of(content: Mapping[str, Any], recording: Recording) -> datetime | None:
-    """Return when a run began: as its session tells, else when its first message came."""
-    try:
-        return datetime.fromisoformat(str(content['started'])).astimezone()
-    except (KeyError, ValueError):
-        times = recording.time_range
-    try:
-        return datetime.fromtimestamp(times[0] / 1e9).astimezone() if times else None
-    except (OverflowError, ValueError, OSError):
-        return None
-
-
-def duration_of(content: Mapping[str, Any], recording: Recording) -> float | None:
-    """Return the length in s: of the displacement by its rate, else from the first message to the last."""
-    counts = [recording.topics[f'/{mount}/displacement'.replace('//', '/')] for mount in recording.mounts]
-    samples = max((topic.message_count for topic in counts), default=0)
-    if samples:
-        return samples / session_sample_rate(content)
-    times = recording.time_range
-    return (times[1] - times[0]) / 1e9 if times else None
 
 
 def _places(folder: Path) -> Iterator[Path]:
@@ -133,18 +96,6 @@ def _is_one(path: Path) -> bool:
     if path.is_file():
         return path.suffix == '.mcap'
     return any((place / METADATA_NAME).is_file() or any(place.glob('*.mcap')) for place in (path, inside))
-
-
-def _mount(parameters: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the simulated mounts: their places, of one its name; empty in a car."""
-    told = parameters.get('mount_sim', {})
-    if not told or told.get('mounts') or told.get('mount'):
-        return str(told.get('mounts') or told.get('mount', ''))
-    from mount_bringup.mount_choice import (
-        seat_of,
-    )  # takes half a second to load, for a run that names no mount
-
-    return seat_of(parameters)
 
 
 def _scenario(content: Mapping[str, Any]) -> str:

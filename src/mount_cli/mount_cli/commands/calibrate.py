@@ -136,6 +136,11 @@ def actuator(
         f'{law.gap_high * 1e6:.1f} um and 0 .. {law.current_high:.2f} A; refused beyond',
         soft_wrap=True,
     )
+    if fit.continued:
+        console.print(
+            f'measured from {fit.lowest_current:.2f} A on; below, the law is continued to 0 N at 0 A',
+            soft_wrap=True,
+        )
     if figure is not None:
         from mount_identification.calibration_pictures import draw_force_law
 

@@ -7,6 +7,7 @@ import typer
 from mount_bringup.graph.nodes import RESTART_LIMIT
 from mount_cli.commands.options import (
     Columns,
+    Dbc,
     Domain,
     JsonFile,
     MapFile,
@@ -27,6 +28,7 @@ from mount_cli.commands.road_arguments import (
     brought_road,
     check_scenario,
     given_without_road,
+    height_column,
 )
 from mount_cli.completion.values import faults, listed, named
 from mount_cli.fetching import local
@@ -93,6 +95,7 @@ def drive(
     time: TimeColumn = '',
     rate: Rate = None,
     map_file: MapFile = None,
+    dbc: Dbc = None,
     topic: Annotated[str, typer.Option(help='recorded: topic of a bag, --column being the field')] = '',
     scale: Annotated[
         float | None,
@@ -181,16 +184,15 @@ def drive(
     if 'list' in (fault or []):
         _list_faults()
         raise typer.Exit
-    if column and not file and not road:
-        raise typer.BadParameter('--column goes with --file or --road')
-    if not file and (time or rate is not None or topic or scale is not None or map_file):
-        raise typer.BadParameter('--time, --rate, --topic, --scale and --map-file go with --file')
     if lockstep and core:
         raise typer.BadParameter('choose --lockstep or --core, not both')
     if apart and not lockstep:
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
     if composed and (lockstep or core):
         raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
+    of_files = {'time': time, 'rate': rate, 'map-file': map_file, 'dbc': dbc, 'topic': topic, 'scale': scale}
+    if not file:
+        given_without_file(**of_files, column=None if road else column)
     if road:
         check_scenario(scenario, file)
         scenario = 'road'
@@ -223,19 +225,20 @@ def drive(
         raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
-    brought: Brought | None = None
-    if road:
-        how = {'lateral': lateral, 'column': (column or [''])[0], 'distance': distance}
-        how |= {'contact_length': contact_length, 'repeat': repeat, 'sim': parameters['mount_sim']}
-        brought = brought_road(road, speed, **how)
+    brought: tuple[Brought, ...] = ()
     console = terminal()
-    if file:
-        from mount_replay.drive.recorded_file import read_recorded
+    if road:
+        how = {'lateral': lateral, 'column': height_column(column or []), 'distance': distance}
+        how |= {'contact_length': contact_length, 'repeat': repeat, 'sim': parameters['mount_sim']}
+        brought = (brought_road(road, speed, **how),)
+    elif file:
+        from mount_replay.drive.recorded_file import recorded_acceleration
 
         said = [f'{topic}.{name}' if topic else name for name in column or []]
-        brought = read_recorded(
-            str(local(file, console)), said, time, rate, scale=scale, mapping_file=map_file
-        )
+        how = {'time': time, 'rate': rate, 'scale': scale, 'mapping_file': map_file, 'dbc': dbc}
+        recorded, factor = recorded_acceleration(str(local(file, console)), said, **how)
+        brought = (recorded,)
+        parameters['mount_sim']['recorded.scale'] = factor
     order = DriveOrder(
         scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, brought
     )
@@ -259,6 +262,13 @@ def drive(
         note(console, complaint)
     if complaints:
         raise typer.Exit(1)
+
+
+def given_without_file(**options: object) -> None:
+    """Refuse options that say something of a recording where there is none."""
+    for name, value in options.items():
+        if value not in (None, '', []):
+            raise typer.BadParameter(f'--{name} is for a recording: name it with --file FILE')
 
 
 def _list_faults() -> None:

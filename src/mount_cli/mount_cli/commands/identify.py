@@ -62,8 +62,8 @@ def friction(
     zero: Annotated[
         str,
         typer.Option(
-            help='zero of the force: law (from the loop), rest (before the motion), recorded; default: law for '
-            'JSON of a damper, else recorded'
+            help='zero of the force: law (from the loop), rest (before the motion), recorded; default: law '
+            'for JSON of a damper, else recorded'
         ),
     ] = '',
     seed: Annotated[int, typer.Option(help='seed of the starts of the searches')] = 0,

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from mount_cli.commands.options import Columns, JsonFile, MapFile, Rate, TimeColumn, recording_argument
+from mount_cli.commands.options import Columns, Dbc, JsonFile, MapFile, Rate, TimeColumn, recording_argument
 from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
@@ -22,7 +22,7 @@ Examples:
 
 `engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --from 12 --to 60 --out bags/weg`
 
-`engine-mount import weg.csv kraft.csv --rate 1000 --column displacement=Weg:mm --column force=F:kN --out bags/two`
+`engine-mount import weg.csv kraft.csv --rate 1000 --column Weg:mm --column F:kN --out bags/two` - two files
 """
 
 
@@ -38,6 +38,7 @@ def import_files(
     column: Columns = None,
     time: TimeColumn = '',
     rate: Rate = None,
+    dbc: Dbc = None,
     first: Annotated[
         float | None, typer.Option('--from', metavar='S', help='s after the first sample of all files')
     ] = None,
@@ -48,11 +49,12 @@ def import_files(
 ) -> None:
     """Make a recording of files of others, in SI units, with a session that tells what it was made of.
 
-    The displacement is brought to 1 kHz, the acceleration of the chassis to an even grid of its own rate; other
-    quantities stay as they were sampled. A gap of more than 0.125 s parts the recording.
+    The displacement is brought to 1 kHz, the acceleration of the chassis to an even grid of its own rate;
+    other quantities stay as they were sampled. A gap of more than 0.125 s parts the recording.
     """
     from mount_cli.screen import progress_bar
     from mount_report.json_file import write_json
+    from mount_signals.formats.content import Stated
     from mount_signals.importing.importing import ImportOrder, import_recording
     from mount_signals.units.mapping import Mapping, mapping_in_file, with_options
 
@@ -60,7 +62,8 @@ def import_files(
     mapping = mapping_in_file(map_file) if map_file else Mapping()
     mapping = with_options(mapping, column or [], time, rate)
     places = [str(local(file, console)) for file in files]
-    order = ImportOrder(places, out, mapping, map_file.name if map_file else '', first, last)
+    name = map_file.name if map_file else ''
+    order = ImportOrder(places, out, mapping, name, first, last, Stated(dbc=dbc))
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
         imported = import_recording(

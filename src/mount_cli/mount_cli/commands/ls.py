@@ -107,9 +107,9 @@ def info(
 
 
 def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
+    from mount_bags.run.told import duration_of, started_of
     from mount_bags.run.versions import versions, versions_sentence
     from mount_cli.screen import TerminalScreen
-    from mount_report.listing import duration_of, started_of
 
     def tell(label: str, text: str) -> None:
         console.print(f'{label:<20}{text}', soft_wrap=True)

@@ -43,7 +43,8 @@ Columns = Annotated[
     typer.Option(
         '--column',
         metavar='[QUANTITY=]COLUMN[:UNIT]',
-        help='recording of others: a column by name or number, and its unit, as in acceleration=az:g',
+        help='recording of others: a column by name or number, and its unit, as in acceleration=az:g; '
+        'road: that of the height',
     ),
 ]
 TimeColumn = Annotated[
@@ -52,7 +53,7 @@ TimeColumn = Annotated[
         '--time',
         '--time-column',
         metavar='COLUMN[:UNIT]',
-        help='recording of others: the column of its times, and their unit, as in t:ms; default: by title, in s',
+        help='recording of others: column of its times, and their unit, as in t:ms; default: by title, in s',
     ),
 ]
 RATE = 'recording of others without times: samples per second'
@@ -64,4 +65,8 @@ MapFile = Annotated[
         metavar='FILE',
         help='recording of others: YAML file that says columns, units and times of a measuring system',
     ),
+]
+Dbc = Annotated[
+    Path | None,
+    typer.Option('--dbc', metavar='FILE', help='CAN log: the database by which its frames are decoded'),
 ]

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from mount_cli.commands.options import (
     RATE,
+    Dbc,
     Domain,
     JsonFile,
     MapFile,
@@ -75,6 +76,7 @@ def replay(
     ] = None,
     map_file: MapFile = None,
     time: TimeColumn = '',
+    dbc: Dbc = None,
     scale: Annotated[
         float | None,
         typer.Option(help='foreign recording: factor to m, or on what --map names with a unit'),
@@ -83,7 +85,7 @@ def replay(
         str,
         typer.Option(
             metavar='M',
-            help='foreign recording: what is subtracted, in m, or mean; default: as --map-file says, else mean',
+            help='foreign recording: what is subtracted, in m, or mean; default: that of --map-file, or mean',
         ),
     ] = '',
     out: NewFolder = None,
@@ -149,7 +151,9 @@ def replay(
     if maps or map_file:
         from mount_replay.given.foreign import foreign_order
 
-        foreign = foreign_order(maps or [], scale, offset, mapping_file=map_file, time=time, rate=rate)
+        foreign = foreign_order(
+            maps or [], scale, offset, mapping_file=map_file, time=time, rate=rate, dbc=dbc
+        )
     elif rate is not None or scale is not None or offset or time:
         raise typer.BadParameter('--scale, --offset, --time and --rate go with --map or --map-file')
     mode = LOCKSTEP if lockstep else CORE

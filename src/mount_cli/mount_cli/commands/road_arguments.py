@@ -1,13 +1,13 @@
 """Options that say which road, and how it is driven; for `drive` and `road`."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from mount_signals.roads.driving import WheelHeight
+    from mount_replay.drive.brought import Brought
     from mount_signals.roads.profile import RoadProfile
 
 Lateral = Annotated[
@@ -54,13 +54,12 @@ def brought_road(
     contact_length: float | None,
     repeat: bool,
     sim: Mapping[str, Any],
-) -> 'WheelHeight':
+) -> 'Brought':
     """Return the road that the options name, driven at their speed, as the simulator takes it.
 
     `sim` are the parameters of mount_sim, for the duration.
     """
-    from dataclasses import replace
-
+    from mount_replay.drive.brought import Brought
     from mount_signals.roads.driving import wheel_height
     from mount_signals.roads.iso8608 import unevenness
     from mount_signals.roads.speed import speed_of
@@ -78,7 +77,14 @@ def brought_road(
         repeat=repeat,
     )
     notes = (f'{profile.name}: {sentence}' for sentence in (*unevenness(profile).sentences(), *over.notes))
-    return replace(over, notes=tuple(notes))
+    return Brought('road.file', over.write, over.told, tuple(notes))
+
+
+def height_column(columns: Sequence[str]) -> str:
+    """Return the one column of the height, '' where none is named."""
+    if len(columns) > 1:
+        raise typer.BadParameter('--column is given once for a road: the column of its height')
+    return columns[0] if columns else ''
 
 
 def given_without_road(**options: Any) -> None:

@@ -86,14 +86,13 @@ def _jobs(
     jobs = []
     for speed in speeds:
         folder = order.out / f'{speed:g}_km_h'
-        folder.mkdir(parents=True, exist_ok=True)
         over = wheel_height(
             profile,
             speed_of(f'{speed:g}/3.6'),
             contact_length=0.0 if profile.effective else parameters.contact_length,
             repeat=bool(parameters.repeat),
         )
-        road = over.write(folder)
+        road = {'road.file': str(over.write(folder).absolute())}
         for who in COMPARED:
             own = {
                 'mount_sim': {'scenario': 'road', 'mount': _mount(who), **road},

@@ -195,13 +195,24 @@ def _ripple_from_table(
     groups = gap_groups(gaps)
     recordings = []
     for group in groups:
-        rows = np.sort(group)
-        name = file.name if len(groups) == 1 else f'{file.name} at {gaps[rows].mean() * 1e6:.1f} um'
-        celsius = _celsius(file, columns, rows, given)
-        recordings.append(
-            RippleRecording(name, float(gaps[rows].mean()), celsius, current[rows], inductance[rows])
-        )
+        parts = _of_one_temperature(np.sort(group), columns.get('coil_temperature'))
+        for rows in parts:
+            name = file.name if len(groups) == 1 else f'{file.name} at {gaps[rows].mean() * 1e6:.1f} um'
+            celsius = _celsius(file, columns, rows, given)
+            name += f', {celsius:.0f} degC' if len(parts) > 1 else ''
+            recordings.append(
+                RippleRecording(name, float(gaps[rows].mean()), celsius, current[rows], inductance[rows])
+            )
     return recordings
+
+
+def _of_one_temperature(rows: NDArray[np.intp], celsius: FloatArray | None) -> list[NDArray[np.intp]]:
+    """Return the rows in parts between which the coil's temperature (degC) leaves a gap, coldest first."""
+    if celsius is None:
+        return [rows]
+    order = rows[np.argsort(celsius[rows], kind='stable')]
+    parts = np.split(order, np.flatnonzero(np.diff(celsius[order]) > _TEMPERATURES_APART) + 1)
+    return [np.sort(part) for part in parts]
 
 
 def _celsius(
@@ -222,6 +233,7 @@ def _settled(file: Path, values: FloatArray) -> float:
     return float(values.mean())
 
 
+_TEMPERATURES_APART = 5.0  # K between neighbouring readings, chosen: a coil passes through all in between
 _LARGEST_DRIFT = 10.0  # K, chosen: 1 um or two of the gap to either side
 
 

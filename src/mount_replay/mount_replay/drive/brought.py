@@ -1,28 +1,42 @@
 """What of others a drive is given, brought into the plain form that the simulator reads."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
+
+from mount_bringup.graph.nodes import SIM
+
+FOLDER = 'given'
+"""In the folder of a run: the files that its simulator reads."""
+
+Settings = dict[str, dict[str, Any]]
 
 
-class Brought(Protocol):
-    """A recorded acceleration, or a road: read, checked, not yet written."""
+@dataclass(frozen=True)
+class Brought:
+    """A signal of others: the parameter of mount_sim that names its file, how it is written, its provenance.
 
-    @property
-    def kind(self) -> str:
-        """What the session calls it, `recorded` or `road`."""
-        ...
+    `write` writes the file into a folder and returns its path; `told` is plain data for the session, `notes`
+    are sentences.
+    """
 
-    @property
-    def told(self) -> Mapping[str, Any]:
-        """What the session tells of its origin, as plain data."""
-        ...
+    parameter: str
+    write: Callable[[Path], Path]
+    told: Mapping[str, Any]
+    notes: Sequence[str] = ()
 
-    @property
-    def notes(self) -> Sequence[str]:
-        """What was done to it or taken for granted, in sentences."""
-        ...
 
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Write the files that the simulator reads into `folder`; return the parameters that name them."""
-        ...
+def written(
+    brought: Sequence[Brought], parameters: Mapping[str, Mapping[str, Any]], folder: Path
+) -> Settings:
+    """Write what was brought into `folder` and return the parameters with the paths of the files."""
+    settings = {node: dict(values) for node, values in parameters.items()}
+    for each in brought:
+        settings.setdefault(SIM.name, {})[each.parameter] = str(each.write(folder).absolute())
+    return settings
+
+
+def provenance(brought: Sequence[Brought]) -> dict[str, Any]:
+    """Return what the session tells: {'given': {parameter: provenance}}, {} where nothing was brought."""
+    return {'given': {each.parameter: dict(each.told) for each in brought}} if brought else {}

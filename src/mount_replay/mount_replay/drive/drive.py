@@ -2,7 +2,7 @@
 
 import contextlib
 import math
-import shutil
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
-from mount_replay.drive.brought import Brought
+from mount_replay.drive.brought import FOLDER, Brought, provenance, written
 from mount_replay.drive.happenings import Happenings, line
 from mount_replay.drive.preflight import preflight
 from mount_replay.drive.progress import DriveProgress
@@ -57,7 +57,7 @@ class DriveOrder:
     apart: bool = False  # in lock-step too every node has a process of its own
     composed: bool = False  # in real time driver, initialisation and control share one
     restart_limit: int = RESTART_LIMIT
-    brought: Brought | None = None  # the excitation, of a file of others
+    brought: tuple[Brought, ...] = ()
 
     @property
     def mounts(self) -> tuple[str, ...]:
@@ -70,14 +70,13 @@ def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str
 
     Raises `Interrupted`, `GraphError` or a `ValueError` with the reason.
     """
-    if order.brought is None:
-        excitation = preflight(order.parameters, core=order.mode == 'core')
-        folder = make_run_folder(order.out, order.scenario)
-    else:
-        folder = make_run_folder(order.out, order.scenario)
-        order, excitation = _with_brought(order, order.brought, folder)
-    for remark in (*(order.brought.notes if order.brought else ()), *excitation.notes):
+    with tempfile.TemporaryDirectory() as scratch:
+        tried = written(order.brought, order.parameters, Path(scratch))
+        excitation = preflight(tried, core=order.mode == 'core')
+    for remark in (*(note for each in order.brought for note in each.notes), *excitation.notes):
         screen.note(remark)
+    folder = make_run_folder(order.out, order.scenario)
+    order = replace(order, parameters=written(order.brought, order.parameters, folder.path / FOLDER))
     complaints: list[str] = []
     if order.mode == 'core':
         return folder, _drive_in_core(order, excitation, folder, screen, complaints), complaints
@@ -87,17 +86,6 @@ def record_drive(order: DriveOrder, screen: Screen) -> tuple[RunFolder, dict[str
 def recorder_parameters(order: DriveOrder) -> RecorderParameters:
     """Return the parameters of the recorder in a drive."""
     return with_flattened(RecorderParameters(), order.parameters.get(RECORDER.name, {}))
-
-
-def _with_brought(order: DriveOrder, brought: Brought, folder: RunFolder) -> tuple[DriveOrder, Excitation]:
-    """Write what of others excites into the run, which a refusal takes away again."""
-    sim = {**order.parameters.get(SIM.name, {}), **brought.write(folder.path)}
-    order = replace(order, parameters={**order.parameters, SIM.name: sim})
-    try:
-        return order, preflight(order.parameters, core=order.mode == 'core')
-    except ValueError:
-        shutil.rmtree(folder.path)
-        raise
 
 
 def _drive_graph(
@@ -258,10 +246,8 @@ def _grouping(order: DriveOrder) -> Grouping:
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
     told = told_parameters(parameters)
-    session: dict[str, Any] = {'scenario': order.scenario, 'mode': order.mode, 'parameters': told}
-    if order.brought is not None:
-        session[order.brought.kind] = dict(order.brought.told)
-    return session_text(new_session(session))
+    content = {'scenario': order.scenario, 'mode': order.mode, 'parameters': told}
+    return session_text(new_session({**content, **provenance(order.brought)}))
 
 
 def told_parameters(parameters: Parameters) -> dict[str, dict[str, Any]]:

@@ -1,14 +1,17 @@
 """A recorded acceleration of others as what the simulator reads: a plain file, its origin told beside it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mount_bags.signals.even_grid import evenly_spaced
-from mount_signals.formats.measured import Heading, Measured
+from mount_bags.signals.signal import Signal
+from mount_replay.drive.brought import Brought
+from mount_signals.formats.content import Stated
+from mount_signals.formats.measured import Heading
 from mount_signals.formats.reading import headings
 from mount_signals.importing.provenance import told_columns, told_mapping, told_source
 from mount_signals.importing.topics import recorded_as
@@ -22,7 +25,7 @@ from mount_signals.units.mapping import (
     with_options,
 )
 from mount_signals.units.quantities import quantity
-from mount_signals.units.signals import ChosenSignal, chosen_signals
+from mount_signals.units.signals import chosen_signals
 from mount_sim.excitation.recorded import LONGEST_GAP, LOWEST_RATE
 
 _ACCELERATION = 'acceleration'
@@ -30,65 +33,52 @@ _OWN = recorded_as(quantity(_ACCELERATION))
 _OWN_COLUMN = f'/{_OWN.topic.name}.{_OWN.field}'
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedFile:
-    """A chosen acceleration, checked, and what the session tells of its origin."""
-
-    measured: Measured
-    chosen: ChosenSignal
-    told: dict[str, Any]
-    kind: str = 'recorded'
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What was taken for granted, in sentences."""
-        return (*self.measured.notes, *self.chosen.signal.notes)
-
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Write the samples as a pair of NPY files to `folder`; return the parameters that read them.
-
-        The values are those of the file, in its unit, and the factor to m/s^2 is a parameter: what the
-        simulator computes does not depend on who reads the file.
-        """
-        name = _plain(self.chosen.signal.name)
-        values = folder / f'{name}_value.npy'
-        np.save(values, self.chosen.signal.values)
-        np.save(folder / f'{name}_t.npy', self.chosen.signal.times)
-        return {'recorded.file': str(values.absolute()), 'recorded.scale': self.chosen.factor}
-
-
-def read_recorded(
+def recorded_acceleration(
     file: str,
     columns: Sequence[str],
+    *,
     time: str = '',
     rate: float | None = None,
-    *,
     scale: float | None = None,
     mapping_file: Path | None = None,
-) -> RecordedFile:
-    """Return the acceleration that the options of the command name in `file`, a path or URI.
+    dbc: Path | None = None,
+) -> tuple[Brought, float]:
+    """Return the acceleration that the options of the command name in `file`, and the factor to m/s^2.
 
-    `columns` are `COLUMN[:UNIT]`, one where a mapping file names none; of a recording of this project it may
-    be left out. Raises `MappingError`, `UnitError`, `SignalError` or `SourceError`, for values too that could
-    be in another unit.
+    `file` is a path or URI. `columns` are `COLUMN[:UNIT]`, one where a mapping file names none; of a
+    recording of this project it may be left out. What is brought are the samples in the unit of the file:
+    what the simulator computes does not depend on who reads them. Raises `MappingError`, `UnitError`,
+    `SignalError` or `SourceError`, also for values that could be in another unit.
     """
+    stated = Stated(dbc=dbc)
     mapping = mapping_in_file(mapping_file) if mapping_file else Mapping()
     mapping = with_options(mapping, columns, time, rate, default=_ACCELERATION)
     if _ACCELERATION not in mapping.columns:
-        mapping = replace(mapping, columns={_ACCELERATION: _own_column(headings(file), file)})
+        mapping = replace(mapping, columns={_ACCELERATION: _own_column(headings(file, stated), file)})
     choice = mapping.columns[_ACCELERATION]
     if scale is not None:
         choice = replace(choice, scale=checked_scale(scale, '--scale'))
     mapping = replace(mapping, columns={_ACCELERATION: choice}, others={})
-    measured = read_chosen(file, mapping)
+    measured = read_chosen(file, mapping, stated)
     chosen = chosen_signals(measured, mapping)
-    evenly_spaced(chosen[_ACCELERATION].signal, LONGEST_GAP, LOWEST_RATE)  # refuses by the names of the file
+    signal = chosen[_ACCELERATION].signal
+    evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)  # refuses by the names of the file
     told = {
         **told_source(measured),
         'mapping': told_mapping(mapping, mapping_file.name if mapping_file else ''),
         'columns': told_columns(chosen),
     }
-    return RecordedFile(measured, chosen[_ACCELERATION], told)
+    brought = Brought('recorded.file', partial(_write, signal), told, (*measured.notes, *signal.notes))
+    return brought, chosen[_ACCELERATION].factor
+
+
+def _write(signal: Signal, folder: Path) -> Path:
+    """Write a pair of NPY files, values and times; return that of the values."""
+    folder.mkdir(parents=True, exist_ok=True)
+    name = _plain(signal.name)
+    np.save(folder / f'{name}_value.npy', signal.values)
+    np.save(folder / f'{name}_t.npy', signal.times)
+    return folder / f'{name}_value.npy'
 
 
 def _own_column(there: Sequence[Heading], file: str) -> ColumnChoice:

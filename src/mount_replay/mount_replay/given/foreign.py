@@ -1,7 +1,7 @@
 """A displacement recorded by somebody else: chosen by column or field, checked, scaled, resampled."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ from mount_replay.given.ramps import MeasuredGap, measured_gaps
 from mount_ros import topics
 from mount_ros.messages.force_table import ForceTable
 from mount_ros.messages.scalars import ScalarsLayout
+from mount_signals.formats.content import Stated
 from mount_signals.importing.one_grid import (
     CHASSIS,
     DISPLACEMENT,
@@ -50,6 +51,7 @@ class ForeignOrder:
     mapping: Mapping
     offset: str = MEAN
     mapping_file: str = ''
+    stated: Stated = field(default_factory=Stated)
 
 
 def foreign_order(
@@ -60,6 +62,7 @@ def foreign_order(
     mapping_file: Path | None = None,
     time: str = '',
     rate: float | None = None,
+    dbc: Path | None = None,
 ) -> ForeignOrder:
     """Return the order that the options of the command describe, or raise `ReplayError`.
 
@@ -92,7 +95,7 @@ def foreign_order(
     options = '--map {quantity}={column}:{unit}'
     return ForeignOrder(
         replace(mapping, columns=columns, others={}, options=options), offset or str(said),
-        mapping_file.name if mapping_file else '',
+        mapping_file.name if mapping_file else '', Stated(dbc=dbc),
     )  # fmt: skip
 
 
@@ -103,7 +106,7 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     interpolated; a longer one, or a rate below `LOWEST_RATE`, is refused. Raises `ReplayError` or
     `SignalError`.
     """
-    measured = read_chosen(str(path), order.mapping)
+    measured = read_chosen(str(path), order.mapping, order.stated)
     notes = list(measured.notes)
     chosen = chosen_signals(measured, order.mapping)
     control = control_parameters(parameters)

@@ -40,13 +40,13 @@ class WheelHeight:
     height: FloatArray
     told: dict[str, object]
     notes: tuple[str, ...]
-    kind: str = 'road'
 
-    def write(self, folder: Path) -> dict[str, object]:
-        """Write `road_value.npy` with its times beside it; return the parameter by which it is read."""
+    def write(self, folder: Path) -> Path:
+        """Write `road_value.npy` with its times beside it, which the simulator reads; return its path."""
+        folder.mkdir(parents=True, exist_ok=True)
         np.save(folder / 'road_t.npy', STEP_TIME * np.arange(self.height.size))
         np.save(folder / 'road_value.npy', self.height)
-        return {'road.file': str((folder / 'road_value.npy').absolute())}
+        return folder / 'road_value.npy'
 
 
 def wheel_height(

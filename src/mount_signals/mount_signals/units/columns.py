@@ -54,8 +54,14 @@ def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
 
 
 def is_time(heading: Heading) -> bool:
-    """Return whether a column is called as one of times is."""
-    return heading.date or heading.name.lower().replace(' ', '_') in TITLES
+    """Return whether a column is called as one of times is, whatever group it is in."""
+    title = heading.name[len(group(heading)) :]
+    return heading.date or title.lower().replace(' ', '_') in TITLES
+
+
+def group(heading: Heading) -> str:
+    """Return the part of a name that says in which group a column is, with the sign behind it."""
+    return heading.name[: max(heading.name.rfind('/'), heading.name.rfind('.')) + 1]
 
 
 def known(measured: Measured) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 
 from mount_bags.signals.signal import SECOND, FloatArray
 from mount_signals.formats.measured import Measured, MeasuredColumn, TimeBase
-from mount_signals.units.columns import column_of, is_time, known, place
+from mount_signals.units.columns import column_of, group, is_time, known, place
 from mount_signals.units.mapping import MappingError, TimeChoice
 from mount_signals.units.unit import Unit, UnitError, si_unit, unit_of
 
@@ -42,11 +42,14 @@ def times_of(
 
 
 def time_column(measured: Measured, column: MeasuredColumn) -> MeasuredColumn | None:
-    """Return the column of times by its title, else the first if it rises; None where there is none."""
+    """Return the column of times by its title, else the first if it rises; None where there is none.
+
+    Times of the same group go before others.
+    """
     columns = list(measured.columns.values())
-    for candidate in columns:
-        if is_time(candidate) and candidate is not column:
-            return candidate
+    titled = [candidate for candidate in columns if is_time(candidate) and candidate is not column]
+    if titled:
+        return next((one for one in titled if group(one) == group(column)), titled[0])
     first = columns[0]
     rises = first is not column and first.number == 0 and first.values.size > 1
     rises = rises and bool(np.all(np.diff(first.values) > 0.0))

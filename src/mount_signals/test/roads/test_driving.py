@@ -1,7 +1,6 @@
 """From a profile and a speed to the height under the wheel."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -139,7 +138,7 @@ def test_provenance_and_class_go_into_the_session(tmp_path):
     assert over.told['uri'] == 'folder/made.csv'
     assert over.told['sha256'] == 'aa'
     assert over.told['speed'] == '20 m/s (72 km/h)'
-    file = Path(over.write(tmp_path)['road.file'])
+    file = over.write(tmp_path / 'given')
     np.testing.assert_array_equal(np.load(file), over.height)
     np.testing.assert_allclose(np.diff(np.load(file.with_name('road_t.npy'))), STEP_TIME)
 

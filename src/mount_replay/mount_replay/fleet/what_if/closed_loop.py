@@ -111,21 +111,22 @@ class _Drive:
     def __init__(self, policy: Policy, start: int, other: '_Drive | None'):
         self.start = start
         self.answers, self.difference = AnswerFigures(), DifferenceFigures()
-        self.answers.begin_run()
         self._trace, self._other = trace_dtype(policy), other
         self._setpoints: list[Column] = []
-        self._count = 0
+        self._count, self._initialised = 0, False
         self._motion = np.zeros(1, _MOTION).view(np.uint8)
 
     def write_samples(self, samples: Samples) -> None:
         """Take the samples and empty the block."""
         part = slice(int(np.searchsorted(samples.stamps[: samples.count], self.start)), samples.count)
-        if part.start < part.stop:
+        if part.start < part.stop and self._initialised:
             self._take(samples, part)
         samples.count = 0
 
     def write_result(self, stamp: int, result: InitialisationResult) -> None:
-        """Let the initialisation's result pass: the controller has it."""
+        """Take the table with which the controller begins."""
+        self.answers.begin_run(result.table)
+        self._initialised = True
 
     def write_off(self, stamp: int) -> None:
         """Let the last setpoint pass."""
@@ -141,9 +142,9 @@ class _Drive:
         """Return the figures of the motion as columns, with `changed` before their unit."""
         now = self._motion.view(_MOTION)[0]
         return {
-            f'displacement_peak{changed}_m': float(now['peak']),
-            f'displacement_rms{changed}_m': math.sqrt(float(now['square']) / float(now['count'])),
-            f'mount_force_peak{changed}_n': float(now['force_peak']),
+            f'peak_displacement{changed}_m': float(now['peak']),
+            f'rms_displacement{changed}_m': math.sqrt(float(now['square']) / float(now['count'])),
+            f'peak_mount_force{changed}_n': float(now['force_peak']),
         }
 
     def _take(self, samples: Samples, part: slice) -> None:

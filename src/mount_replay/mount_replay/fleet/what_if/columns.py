@@ -12,7 +12,7 @@ _RECORDING = (
     Column('mount', TEXT, '', 'which of several mounts, empty where there is one'),
     Column('reason', TEXT, '', 'why this recording has no figures, empty where it has'),
     Column('asked', TEXT, '', 'setpoints (replayed) or displacement (simulated anew: --closed-loop)'),
-    Column('size', COUNT, 'B', 'size of the files of the recording'),
+    Column('size_bytes', COUNT, 'B', 'size of its files'),
     Column('sha256', TEXT, '', 'SHA-256 of its MCAP files'),
     Column('recorded_with', TEXT, '', 'version of this project that made the recording, where it tells'),
     Column('replayed_with', TEXT, '', 'versions of the project and of the libraries that replayed it, JSON'),
@@ -21,8 +21,8 @@ _RECORDING = (
 
 _SAMPLES = (
     Column('duration_s', NUMBER, 's', 'length of what the controller was given'),
-    Column('samples', COUNT, '1', 'samples that it was given'),
-    Column('activations', COUNT, '1', 'how often it was activated'),
+    Column('samples', COUNT, '', 'samples that it was given'),
+    Column('activations', COUNT, '', 'how often it was activated'),
     Column('as_recorded', FLAG, '', 'whether the replay without the change gives the recorded setpoints'),
     Column(
         'as_recorded_largest_a', NUMBER, 'A', 'largest difference of that replay from the recorded setpoints'
@@ -30,23 +30,23 @@ _SAMPLES = (
 )
 
 _SETPOINTS = (
-    Column('setpoints_differing', COUNT, '1', 'setpoints that the change made others'),
+    Column('setpoints_differing', COUNT, '', 'setpoints that the change made others'),
     Column('setpoint_difference_rms_a', NUMBER, 'A', 'rms of the difference that the change made'),
     Column('setpoint_difference_largest_a', NUMBER, 'A', 'largest difference, changed minus as recorded'),
     Column('setpoint_difference_largest_at_s', NUMBER, 's', 'when, on the time axis of the recording'),
     Column('setpoint_difference_first_at_s', NUMBER, 's', 'when the first setpoint differs'),
-    Column('current_peak_a', NUMBER, 'A', 'largest setpoint as recorded'),
-    Column('current_peak_changed_a', NUMBER, 'A', _CHANGED),
-    Column('current_mean_a', NUMBER, 'A', 'mean of all setpoints as recorded'),
-    Column('current_mean_changed_a', NUMBER, 'A', _CHANGED),
+    Column('peak_current_a', NUMBER, 'A', 'largest setpoint as recorded'),
+    Column('peak_current_changed_a', NUMBER, 'A', _CHANGED),
+    Column('mean_current_a', NUMBER, 'A', 'mean of all setpoints as recorded'),
+    Column('mean_current_changed_a', NUMBER, 'A', _CHANGED),
 )
 
 _DAMPING = (
-    Column('switched_on', COUNT, '1', 'how often damping went on, as recorded'),
-    Column('switched_on_changed', COUNT, '1', _CHANGED),
-    Column('switchings_appeared', COUNT, '1', 'switchings of damping, on or off, that only the change has'),
-    Column('switchings_vanished', COUNT, '1', 'switchings that the change does not have'),
-    Column('switchings_moved', COUNT, '1', 'switchings that the change has at another time'),
+    Column('switched_on', COUNT, '', 'how often damping went on, as recorded'),
+    Column('switched_on_changed', COUNT, '', _CHANGED),
+    Column('switchings_appeared', COUNT, '', 'switchings of damping, on or off, that only the change has'),
+    Column('switchings_vanished', COUNT, '', 'switchings that the change does not have'),
+    Column('switchings_moved', COUNT, '', 'switchings that the change has at another time'),
     Column('switching_moved_furthest_s', NUMBER, 's', 'by how much the one that moved furthest came later'),
     Column('damping_s', NUMBER, 's', 'time for which damping was on, as recorded'),
     Column('damping_changed_s', NUMBER, 's', _CHANGED),
@@ -54,25 +54,25 @@ _DAMPING = (
 
 _FRICTION = (
     Column(
-        'friction_peak_n',
+        'peak_friction_n',
         NUMBER,
         'N',
         'largest friction force that the force model of the controller predicts, as recorded',
     ),
-    Column('friction_peak_changed_n', NUMBER, 'N', _CHANGED),
-    Column('friction_rms_n', NUMBER, 'N', 'rms of that force over all samples'),
-    Column('friction_rms_changed_n', NUMBER, 'N', _CHANGED),
-    Column('pads_energy_j', NUMBER, 'J', 'energy that the pads take by it at the measured velocity'),
-    Column('pads_energy_changed_j', NUMBER, 'J', _CHANGED),
+    Column('peak_friction_changed_n', NUMBER, 'N', _CHANGED),
+    Column('rms_friction_n', NUMBER, 'N', 'rms of that force over all samples'),
+    Column('rms_friction_changed_n', NUMBER, 'N', _CHANGED),
+    Column('pad_energy_j', NUMBER, 'J', 'energy that the pads take by it at the measured velocity'),
+    Column('pad_energy_changed_j', NUMBER, 'J', _CHANGED),
 )
 
 _MOTION = (
-    Column('displacement_peak_m', NUMBER, 'm', 'largest displacement, simulated as recorded (--closed-loop)'),
-    Column('displacement_peak_changed_m', NUMBER, 'm', _CHANGED),
-    Column('displacement_rms_m', NUMBER, 'm', 'rms of the displacement, simulated as recorded'),
-    Column('displacement_rms_changed_m', NUMBER, 'm', _CHANGED),
-    Column('mount_force_peak_n', NUMBER, 'N', 'largest force of the mount, simulated as recorded'),
-    Column('mount_force_peak_changed_n', NUMBER, 'N', _CHANGED),
+    Column('peak_displacement_m', NUMBER, 'm', 'largest displacement, simulated as recorded (--closed-loop)'),
+    Column('peak_displacement_changed_m', NUMBER, 'm', _CHANGED),
+    Column('rms_displacement_m', NUMBER, 'm', 'rms of the displacement, simulated as recorded'),
+    Column('rms_displacement_changed_m', NUMBER, 'm', _CHANGED),
+    Column('peak_mount_force_n', NUMBER, 'N', 'largest force of the mount, simulated as recorded'),
+    Column('peak_mount_force_changed_n', NUMBER, 'N', _CHANGED),
 )
 
 REPLAY_COLUMNS = (*_RECORDING, *_SAMPLES, *_SETPOINTS, *_DAMPING, *_FRICTION, *_MOTION)

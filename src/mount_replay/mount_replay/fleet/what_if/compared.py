@@ -136,8 +136,8 @@ class _Comparison:
     def _begun(self, run: ControlRun, sums: _Sums) -> _Replays:
         first = int(run.stamps[0])
         gap = self._changed_gaps.get(run.gap.stamp, run.gap)
-        sums.before.begin_run()
-        sums.after.begin_run()
+        sums.before.begin_run((run.gap.table.current, run.gap.table.normal_force))
+        sums.after.begin_run((gap.table.current, gap.table.normal_force))
         sums.runs += 1
         sums.whole &= run.from_its_beginning
         return _Replays(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mount_bags.events.switching_changes import Switching, paired_switchings, switching_times
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.interpolation import interpolated
 from mount_models.arithmetic.record import record_type
 from mount_replay.core import ControlAnswers
 
@@ -40,16 +41,18 @@ class AnswerFigures:
     def __init__(self) -> None:
         self._sums = np.zeros(1, _ANSWERS).view(np.uint8)
         self._runs: list[_Changes] = []
+        self._table: tuple[Column, ...] = ()
 
-    def begin_run(self) -> None:
-        """Note that the controller was activated anew."""
+    def begin_run(self, table: tuple[Column, Column]) -> None:
+        """Note that the controller was activated anew, with a `table` of current (A) and normal force (N)."""
         self._runs.append(_Changes())
+        self._table = tuple(np.array(column, np.float64) for column in table)
 
     def add(self, answers: ControlAnswers) -> None:
         """Take answers in the order of their samples."""
         traces = answers.traces
-        names = ('damping_active', 'friction_coefficient', 'normal_force', 'desired_force', 'velocity')
-        _add_answers(self._sums, answers.setpoints, *(traces[name] for name in names))
+        names = ('damping_active', 'friction_coefficient', 'desired_force', 'velocity')
+        _add_answers(self._sums, self._table, answers.setpoints, *(traces[name] for name in names))
         self._runs[-1].add(answers.stamps[answers.traced], traces['damping_active'][answers.traced])
 
     @property
@@ -69,12 +72,12 @@ class AnswerFigures:
         mean = float(sums['current_sum']) / answered if answered else math.nan
         rms = math.sqrt(float(sums['force_square']) / samples) if samples else math.nan
         return {
-            f'current_peak{changed}_a': float(sums['current_peak']) if answered else math.nan,
-            f'current_mean{changed}_a': mean,
+            f'peak_current{changed}_a': float(sums['current_peak']) if answered else math.nan,
+            f'mean_current{changed}_a': mean,
             f'damping{changed}_s': int(sums['damping']) * sample_time,
-            f'friction_peak{changed}_n': float(sums['force_peak']),
-            f'friction_rms{changed}_n': rms,
-            f'pads_energy{changed}_j': float(sums['power_sum']) * sample_time,
+            f'peak_friction{changed}_n': float(sums['force_peak']),
+            f'rms_friction{changed}_n': rms,
+            f'pad_energy{changed}_j': float(sums['power_sum']) * sample_time,
         }
 
     @property
@@ -164,8 +167,11 @@ class _Changes:
 
 
 @compiled
-def _add_answers(sums, currents, active, coefficients, normal_forces, desired_forces, velocities):
-    """Add the answers (n,) to `sums`, the bytes of its record; what was not traced is 0."""
+def _add_answers(sums, table, currents, active, coefficients, desired_forces, velocities):
+    """Add the answers (n,) to `sums`, the bytes of its record; what was not traced is 0.
+
+    The friction is that at the normal force of the setpoint, which may be held below the wanted one.
+    """
     now = sums.view(_ANSWERS)[0]
     for index in range(len(currents)):
         now.samples += 1
@@ -177,9 +183,9 @@ def _add_answers(sums, currents, active, coefficients, normal_forces, desired_fo
         if not active[index] > 0.0:
             continue
         now.damping += 1
-        if not normal_forces[index] > 0.0:
+        force = coefficients[index] * interpolated(current, table[0], table[1])
+        if math.isnan(force):
             continue
-        force = coefficients[index] * normal_forces[index]
         now.force_square += force * force
         now.force_peak = max(now.force_peak, force)
         # with the sign of the wanted force: the noise of the velocity, whose sign is as often wrong, cancels

@@ -1,6 +1,8 @@
 """One recording of a fleet: fetched, replayed as recorded and with the change, told as rows."""
 
 import json
+import os
+import platform
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +12,7 @@ from typing import Any
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_hash, recording_place
 from mount_bags.run.versions import versions
+from mount_replay.fleet.what_if.asked import Asked
 from mount_replay.fleet.what_if.closed_loop import compared_motion
 from mount_replay.fleet.what_if.columns import DISPLACEMENT, SETPOINTS
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
@@ -22,23 +25,17 @@ _OF_THE_MACHINE = ('processor', 'machine', 'c_library')  # no number of a row de
 
 
 @dataclass(frozen=True)
-class Asked:
-    """One recording: where it lies, and its path below what was asked for."""
-
-    uri: str
-    path: str
-
-
-@dataclass(frozen=True)
 class Replayed:
     """The rows of one recording, one for each mount, and what they took.
 
-    `fetched`: whether the recording was there to be read; times in s, those of the processor in `busy`.
+    `fetched`: whether the recording was there to be read; `busy`: time of the processor in s; `worker`: the
+    process that did it.
     """
 
     rows: tuple[Row, ...]
     fetched: bool
     busy: float
+    worker: str
 
 
 def replay_one(asked: Asked, changes: Changes, closed_loop: bool = False) -> Replayed:
@@ -46,14 +43,15 @@ def replay_one(asked: Asked, changes: Changes, closed_loop: bool = False) -> Rep
 
     What cannot be replayed, and what cannot be fetched, is a row with its reason.
     """
-    begin = time.process_time()
-    common = {'recording': asked.path, **told_of(changes, closed_loop)}
+    begin, worker = time.process_time(), f'{platform.node()}/{os.getpid()}'
+    common = {'recording': asked.path, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
     try:
         with local_copy(asked.uri) as path:
             rows = tuple({**common, **row} for row in _rows(asked, path, changes, closed_loop))
+        fetched = True
     except OSError as error:
-        return Replayed(({**common, 'mount': '', 'reason': str(error)},), False, time.process_time() - begin)
-    return Replayed(rows, True, time.process_time() - begin)
+        rows, fetched = ({**common, 'mount': '', 'reason': str(error)},), False
+    return Replayed(rows, fetched, time.process_time() - begin, worker)
 
 
 def told_of(changes: Changes, closed_loop: bool) -> Row:
@@ -67,9 +65,7 @@ def told_of(changes: Changes, closed_loop: bool) -> Row:
 
 
 def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
-    place = recording_place(path)
-    files = [file for file in place.rglob('*') if file.is_file()] if place.is_dir() else [place]
-    whole = {'size': sum(file.stat().st_size for file in files), 'sha256': recording_hash(place)}
+    whole = {'sha256': recording_hash(recording_place(path))}
     try:
         mounts = open_run(path).by_mount()
     except ValueError as error:

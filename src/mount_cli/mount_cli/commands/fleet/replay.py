@@ -1,0 +1,118 @@
+"""`engine-mount fleet replay`: what another controller would have answered on many recordings."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from mount_cli.commands.options import JsonFile
+from mount_cli.completion.values import named, setting
+from mount_cli.terminal import note, terminal
+
+EPILOG = """Exit code: 0 when every recording has its row, with figures or with the reason why not; 1 when one
+could not be fetched, or the order was refused.
+
+Examples:
+
+`engine-mount fleet replay drives --set mount_control.highest_current=2.0 --out result`
+
+`engine-mount fleet replay CATALOGUE --policy switched_viscous --out result --workers 2`
+
+`engine-mount fleet replay s3://bucket/drives --set lowest_amplitude=0.0002 --out result`
+
+`engine-mount fleet replay drives --set lowest_amplitude=0.0002 --closed-loop --out moved` - and the motion?
+
+An interrupted run goes on with the same command. The table is result.parquet in the folder of the result;
+setpoints are compared for the recorded displacement, with --closed-loop the displacement is simulated anew.
+"""
+
+
+def replay(
+    places: Annotated[
+        list[str],
+        typer.Argument(
+            metavar='CATALOGUE|URI...', help='catalogues, or folders and URIs below which recordings lie'
+        ),
+    ],
+    out: Annotated[Path, typer.Option(metavar='RESULT', help='folder of the result, new or interrupted')],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--set',
+            metavar='[NODE.]NAME=VALUE',
+            help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
+            autocompletion=setting('mount_control', 'mount_init'),
+        ),
+    ] = None,
+    policy: Annotated[
+        str, typer.Option(metavar='NAME', help='another policy', autocompletion=named('policy'))
+    ] = '',
+    closed_loop: Annotated[
+        bool,
+        typer.Option('--closed-loop', help='simulate engine and mount anew over recorded accelerations'),
+    ] = False,
+    scheduler: Annotated[
+        str, typer.Option(metavar='ADDRESS', help='local, or tcp://HOST:PORT of a Dask cluster')
+    ] = 'local',
+    workers: Annotated[
+        int, typer.Option(min=0, metavar='NUMBER', help='local: processes; 0: one on each core')
+    ] = 0,
+    json_file: JsonFile = None,
+) -> None:
+    """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
+    from mount_cli.screen import TerminalScreen
+    from mount_replay.fleet.what_if.run import FleetOrder, Progress, replay_fleet
+    from mount_report.json_file import write_json
+
+    changes = _changes([*(settings or []), *([f'policy={policy}'] if policy else [])])
+    if not changes:
+        raise typer.BadParameter('say what is to be other than recorded, with --set or --policy')
+    console = terminal()
+    order = FleetOrder(places, changes, closed_loop)
+    with TerminalScreen(console).bar('replaying') as show:
+
+        def told(progress: Progress) -> None:
+            show(progress.done / progress.of, detail=_progress_text(progress))
+
+        outcome = replay_fleet(order, out, scheduler=scheduler, workers=workers, told=told)
+    figures = outcome.figures()
+    _print(figures, console)
+    if json_file is not None:
+        write_json(figures, json_file)
+    for row in outcome.not_fetched:
+        note(console, f'{row["recording"]}: {row["reason"]}; the same command tries it again')
+    if outcome.not_fetched:
+        raise typer.Exit(1)
+
+
+def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
+    from mount_bringup.settings import SettingError, settings_of_options
+    from mount_replay.replay import parsed_changes
+
+    try:
+        given = settings_of_options(settings)
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
+    return parsed_changes(
+        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
+    )
+
+
+def _progress_text(progress: Any) -> str:
+    text = f'{progress.done} of {progress.of}, {progress.rate:.1f} recordings/s, {progress.left:.0f} s left'
+    return text + (f', {progress.failed} without figures' if progress.failed else '')
+
+
+def _print(figures: dict[str, Any], console: Any) -> None:
+    before = f' ({figures["done_before"]} done before)' if figures['done_before'] else ''
+    console.print(
+        f'recordings {figures["recordings"]}{before}, {figures["failed"]} of them without figures',
+        soft_wrap=True,
+    )
+    if figures['workers']:
+        console.print(
+            f'replayed   {figures["replayed_s"]:.0f} s in {figures["wall_s"]:.1f} s, '
+            f'{figures["real_time_factor_per_core"]:.0f} x real time on each of {figures["workers"]} cores',
+            soft_wrap=True,
+        )
+    console.print(f'result     {figures["result"]}', soft_wrap=True)

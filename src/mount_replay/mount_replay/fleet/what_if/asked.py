@@ -1,0 +1,97 @@
+"""Which recordings an order means: those of a catalogue, and all that lie below URIs or paths."""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mount_replay.fleet.columns import TABLES
+from mount_signals.extras import required
+from mount_signals.sources.source import Entry
+from mount_signals.sources.stores import entries
+from mount_signals.sources.uris import shown
+
+_FILES = re.compile(r'\.(mcap|mcap\.zstd|db3|db3\.zstd)$')
+_PIECE = re.compile(r'_\d+(\.\w+)+$')
+_METADATA = 'metadata.yaml'
+_CATALOGUE = '.parquet'
+
+
+class AskedError(ValueError):
+    """An order means no recording, or one name means two; the text says which."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One recording: where it lies, its path below what was asked for, and its size in bytes."""
+
+    uri: str
+    path: str
+    size: int
+
+
+def recordings_asked(places: Sequence[str]) -> list[Asked]:
+    """Return the recordings of catalogues and below URIs or paths, by their paths; raises a `ValueError`.
+
+    A catalogue is a table with the columns `uri`, `recording` and `size_bytes`, a Parquet file or the
+    folder of `engine-mount fleet index`. Raises `SourceError` where a place cannot be listed.
+    """
+    found: dict[str, Asked] = {}
+    for place in places:
+        table = _catalogue(place)
+        for asked in _of_catalogue(table) if table is not None else _below(place):
+            other = found.setdefault(asked.path, asked)
+            if other.uri != asked.uri:
+                raise AskedError(
+                    f'{asked.path} means two recordings: {shown(other.uri)} and {shown(asked.uri)}; '
+                    'ask for a folder that holds both'
+                )
+    if not found:
+        raise AskedError(f'no recording at {" or ".join(shown(place) for place in places)}')
+    return [found[path] for path in sorted(found)]
+
+
+def _catalogue(place: str) -> Path | None:
+    """Return the table of recordings at `place`, None where that is no catalogue."""
+    path = Path(place)
+    if path.is_dir():
+        path /= f'recordings{_CATALOGUE}'
+    return path if path.suffix == _CATALOGUE and path.is_file() else None
+
+
+def _of_catalogue(table: Path) -> Iterator[Asked]:
+    parquet: Any = required('pyarrow.parquet', TABLES)
+    rows = parquet.read_table(table, columns=['uri', 'recording', 'size_bytes']).to_pylist()
+    for row in {row['recording']: row for row in rows}.values():
+        yield Asked(row['uri'], row['recording'], row['size_bytes'] or 0)
+
+
+def _below(place: str) -> Iterator[Asked]:
+    root = place.rstrip('/') or place
+    listed = list(entries(place))
+    folders: dict[str, list[Entry]] = {}
+    for entry in listed:
+        folders.setdefault(entry.uri.rpartition('/')[0], []).append(entry)
+    for folder, files in folders.items():
+        recorded = [file for file in files if _FILES.search(file.uri)]
+        if not recorded:
+            continue
+        if _is_one(files, recorded):
+            yield _asked(folder, root, recorded)
+            continue
+        for file in recorded:
+            yield _asked(file.uri, root, [file])
+
+
+def _is_one(files: Iterable[Entry], recorded: Sequence[Entry]) -> bool:
+    """Whether the files of a folder are one recording: described, or numbered pieces of one name."""
+    if any(file.uri.rpartition('/')[2] == _METADATA for file in files):
+        return True
+    names = [file.uri.rpartition('/')[2] for file in recorded]
+    return all(_PIECE.search(name) for name in names) and len({_PIECE.sub('', name) for name in names}) == 1
+
+
+def _asked(uri: str, root: str, files: Sequence[Entry]) -> Asked:
+    path = uri[len(root) :].strip('/') if uri.startswith(root) else uri
+    return Asked(uri, path or uri.rpartition('/')[2], sum(file.size for file in files))

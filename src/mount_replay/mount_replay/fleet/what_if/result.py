@@ -1,0 +1,116 @@
+"""The folder of a result: rows in small files as they are done, one sorted table at the end.
+
+    order.json      what was asked; another order is refused
+    parts/*.parquet the rows of finished recordings, each file whole or not there
+    result.parquet  all rows, sorted; there once the order is done
+
+A file comes into being under another name and is renamed when it is whole, so that whatever ends a run leaves
+finished recordings or none. A recording is finished when its rows are in a part; rows of what could not be
+fetched are in no part, so that the same command tries them again.
+"""
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mount_replay.fleet.columns import TABLES, table_of, write_table
+from mount_replay.fleet.what_if.columns import REPLAY_COLUMNS
+from mount_signals.extras import required
+
+if TYPE_CHECKING:
+    import pyarrow
+
+Row = Mapping[str, Any]
+
+RESULT, ORDER, PARTS = 'result.parquet', 'order.json', 'parts'
+_SORTED_BY = [('recording', 'ascending'), ('mount', 'ascending')]
+
+
+class ResultError(ValueError):
+    """A folder cannot take the rows of an order; the text says why, and what would help."""
+
+
+class Result:
+    """The rows of one order in a folder; one process at a time writes there."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.table = folder / RESULT
+        self._parts = folder / PARTS
+        self._numbers = iter(range(0))
+
+    @contextlib.contextmanager
+    def taken(self, order: Mapping[str, Any]) -> Iterator[None]:
+        """Make the folder or go on with it, for as long as the block lasts; raises `ResultError`."""
+        if self.folder.exists() and not (self.folder / ORDER).exists() and any(self.folder.iterdir()):
+            raise ResultError(f'{self.folder} holds something else; choose another folder with --out')
+        self._parts.mkdir(parents=True, exist_ok=True)
+        with (self.folder / f'.{ORDER}.lock').open('w') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise ResultError(
+                    f'{self.folder} is being written by another command; wait for it, or choose another --out'
+                ) from None
+            self._check(order)
+            self._tidy()
+            begin = max((int(part.stem) for part in self._parts.glob('*.parquet')), default=-1) + 1
+            self._numbers = iter(range(begin, 1 << 62))
+            yield
+
+    def finished(self) -> set[tuple[str, int]]:
+        """Return the recordings whose rows are here, with their sizes in bytes."""
+        return {(row['recording'], row['size_bytes']) for part in self._read() for row in part.to_pylist()}
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Write the rows of recordings as a new part, all rows of each of them in it."""
+        write_table(table_of(REPLAY_COLUMNS, rows), self._parts / f'{next(self._numbers):06d}.parquet')
+
+    def finish(self, asked: Iterable[str], others: Iterable[Row]) -> 'pyarrow.Table':
+        """Write and return the table: rows of `asked` recordings in the parts, and `others`, sorted."""
+        wanted, latest = set(asked), dict[str, list[Row]]()
+        for part in self._read():
+            found: dict[str, list[Row]] = {}
+            for row in part.to_pylist():
+                found.setdefault(row['recording'], []).append(row)
+            latest |= found  # of a recording that was another one before, the last rows
+        rows = [row for name, rows in latest.items() if name in wanted for row in rows]
+        table = table_of(REPLAY_COLUMNS, [*rows, *others]).sort_by(_SORTED_BY).combine_chunks()
+        write_table(table, self.table)
+        return table
+
+    def _check(self, order: Mapping[str, Any]) -> None:
+        place = self.folder / ORDER
+        if not place.exists():
+            beside = self.folder / f'.{ORDER}.{os.getpid()}'
+            beside.write_text(json.dumps(order, indent=2, sort_keys=True) + '\n', encoding='utf-8')
+            beside.replace(place)
+            return
+        before = json.loads(place.read_text(encoding='utf-8'))
+        for name in sorted(before.keys() | order.keys()):
+            if before.get(name) != order.get(name):
+                raise ResultError(
+                    f'{self.folder} holds the result of another order: {name} was '
+                    f'{json.dumps(before.get(name))}, now it is {json.dumps(order.get(name))}; '
+                    'choose another folder with --out'
+                )
+
+    def _tidy(self) -> None:
+        """Remove what a run left that was ended while it wrote, or whose disk lost power."""
+        arrow, parquet = required('pyarrow', TABLES), required('pyarrow.parquet', TABLES)
+        for beside in self._parts.glob('.*'):
+            beside.unlink()
+        for part in self._parts.glob('*.parquet'):
+            try:
+                parquet.read_metadata(part)
+            except (arrow.ArrowInvalid, OSError):
+                part.unlink()
+
+    def _read(self) -> Iterator['pyarrow.Table']:
+        parquet = required('pyarrow.parquet', TABLES)
+        for part in sorted(self._parts.glob('*.parquet')):
+            yield parquet.read_table(part)

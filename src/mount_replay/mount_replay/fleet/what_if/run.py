@@ -1,0 +1,192 @@
+"""An order for many recordings, from the first to the sorted table; goes on where it was interrupted."""
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mount_bags.run.versions import versions
+from mount_replay.fleet.cluster import LOCAL
+from mount_replay.fleet.runner import Done, run_tasks
+from mount_replay.fleet.what_if.asked import Asked, recordings_asked
+from mount_replay.fleet.what_if.one import Replayed, Row, replay_one, told_of
+from mount_replay.fleet.what_if.result import Result
+from mount_signals.sources.uris import shown
+
+if TYPE_CHECKING:
+    import pyarrow
+
+_WRITTEN_AFTER = 5.0  # s, chosen: what a run that is killed does again
+_WRITTEN_TOGETHER = 200  # recordings, chosen
+_OF_A_WORKER = ('mount_bringup', 'numpy', 'numba', 'python')
+
+
+@dataclass(frozen=True)
+class FleetOrder:
+    """What is asked: `places` (catalogues, URIs, paths) with `changes` {node: {parameter: value}}.
+
+    `closed_loop`: displacement is asked, not setpoints.
+    """
+
+    places: Sequence[str]
+    changes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    closed_loop: bool = False
+
+    def told(self) -> dict[str, Any]:
+        """Return what makes two orders the same: all but where they run."""
+        here = versions()
+        told = {
+            'asked_for': [shown(place) for place in self.places],
+            'changes': self.changes,
+            'closed_loop': self.closed_loop,
+            'versions': {name: here[name] for name in _OF_A_WORKER},
+        }
+        return json.loads(json.dumps(told, default=list))
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an order is: recordings done of how many, their rate (1/s), and the time left (s) by it."""
+
+    done: int
+    of: int
+    failed: int
+    rate: float
+
+    @property
+    def left(self) -> float:
+        """Time left in s."""
+        return (self.of - self.done) / self.rate if self.rate > 0.0 else float('inf')
+
+
+@dataclass(frozen=True)
+class FleetOutcome:
+    """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs."""
+
+    table: 'pyarrow.Table'
+    result: Path
+    recordings: int
+    before: int
+    failed: int
+    wall: float
+    busy: float
+    replayed: float
+    workers: int
+    not_fetched: Sequence[Row] = ()  # what the same order tries again
+
+    def figures(self) -> dict[str, Any]:
+        """Return what `--json` writes; rates are those of this run, unknown is null."""
+        return {
+            'recordings': self.recordings,
+            'failed': self.failed,
+            'done_before': self.before,
+            'wall_s': self.wall,
+            'processor_s': self.busy,
+            'replayed_s': self.replayed,
+            'real_time_factor_per_core': self.replayed / (self.wall * self.workers) if self.workers else None,
+            'real_time_factor_per_processor_s': self.replayed / self.busy if self.busy else None,
+            'workers': self.workers,
+            'result': str(self.result),
+        }
+
+
+def replay_fleet(
+    order: FleetOrder,
+    out: Path,
+    *,
+    scheduler: str = LOCAL,
+    workers: int = 0,
+    told: Callable[[Progress], None] = lambda progress: None,
+) -> FleetOutcome:
+    """Replay all recordings of an order into the folder `out`, or those that an earlier run left.
+
+    `scheduler` and `workers` as in `run_tasks`. Raises a `ValueError` or `OSError` with the reason where the
+    run cannot begin or go on; what was done until then stays, and the same order goes on from there.
+    """
+    begin = time.monotonic()
+    asked = recordings_asked(order.places)
+    result = Result(out)
+    with result.taken(order.told()):
+        finished = result.finished()
+        left = [each for each in asked if (each.path, each.size) not in finished]
+        run = _Run(order, result, left, told, before=len(asked) - len(left), of=len(asked))
+        run.through(scheduler, workers)
+        table = result.finish([each.path for each in asked], run.not_fetched)
+    return FleetOutcome(
+        table=table,
+        result=result.table,
+        recordings=len(asked),
+        before=len(asked) - len(left),
+        failed=len({row['recording'] for row in table.to_pylist() if row['reason']}),
+        wall=time.monotonic() - begin,
+        busy=run.busy,
+        replayed=run.replayed,
+        workers=len(run.workers),
+        not_fetched=run.not_fetched,
+    )
+
+
+class _Run:
+    """One run of an order: takes results as they come and writes them soon."""
+
+    def __init__(
+        self,
+        order: FleetOrder,
+        result: Result,
+        left: Sequence[Asked],
+        told: Callable[[Progress], None],
+        *,
+        before: int,
+        of: int,
+    ):
+        self._order, self._result, self._left, self._told = order, result, left, told
+        self._before, self._of, self._failed = before, of, 0
+        self._waiting: list[Row] = []
+        self._recordings = 0
+        self.not_fetched: list[Row] = []
+        """Rows of what could not be read this time: the same order tries it again."""
+        self.busy = self.replayed = 0.0
+        self.workers: set[str] = set()
+
+    def through(self, scheduler: str, workers: int) -> None:
+        """Replay all that is left; what is done is written, whatever ends this."""
+        work = partial(replay_one, changes=self._order.changes, closed_loop=self._order.closed_loop)
+        begin = written = time.monotonic()
+        try:
+            for count, done in enumerate(
+                run_tasks(work, self._left, scheduler=scheduler, workers=workers), 1
+            ):
+                self._take(self._left[done.place], done)
+                now = time.monotonic()
+                if now - written >= _WRITTEN_AFTER or self._recordings >= _WRITTEN_TOGETHER:
+                    self._write()
+                    written = now
+                self._told(
+                    Progress(self._before + count, self._of, self._failed, count / max(now - begin, 1e-9))
+                )
+        finally:
+            self._write()
+
+    def _take(self, asked: Asked, done: Done[Replayed]) -> None:
+        replayed = done.result
+        if replayed is None:  # a fault of this program, or the workers were lost with it
+            row = {'recording': asked.path, 'mount': '', 'size_bytes': asked.size, 'reason': done.reason}
+            row |= told_of(self._order.changes, self._order.closed_loop)
+            replayed = Replayed((row,), False, 0.0, '')
+        self.busy += replayed.busy
+        self.workers |= {replayed.worker} - {''}
+        self.replayed += max((row.get('duration_s') or 0.0 for row in replayed.rows), default=0.0)
+        self._failed += any(row['reason'] for row in replayed.rows)
+        if not replayed.fetched:
+            self.not_fetched += replayed.rows
+            return
+        self._waiting += replayed.rows
+        self._recordings += 1
+
+    def _write(self) -> None:
+        if self._waiting:
+            self._result.add(self._waiting)
+        self._waiting, self._recordings = [], 0

@@ -1,0 +1,218 @@
+"""Many recordings, as recorded and with a change: the same table however it comes about."""
+
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mount_bags.run.place import open_run
+from mount_replay.fleet.runner import Done
+from mount_replay.fleet.what_if import one, run
+from mount_replay.fleet.what_if.asked import AskedError, recordings_asked
+from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
+from mount_replay.fleet.what_if.result import ResultError
+from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
+from mount_replay.replay import parsed_changes
+from mount_signals.sources.source import SourceError
+
+REFERENCES = Path(__file__).resolve().parents[3] / 'bags' / 'reference'
+CHANGES = parsed_changes({'highest_current': 0.7})
+NAMES = ['gap', 'opening', 'rough']
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    """A folder with three recordings and one that is damaged."""
+    folder = tmp_path / 'fleet'
+    for name in NAMES:
+        shutil.copytree(REFERENCES / name, folder / name)
+    (folder / 'broken.mcap').write_bytes(b'not a recording')
+    return folder
+
+
+@pytest.fixture
+def serial(monkeypatch):
+    """Tasks one after the other in this process; which recordings came is what the fixture gives."""
+    replayed = []
+
+    def tasks(work, items, **_):
+        for place, item in enumerate(items):
+            replayed.append(item.path)
+            yield Done(place, work(item))
+
+    monkeypatch.setattr(run, 'run_tasks', tasks)
+    return replayed
+
+
+def order_of(fleet):
+    return FleetOrder([str(fleet)], CHANGES)
+
+
+@pytest.mark.parametrize('name', sorted(path.name for path in REFERENCES.iterdir() if path.is_dir()))
+def test_a_recording_read_in_stretches_gives_the_figures_of_the_whole(name):
+    whole = compared_setpoints(recorded_in(open_run(REFERENCES / name)), CHANGES, 0)
+    assert whole['samples'] > 1000
+    for length in (700, 1500):
+        parts = compared_setpoints(recorded_in(open_run(REFERENCES / name)), CHANGES, length)
+        assert same(parts, whole)
+
+
+def test_the_changed_level_shows_in_the_row_and_the_replay_as_recorded_is_what_was_recorded():
+    row = compared_setpoints(recorded_in(open_run(REFERENCES / 'opening')), CHANGES)
+    assert row['as_recorded'] is True
+    assert row['peak_current_a'] > row['peak_current_changed_a'] == 0.7
+    assert row['setpoints_differing'] > 0
+    assert row['setpoint_difference_largest_a'] == pytest.approx(0.7 - row['peak_current_a'], abs=0.05)
+    assert 0.0 < row['pad_energy_changed_j'] < row['pad_energy_j']
+
+
+def test_without_an_effect_nothing_differs():
+    row = compared_setpoints(
+        recorded_in(open_run(REFERENCES / 'gap')), parsed_changes({'longest_bridge': 0.03})
+    )
+    assert row['setpoints_differing'] == row['switchings_moved'] == row['switchings_appeared'] == 0
+    assert math.isnan(row['setpoint_difference_first_at_s'])
+
+
+def test_a_damaged_recording_is_a_row_with_its_reason(fleet, tmp_path, serial):
+    table = replay_fleet(order_of(fleet), tmp_path / 'result').table.to_pylist()
+    assert [row['recording'] for row in table] == ['broken.mcap', *NAMES]
+    assert [bool(row['reason']) for row in table] == [True, False, False, False]
+    assert str(tmp_path) not in table[0]['reason']
+
+
+def test_another_order_into_the_same_result_is_refused(fleet, tmp_path, serial):
+    replay_fleet(order_of(fleet), tmp_path / 'result')
+    other = FleetOrder([str(fleet)], parsed_changes({'highest_current': 0.8}))
+    with pytest.raises(ResultError, match=r'another order: changes was .*0\.7.* now it is .*0\.8'):
+        replay_fleet(other, tmp_path / 'result')
+
+
+def test_the_same_order_again_reads_nothing_again(fleet, tmp_path, serial):
+    first = replay_fleet(order_of(fleet), tmp_path / 'result')
+    content = first.result.read_bytes()
+    serial.clear()
+    again = replay_fleet(order_of(fleet), tmp_path / 'result')
+    assert (serial, again.before, again.failed) == ([], 4, 1)
+    assert again.result.read_bytes() == content
+
+
+def test_what_cannot_be_fetched_is_tried_again(fleet, tmp_path, serial, monkeypatch):
+    whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
+    there = one.local_copy
+
+    def away(uri):
+        if uri.endswith('opening'):
+            raise SourceError('the store does not answer')
+        return there(uri)
+
+    monkeypatch.setattr(one, 'local_copy', away)
+    first = replay_fleet(order_of(fleet), tmp_path / 'result')
+    assert [row['reason'] for row in first.not_fetched] == ['the store does not answer']
+    assert first.table.num_rows == 4
+    monkeypatch.setattr(one, 'local_copy', there)
+    serial.clear()
+    again = replay_fleet(order_of(fleet), tmp_path / 'result')
+    assert serial == ['opening']
+    assert again.result.read_bytes() == whole
+
+
+KILLED = """
+import os, signal, sys
+from mount_replay.fleet.runner import Done
+from mount_replay.fleet.what_if import run
+from mount_replay.replay import parsed_changes
+
+run._WRITTEN_AFTER = 0.0
+
+def tasks(work, items, **_):
+    for place, item in enumerate(items):
+        if place == 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+        yield Done(place, work(item))
+
+run.run_tasks = tasks
+run.replay_fleet(
+    run.FleetOrder([sys.argv[1]], parsed_changes({'highest_current': 0.7})), run.Path(sys.argv[2])
+)
+"""
+
+
+def test_a_command_that_is_killed_goes_on_where_it_was_with_nothing_lost_or_twice(fleet, tmp_path, serial):
+    whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
+    killed = subprocess.run([sys.executable, '-c', KILLED, str(fleet), str(tmp_path / 'result')], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    (tmp_path / 'result' / 'parts' / '.000002.parquet.1').write_bytes(b'PAR1 half')
+    (tmp_path / 'result' / 'parts' / '000003.parquet').write_bytes(b'')  # as after a loss of power
+    serial.clear()
+    again = replay_fleet(order_of(fleet), tmp_path / 'result')
+    assert serial == ['opening', 'rough']
+    assert again.before == 2
+    assert again.result.read_bytes() == whole
+
+
+WITH_DASK = """
+import os, signal, sys
+from pathlib import Path
+from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
+from mount_replay.replay import parsed_changes
+
+def children(process):
+    found = []
+    for place in Path('/proc').glob('[0-9]*/stat'):
+        try:
+            parts = place.read_text().rpartition(')')[2].split()
+        except OSError:
+            continue
+        if int(parts[1]) == process and b'spawn_main' in place.with_name('cmdline').read_bytes():
+            found.append(int(place.parent.name))
+    return found
+
+killed = []
+
+def told(progress):
+    if not killed:
+        killed.append(children(os.getpid())[0])
+        os.kill(killed[0], signal.SIGKILL)
+
+if __name__ == '__main__':
+    order = FleetOrder([sys.argv[1]], parsed_changes({'highest_current': 0.7}))
+    outcome = replay_fleet(order, Path(sys.argv[2]), workers=2, told=told)
+    assert not outcome.not_fetched
+    assert killed
+"""
+
+
+def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes(fleet, tmp_path, serial):
+    whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
+    script = tmp_path / 'with_dask.py'
+    script.write_text(WITH_DASK, encoding='utf-8')
+    other = {
+        'OPENBLAS_CORETYPE': 'Prescott',
+        'NPY_DISABLE_CPU_FEATURES': 'AVX2 FMA3 AVX512F AVX512_SKX',
+    }
+    subprocess.run(
+        [sys.executable, str(script), str(fleet), str(tmp_path / 'result')],
+        env={**os.environ, **other},
+        check=True,
+    )
+    assert (tmp_path / 'result' / 'result.parquet').read_bytes() == whole
+
+
+def test_recordings_are_named_by_their_path_below_what_was_asked_for(fleet):
+    assert [asked.path for asked in recordings_asked([str(fleet)])] == ['broken.mcap', *NAMES]
+    assert [asked.path for asked in recordings_asked([str(fleet / 'gap')])] == ['gap']
+    with pytest.raises(AskedError, match='no recording at'):
+        recordings_asked([str(Path(__file__).parent)])
+
+
+def same(row, other):
+    """Whether two rows are the same to the bit; NaN is itself."""
+    return row.keys() == other.keys() and all(
+        value == other[name] or (value != value and other[name] != other[name]) for name, value in row.items()
+    )
