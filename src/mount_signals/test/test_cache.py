@@ -118,6 +118,21 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
         hold(Cache(tmp_path / 'file' / 'copies', 100), 'a', 1)
 
 
+def test_what_was_half_removed_is_not_taken_for_whole(cache, monkeypatch):
+    hold(cache, 'a', 60).release()
+
+    def remove_half(place, **how):
+        for file in place.rglob('*.bin'):
+            file.unlink()
+        raise OSError('killed')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module.shutil, 'rmtree', remove_half)
+        with pytest.raises(SourceError):
+            hold(cache, 'b', 60)
+    assert hold(cache, 'a', 60).path.read_bytes() == bytes(60)
+
+
 def test_what_fails_leaves_nothing(cache):
     def fill(part):
         (part / 'a.bin').write_bytes(b'half')
