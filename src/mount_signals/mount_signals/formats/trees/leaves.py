@@ -1,5 +1,6 @@
 """Arrays of a nested file by their paths, as columns: `imu.acc.z`, `accelerometer.2`."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -104,7 +105,7 @@ def leaves_of(name: str, array: Any, notes: list[str], unit: str = '') -> list[L
     if dtype.names:
         whole = [Leaf(f'{name}.{field}'.lstrip('.'), array, field=field) for field in dtype.names]
         return [leaf for leaf in whole if _is_column(leaf.name, dtype[leaf.field], shape, notes)]
-    size = int(np.prod(shape))
+    size = math.prod(shape)
     if size <= 1:
         return []
     if not _is_column(name, dtype, shape, notes):
