@@ -204,5 +204,7 @@ def _ambiguous(path: Path, possible: list[Split]) -> str:
     ways = ' or '.join(
         f'{split.told} ({", ".join(split.rows[0][:4]).replace(chr(9), " ")})' for split in possible
     )
-    return f'{path} can be read as {ways}; state decimal or delimiter in the mapping file, or '
-        'export with semicolons'
+    return (
+        f'{path} can be read as {ways}; state decimal or delimiter in the mapping file, or export with '
+        'semicolons'
+    )
