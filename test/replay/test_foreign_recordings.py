@@ -83,9 +83,9 @@ def test_a_field_of_a_bag_by_its_stamps(tmp_path):
     assert found.controls[0].stamps[0] == 1_700_000_000_000_000_000
     assert '/pot.range: 999 samples at 100 Hz, by their header stamps' in found.notes
     assert '/pot.range: 1 samples without a number are left out' in found.notes
-    with pytest.raises(ReplayError, match='name a field too'):
+    with pytest.raises(SignalError, match='its columns are /pot.range'):
         given(tmp_path / 'bag', 'displacement=/pot')
-    with pytest.raises(SignalError, match="has no 'length'; it has range"):
+    with pytest.raises(SignalError, match="has no column '/pot.length'; its columns are /pot.range"):
         given(tmp_path / 'bag', 'displacement=/pot.length')
 
 

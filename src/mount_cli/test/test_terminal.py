@@ -80,6 +80,7 @@ REFUSED = {
     'cut': (MISSING, '--from', '1s', '--to', '2s', '--out', MISSING),
     'drive': ('--core', '--scenario', 'recorded', '--file', MISSING),
     'identify drift': (MISSING, MISSING),
+    'import': (MISSING, '--out', 'made'),
     'info': (MISSING,),
     'ls': (MISSING,),
     'identify friction': ('--train', MISSING),
