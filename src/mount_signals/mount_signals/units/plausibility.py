@@ -36,7 +36,7 @@ _OTHERS = {
 
 @dataclass(frozen=True)
 class Size:
-    """Mean, lowest and highest of values, in their own unit; `usual` leaves out what is rare, as faults are."""
+    """Mean, lowest and highest of values, in their own unit; `usual`: without what is rare, as faults."""
 
     mean: float
     low: float
