@@ -59,7 +59,7 @@ identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes
 	@$(BIN)/engine-mount identify friction --step sawtooth --train $(RACK)/friction_ramp.csv $(RACK)/friction_[46]0N.csv $(RACK)/friction_1?0N.csv --held-out $(RACK)/friction_80N.csv --base $(RACK)/default.yaml --out $(SPECIMEN)
 
 pages: $(VENV)/.ready-dev ## write the pages of docs/reference that come from the code, and what the notebooks show
-	@for page in commands_page names_page parameters_page signals_page notebooks; do $(BIN)/python test/docs/$$page.py || exit 1; done
+	@for page in commands_page fleet_columns_page names_page parameters_page signals_page notebooks; do $(BIN)/python test/docs/$$page.py || exit 1; done
 
 bench: $(VENV)/.ready ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench

@@ -1,12 +1,13 @@
 """Pages of reference that a program writes are what it writes from the present sources."""
 
 import commands_page
+import fleet_columns_page
 import names_page
 import parameters_page
 import pytest
 import signals_page
 
-WRITERS = (commands_page, names_page, parameters_page, signals_page)
+WRITERS = (commands_page, fleet_columns_page, names_page, parameters_page, signals_page)
 
 
 @pytest.mark.parametrize('writer', WRITERS, ids=lambda writer: writer.PAGE.stem)

@@ -52,9 +52,7 @@ class Graph:
 
     def client(self, kind, service):
         answer = GetState.Response(current_state=State(id=State.PRIMARY_STATE_UNCONFIGURED))
-        return SimpleNamespace(
-            service_is_ready=lambda: True, call_async=lambda _: Answer(answer), destroy=lambda: None
-        )
+        return SimpleNamespace(service_is_ready=lambda: True, call_async=lambda _: Answer(answer))
 
     def call(self, kind, service, request):
         if kind is SetParameters:

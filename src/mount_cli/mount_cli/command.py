@@ -19,12 +19,14 @@ from mount_cli.commands import (
     experiment,
     faults,
     identify,
+    import_files,
     ls,
     merge,
     record,
     recover,
     replay,
     report,
+    road,
     version,
     view,
 )
@@ -87,6 +89,7 @@ _COMMANDS: tuple[tuple[str, str, Callable[..., None], str | None], ...] = (
     (_RECORDINGS, 'replay', replay.replay, replay.EPILOG),
     (_RECORDINGS, 'compare', compare.compare, compare.EPILOG),
     (_RECORDINGS, 'audit', audit.audit, audit.EPILOG),
+    (_CHANGE, 'import', import_files.import_files, import_files.EPILOG),
     (_CHANGE, 'cut', cut.cut, cut.EPILOG),
     (_CHANGE, 'merge', merge.merge, merge.EPILOG),
     (_CHANGE, 'recover', recover.recover, recover.EPILOG),
@@ -104,6 +107,7 @@ for _panel, _name, _function, _epilog in _COMMANDS:
 app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
 app.add_typer(identify.app, rich_help_panel=_MOUNT)
+app.add_typer(road.app, rich_help_panel=_RECORDINGS)
 
 
 def main(arguments: list[str] | None = None) -> None:

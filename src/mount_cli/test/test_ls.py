@@ -6,9 +6,9 @@ import shutil
 import pytest
 from typer.testing import CliRunner
 
+from mount_bringup.changed_parameters import changed_parameters
 from mount_cli.command import app
 from mount_models.specimen import default_specimen
-from mount_report.recording_facts import changed_parameters
 
 DRIVE = ('--core', '--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
 CHANGED = ('--set', 'switch_on_level=0.0007', '--set', 'policy=switched_viscous', '--no-report')

@@ -35,6 +35,7 @@ def with_force_law(base: Specimen, name: str, fit: ForceLawFit, files: Sequence[
         'valid': {
             'gap': [law.gap_low, law.gap_high],
             'current': [0.0, law.current_high],
+            **({'measured_current': [_short(fit.lowest_current), law.current_high]} if fit.continued else {}),
         },
         'residuals': {
             'relative_rms': _short(fit.relative_rms),
@@ -70,7 +71,7 @@ def with_gap_curves(
     curve = calibration.curves.inductance_of_gap
     entry = {
         **_origin(files),
-        'valid': {'gap': [curve.low, curve.high]},
+        'valid': {'gap': [curve.low, curve.high], **_currents_of_tables(calibration)},
         'celsius': _short(float(np.mean([point.celsius for point in calibration.points]))),
         'temperature_compensation': how,
         'inductance_of_gap': _fit_entry(calibration.inductance),
@@ -131,6 +132,15 @@ def with_friction(base: Specimen, name: str, found: Identification) -> Specimen:
             provenance=_provenance(base, name, 'friction', entry, 'engine-mount identify'),
         )
     )
+
+
+def _currents_of_tables(calibration: GapCalibration) -> dict[str, Any]:
+    """Return the range of currents of tables of few points, where such were interpolated; else nothing."""
+    tables = [point.table for point in calibration.points if point.table is not None]
+    if not tables:
+        return {}
+    low, high = max(low for low, _ in tables), min(high for _, high in tables)
+    return {'interpolated_within_current': [_short(low), _short(high)]}
 
 
 def foreign_parts(specimen: Specimen) -> list[str]:

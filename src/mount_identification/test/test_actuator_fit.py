@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from mount_identification.actuator.fit import fit_force_law
+from mount_identification.specimen import with_force_law
 from mount_models.actuator.law import TABLE_1, ForceLaw, GapOutsideLaw, checked_force
 from mount_models.actuator.law_check import ForceLawRefusedError
 from mount_models.actuator.reluctance import ReluctanceActuator, force
+from mount_models.specimen import default_specimen
 
 GAPS = np.arange(280, 541, 20)[:, np.newaxis] * 1e-6
 CURRENTS = np.linspace(0.1, 3.0, 30)
@@ -116,3 +118,50 @@ def test_points_that_failed_are_refused(measured):
 def test_a_single_gap_is_refused(measured):
     with pytest.raises(ForceLawRefusedError, match='at least 5 air gaps'):
         fit_force_law(np.full_like(measured, 349e-6), CURRENTS, measured)
+
+
+def magnet_pull(current, gap):
+    """A magnet by a formula of its own: the square of the ampere turns, bent by saturation."""
+    field = current / (gap + 60e-6) / 6e3
+    return 330.0 * field**2 / (1.0 + field**2)
+
+
+def points_from(lowest):
+    gaps = np.repeat(np.linspace(270e-6, 550e-6, 12), 24)
+    currents = np.tile(np.linspace(lowest, 3.0, 24), 12)
+    return gaps, currents, magnet_pull(currents, gaps)
+
+
+def test_forces_from_0_2_ampere_on_are_taken_and_the_range_is_told(tmp_path):
+    fit = fit_force_law(*points_from(0.2))
+    assert fit.continued
+    assert fit.lowest_current == pytest.approx(0.2)
+    for gap in (300e-6, 400e-6, 500e-6):
+        for current in (0.06, 0.1, 0.15):
+            assert float(checked_force(fit.law, current, gap)) == pytest.approx(
+                magnet_pull(current, gap), abs=1.0
+            )
+    file = tmp_path / 'force.csv'
+    file.write_text('gap_um\n')
+    entry = with_force_law(default_specimen(), 'own', fit, [file]).provenance['parts']['force_law']
+    assert entry['valid']['measured_current'] == [0.2, 3.0]
+    whole = fit_force_law(*points_from(0.0))
+    assert not whole.continued
+    entry = with_force_law(default_specimen(), 'own', whole, [file]).provenance['parts']['force_law']
+    assert 'measured_current' not in entry['valid']
+
+
+def test_a_law_that_fails_only_below_the_lowest_current_is_refused_for_that(monkeypatch):
+    from mount_identification.actuator import fit as module
+
+    def fails_below(law, lowest_current=0.0):
+        if lowest_current < 0.5:
+            raise ForceLawRefusedError(
+                'the force must be positive; at 293 um and 0.05 A it does not: look again'
+            )
+
+    monkeypatch.setattr(module, 'check_force_law', fails_below)
+    with pytest.raises(ForceLawRefusedError, match=r'measured from 0\.80 A on only.*measure from 0\.05 A on'):
+        fit_force_law(*points_from(0.8))
+    with pytest.raises(ForceLawRefusedError, match='look again'):
+        fit_force_law(*points_from(0.0))

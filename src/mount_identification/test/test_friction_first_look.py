@@ -2,41 +2,13 @@
 
 import numpy as np
 import pytest
+from joint import DT, jenkin, measured, motion
 
 from mount_identification.friction.laws.dahl import Dahl
 from mount_identification.friction.looks.first_look import first_look
-from mount_identification.friction.recording import checked_recording
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.full import full_response
-
-DT = 1e-3
-TIME = np.arange(0.0, 8.0, DT)
-
-
-def motion(amplitude, frequency=0.5, rest=0.3):
-    """Rest, then a sine that begins at its middle; m."""
-    return amplitude * np.sin(2 * np.pi * frequency * np.maximum(TIME - rest, 0.0))
-
-
-def jenkin(x, limits, stiffness, play, stretch):
-    """A slider behind a spring with play, written apart from the one of the package: by its slider."""
-    force = np.empty(x.size)
-    slider = x[0] - stretch
-    for k, place in enumerate(x):
-        for sign, limit in zip((1.0, -1.0), limits, strict=True):
-            beyond = sign * (place - slider) - play
-            if stiffness * beyond > limit:
-                slider = place - sign * (play + limit / stiffness)
-        out = place - slider
-        force[k] = stiffness * np.sign(out) * max(abs(out) - play, 0.0)
-    return force
-
-
-def measured(x, force, zero, seed=0, noise=0.01):
-    random = np.random.default_rng(seed)
-    force = force + zero + noise * np.sqrt(np.mean(force**2)) * random.standard_normal(force.size)
-    return checked_recording('made', TIME, x, force, 1000.0)
 
 
 @pytest.mark.parametrize('zero', [-400.0, 0.0, 250.0])

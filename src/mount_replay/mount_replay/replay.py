@@ -9,7 +9,13 @@ from typing import Any
 from mount_bags.bag.recording import Recording
 from mount_bags.run.folder import RunFolder, make_run_folder
 from mount_bags.run.place import open_mount
-from mount_bags.run.session import session_parameters, time_text
+from mount_bags.run.session import (
+    SessionError,
+    recorded_session,
+    session_content,
+    session_parameters,
+    time_text,
+)
 from mount_bags.run.versions import versions
 from mount_bringup.chosen import (
     Parameters,
@@ -28,11 +34,12 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, with_flattened
 from mount_replay.agreement import Agreement, agreement
 from mount_replay.core import Progress, Replayed, replay_in_core
-from mount_replay.given.foreign import ForeignOrder, chosen_gap, foreign_input
+from mount_replay.given.foreign import DEFAULT_TABLE, ForeignOrder, chosen_gap, foreign_input
 from mount_replay.given.input import ReplayError, ReplayInput, replay_input
 from mount_replay.given.parameter_changes import without
 from mount_replay.output import write_replay
 from mount_ros import topics
+from mount_signals.importing.importing import SCENARIO
 
 CORE, LOCKSTEP = 'core', 'lock-step'
 REPLAYED_NODES = ('mount_control', 'mount_init')
@@ -175,10 +182,19 @@ def _read(order: ReplayOrder) -> tuple[ReplayInput, float, float]:
     recording = open_mount(order.recording, order.mount)
     decoding_time = _load_displacement(recording)
     reading_time = time.perf_counter() - begin
-    gap, sentence = chosen_gap(order.table, {}) if order.table else (None, '')
+    table = order.table or (DEFAULT_TABLE if _is_imported(recording) else '')
+    gap, sentence = chosen_gap(table, {}) if table else (None, '')
     given = replay_input(recording, gap)
     given.notes += [*([sentence] if sentence else []), *recording.warnings]
     return given, reading_time, decoding_time
+
+
+def _is_imported(recording: Recording) -> bool:
+    """Whether a recording was made of files of others, in which no gap was ever measured."""
+    try:
+        return session_content(recorded_session(recording)).get('scenario') == SCENARIO
+    except SessionError:
+        return False
 
 
 def _load_displacement(recording: Recording) -> float:

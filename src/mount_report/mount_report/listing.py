@@ -2,24 +2,21 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from mount_bags.bag.metadata import METADATA_NAME
 from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.messages.series import SeriesError
 from mount_bags.run.folder import RunFolder
 from mount_bags.run.place import open_run
-from mount_bags.run.session import (
-    SessionError,
-    recorded_session,
-    recorded_sessions,
-    session_content,
-    session_parameters,
-    session_sample_rate,
-)
+from mount_bags.run.session import session_parameters
+from mount_bags.run.told import duration_of, started_of, told_session
+from mount_bringup.recorded_mount import simulated_mounts
+from mount_signals.sources.local import local_path
+from mount_signals.sources.source import SourceError
+from mount_signals.sources.stores import is_local, outline
 
 _SOUND = 'nothing lost, no faults'
 _COUNTS = {
@@ -36,10 +33,11 @@ _COUNTS = {
 class Listed:
     """One recording; `started` with its zone, `duration` in s of its stamps, empty or None where unknown.
 
-    `sound` is None where no summary of a run tells whether anything was lost or went wrong.
+    `path` is its URI where it lies in a store. `sound` is None where no summary of a run tells whether
+    anything was lost or went wrong.
     """
 
-    path: Path
+    path: Path | str
     started: datetime | None = None
     duration: float | None = None
     scenario: str = ''
@@ -61,9 +59,13 @@ class Listed:
         }
 
 
-def listed(folders: Sequence[Path]) -> list[Listed]:
-    """Return the recordings in `folders`, and those that these are themselves, the newest first."""
-    found = [listed_one(place) for folder in folders for place in _places(folder)]
+def listed(folders: Sequence[Path | str]) -> list[Listed]:
+    """Return the recordings in `folders`, and those that these are themselves, the newest first.
+
+    A folder is a path or a URI; of what lies in a store only the ends are read. Raises `SourceError` where a
+    store does not tell what is there.
+    """
+    found = [one for folder in folders for one in _listed_at(str(folder))]
     return sorted(found, key=lambda one: one.started.timestamp() if one.started else 0.0, reverse=True)
 
 
@@ -82,42 +84,25 @@ def listed_one(path: Path) -> Listed:
         duration_of(content, recording),
         _scenario(content),
         str(content.get('mode', '')),
-        _mount(parameters),
+        simulated_mounts(parameters),
         str(parameters.get('mount_control', {}).get('policy', '')),
         verdict,
         sound,
     )
 
 
-def told_session(recording: Recording) -> dict[str, Any]:
-    """Return the content of the session, of several mounts that of the first, {} where none can be read."""
-    try:
-        text = recorded_session(recording) or next(iter(recorded_sessions(recording).values()), '')
-        return session_content(text)
-    except (SessionError, SeriesError, ReadingError):
-        return {}
+def _listed_at(folder: str) -> Iterator[Listed]:
+    if is_local(folder):
+        yield from map(listed_one, _places(local_path(folder)))
+        return
+    from mount_signals.sources.outlines import recordings_at
 
-
-def started_of(content: Mapping[str, Any], recording: Recording) -> datetime | None:
-    """Return when a run began: as its session tells, else when its first message came."""
-    try:
-        return datetime.fromisoformat(str(content['started'])).astimezone()
-    except (KeyError, ValueError):
-        times = recording.time_range
-    try:
-        return datetime.fromtimestamp(times[0] / 1e9).astimezone() if times else None
-    except (OverflowError, ValueError, OSError):
-        return None
-
-
-def duration_of(content: Mapping[str, Any], recording: Recording) -> float | None:
-    """Return the length in s: of the displacement by its rate, else from the first message to the last."""
-    counts = [recording.topics[f'/{mount}/displacement'.replace('//', '/')] for mount in recording.mounts]
-    samples = max((topic.message_count for topic in counts), default=0)
-    if samples:
-        return samples / session_sample_rate(content)
-    times = recording.time_range
-    return (times[1] - times[0]) / 1e9 if times else None
+    for uri in recordings_at(folder):
+        try:
+            with outline(uri) as path:
+                yield replace(listed_one(path), path=uri)
+        except SourceError as error:
+            yield Listed(uri, verdict=str(error), sound=False)
 
 
 def _places(folder: Path) -> Iterator[Path]:
@@ -133,18 +118,6 @@ def _is_one(path: Path) -> bool:
     if path.is_file():
         return path.suffix == '.mcap'
     return any((place / METADATA_NAME).is_file() or any(place.glob('*.mcap')) for place in (path, inside))
-
-
-def _mount(parameters: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the simulated mounts: their places, of one its name; empty in a car."""
-    told = parameters.get('mount_sim', {})
-    if not told or told.get('mounts') or told.get('mount'):
-        return str(told.get('mounts') or told.get('mount', ''))
-    from mount_bringup.mount_choice import (
-        seat_of,
-    )  # takes half a second to load, for a run that names no mount
-
-    return seat_of(parameters)
 
 
 def _scenario(content: Mapping[str, Any]) -> str:

@@ -10,14 +10,10 @@ from mount_bags.bag.recording import Recording
 from mount_bags.events.event_marks import read_marks
 from mount_bags.run.screen import Table
 from mount_bags.run.session import session_parameters
+from mount_bags.run.told import duration_of, started_of, told_session, versions_told
 from mount_bags.run.versions import version_differences, versions
-from mount_bringup.settings import defaults_of_nodes
-from mount_models.specimen import default_specimen
-from mount_report.listing import duration_of, started_of, told_session
+from mount_bringup.changed_parameters import changed_parameters
 from mount_ros.topics import AIR_GAP, EVENT
-
-_OF_THE_RUN = {'uri', 'lockstep', 'interface', 'channel', 'port'}
-"""Parameters that a run chooses by itself."""
 
 
 @dataclass(frozen=True)
@@ -92,52 +88,18 @@ class RecordingFacts:
 def recording_facts(recording: Recording) -> RecordingFacts:
     """Return what a recording is and holds; every message is looked at, for the losses."""
     session = told_session(recording)
-    replay = session.get('replay')
-    told = (replay if isinstance(replay, Mapping) else session).get('versions')
     audits = audit(recording)
     return RecordingFacts(
         recording,
         session,
         changed_parameters(session_parameters(session)),
-        {str(name): str(value) for name, value in told.items()} if isinstance(told, Mapping) else {},
+        versions_told(session),
         version_differences(session, versions()) if session else {},
         _gaps(recording),
         _marks(recording),
         audits,
         losses(recording, audits),
     )
-
-
-def changed_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, tuple[Any, Any]]]:
-    """Return {node: {parameter: (value, default)}} of what a session tells that is not the default.
-
-    Of friction and contact the default is what the shipped specimen says of this actuator.
-    """
-    defaults = defaults_of_nodes()
-    identified = default_specimen().friction
-    control = defaults['mount_control']
-    for name in control:
-        prefix, _, rest = name.partition('.')
-        if prefix in ('friction', 'contact') and rest in identified:
-            control[name] = identified[rest]
-    changed = {
-        node: {
-            name: (value, defaults[node][name])
-            for name, value in values.items()
-            if name in defaults.get(node, {})
-            and name not in _OF_THE_RUN
-            and _differs(value, defaults[node][name])
-        }
-        for node, values in parameters.items()
-    }
-    return {node: own for node, own in changed.items() if own}
-
-
-def _differs(value: Any, default: Any) -> bool:
-    both_unknown = value != value and default != default
-    if isinstance(default, tuple):
-        return bool(value) and tuple(value) != default
-    return not both_unknown and value != default
 
 
 def _gaps(recording: Recording) -> dict[str, dict[str, float]]:

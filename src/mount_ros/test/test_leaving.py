@@ -25,8 +25,8 @@ leave_middleware(functools.partial(keeping.sleep, 600), code={code}, last=0.3)
 _LEFT = """
 import time
 from mount_ros.nodes.leaving import leave_middleware
-leave_middleware(lambda: None, last=0.05)
-time.sleep(0.2)
+leave_middleware(lambda: None, last=2.0)
+time.sleep(2.5)
 print('goes on', end='')
 """
 
@@ -60,3 +60,21 @@ def test_a_process_ends_although_its_middleware_keeps_the_interpreter(code):
 def test_a_process_that_has_left_goes_on():
     ended = subprocess.run([sys.executable, '-c', _LEFT], capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'goes on', '')
+
+
+_SET = """
+import ctypes, time
+from mount_ros.nodes.leaving import Deadline
+deadline = Deadline(7)
+deadline.set(2.0)
+deadline.set(0.0)
+time.sleep(2.5)
+print('called off', end='', flush=True)
+deadline.set(0.5)
+ctypes.PyDLL(None).sleep(60)  # keeps the interpreter
+"""
+
+
+def test_a_deadline_ends_the_process_unless_it_is_called_off():
+    ended = subprocess.run([sys.executable, '-c', _SET], capture_output=True, text=True, timeout=50)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (7, 'called off', '')

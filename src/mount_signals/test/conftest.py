@@ -8,7 +8,7 @@ import pytest
 # The tests are imported one by one (importmode importlib); what they share is found by this path.
 sys.path.insert(0, str(Path(__file__).parent))
 
-from served_stores import know_host, s3_store, sftp_store
+from served_stores import Bucket, HttpStore, know_host, name_s3_store, s3_server, sftp_store
 
 
 @pytest.fixture(autouse=True)
@@ -29,11 +29,17 @@ def reference() -> Path:
     return Path(__file__).parents[3] / 'bags' / 'reference' / 'gap'
 
 
+@pytest.fixture(scope='session')
+def s3_port():
+    with s3_server() as port:
+        yield port
+
+
 @pytest.fixture
-def s3(monkeypatch):
-    """Return port and client of a store of objects with the bucket `drives`."""
-    with s3_store(monkeypatch) as store:
-        yield store
+def s3(s3_port, monkeypatch) -> Bucket:
+    """Return an empty bucket `drives` of a store of objects, which the environment names."""
+    name_s3_store(s3_port, monkeypatch)
+    return Bucket(s3_port)
 
 
 @pytest.fixture
@@ -44,3 +50,13 @@ def sftp(tmp_path, own_home):
     with sftp_store(folder, own_home) as port:
         know_host(own_home, port)
         yield port, folder
+
+
+@pytest.fixture
+def web(tmp_path):
+    """Return a server by HTTP and its folder."""
+    folder = tmp_path / 'served'
+    folder.mkdir()
+    store = HttpStore(folder)
+    yield store, folder
+    store.close()

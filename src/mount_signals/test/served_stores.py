@@ -1,8 +1,10 @@
 """Stores that tests fetch from: S3, SFTP and HTTP on this machine, and a way to them that breaks."""
 
 import asyncio
+import collections
 import contextlib
 import functools
+import http.client
 import http.server
 import os
 import socket
@@ -11,26 +13,54 @@ from pathlib import Path
 
 import asyncssh
 
+SECRET_KEY = 'a-key-that-nothing-may-write-down'
+
 
 @contextlib.contextmanager
-def s3_store(patch):
-    """Give the port of a store of objects with a bucket `drives`, and a client to fill it."""
-    import boto3
+def s3_server():
+    """Give the port of a store of objects."""
     from moto.server import ThreadedMotoServer
 
-    server = ThreadedMotoServer(ip_address='127.0.0.1', port=0)
+    server = ThreadedMotoServer(ip_address='127.0.0.1', port=0, verbose=False)
     server.start()
-    port = server.get_host_and_port()[1]
-    patch.setenv('AWS_ACCESS_KEY_ID', 'test')
-    patch.setenv('AWS_SECRET_ACCESS_KEY', 'test')
-    patch.setenv('AWS_DEFAULT_REGION', 'eu-central-1')
-    patch.setenv('AWS_ENDPOINT_URL', f'http://127.0.0.1:{port}')
-    client = boto3.client('s3')
-    client.create_bucket(Bucket='drives', CreateBucketConfiguration={'LocationConstraint': 'eu-central-1'})
     try:
-        yield port, client
+        yield server.get_host_and_port()[1]
     finally:
         server.stop()
+
+
+def name_s3_store(port, patch):
+    """Let the environment name the store at `port` and who asks."""
+    patch.setenv('AWS_ACCESS_KEY_ID', 'test')
+    patch.setenv('AWS_SECRET_ACCESS_KEY', SECRET_KEY)
+    patch.setenv('AWS_DEFAULT_REGION', 'us-east-1')
+    patch.setenv('AWS_ENDPOINT_URL', f'http://127.0.0.1:{port}')
+
+
+class Bucket:
+    """The bucket `drives` of a store of objects at `port`, made anew."""
+
+    def __init__(self, port):
+        import s3fs
+
+        self.port = port
+        connection = http.client.HTTPConnection('127.0.0.1', port)
+        connection.request('POST', '/moto-api/reset')
+        assert connection.getresponse().status == 200
+        connection.close()
+        s3fs.S3FileSystem.clear_instance_cache()  # those of other tests have other keys
+        self._files = s3fs.S3FileSystem(use_listings_cache=False, skip_instance_cache=True)
+        self._files.call_s3('create_bucket', Bucket='drives')
+
+    def put(self, key, data, **how):
+        self._files.call_s3('put_object', Bucket='drives', Key=key, Body=data, **how)
+
+    def put_folder(self, folder, key):
+        for file in folder.iterdir():
+            self.put(f'{key}/{file.name}', file.read_bytes())
+
+    def put_in_parts(self, key, data, size):
+        self._files.pipe_file(f'drives/{key}', data, chunksize=size)
 
 
 @contextlib.contextmanager
@@ -48,18 +78,31 @@ def sftp_store(folder, home, port=0):
         key.write_public_key(ssh / 'authorized_keys')
     served = functools.partial(asyncssh.SFTPServer, chroot=os.fsencode(folder))
 
+    connections = []
+
+    class Kept(asyncssh.SSHServer):
+        def connection_made(self, conn):
+            connections.append(conn)
+
     async def begin():
         return await asyncssh.listen(
-            '127.0.0.1', port, server_host_keys=[str(ssh / 'host')],
+            '127.0.0.1', port, server_factory=Kept, server_host_keys=[str(ssh / 'host')],
             authorized_client_keys=str(ssh / 'authorized_keys'), sftp_factory=served, allow_scp=False,
         )  # fmt: skip
+
+    async def end():
+        server.close()
+        for connection in connections:
+            connection.abort()
+            await connection.wait_closed()
+        await server.wait_closed()
+        await asyncio.sleep(0)
 
     server = asyncio.run_coroutine_threadsafe(begin(), loop).result()
     try:
         yield server.get_port()
     finally:
-        loop.call_soon_threadsafe(server.close)
-        asyncio.run_coroutine_threadsafe(server.wait_closed(), loop).result(10)
+        asyncio.run_coroutine_threadsafe(end(), loop).result(10)
         loop.call_soon_threadsafe(loop.stop)
         thread.join()
 
@@ -71,48 +114,74 @@ def know_host(home, port, key='host'):
         file.write(f'[127.0.0.1]:{port} {public}')
 
 
-@contextlib.contextmanager
-def http_store(folder, *, stretches=True, sizes=True):
-    """Give the port of a server of the files in `folder`, with stretches of files or only whole ones."""
+class HttpStore:
+    """A server of the files in `folder`: with stretches of them or only whole ones, with sizes or without.
 
-    class Handler(http.server.SimpleHTTPRequestHandler):
-        protocol_version = 'HTTP/1.1'
+    `asked` counts the requests by method; answers to GET wait for `gate`.
+    """
 
-        def __init__(self, *args):
-            super().__init__(*args, directory=str(folder))
+    def __init__(self, folder, *, stretches=True, sizes=True):
+        self.asked = collections.Counter()
+        self.gate = threading.Event()
+        self.gate.set()
+        self.status = 0
+        handler = functools.partial(_Handler, self, str(folder))
+        self.stretches, self.sizes = stretches, sizes
+        self._server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler)
+        self.port = self._server.server_address[1]
+        self.uri = f'http://127.0.0.1:{self.port}'
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self._thread.start()
 
-        def log_message(self, *args):
-            pass
+    def close(self):
+        self.gate.set()
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
 
-        def do_GET(self):
-            wanted = self.headers.get('Range')
-            if not (wanted and stretches):
-                super().do_GET()
-                return
-            data = Path(self.translate_path(self.path)).read_bytes()
-            begin, _, last = wanted.removeprefix('bytes=').partition('-')
-            part = data[int(begin) : int(last) + 1 if last else None]
-            self.send_response(206)
-            self.send_header('Content-Length', str(len(part)))
-            self.send_header('Content-Range', f'bytes {begin}-{int(begin) + len(part) - 1}/{len(data)}')
-            self.end_headers()
-            self.wfile.write(part)
 
-        def send_header(self, keyword, value):
-            if sizes or keyword != 'Content-Length':
-                super().send_header(keyword, value)
-            if keyword == 'Content-Length' and not sizes:
-                super().send_header('Connection', 'close')
+class _Handler(http.server.SimpleHTTPRequestHandler):
+    protocol_version = 'HTTP/1.1'
 
-    server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), Handler)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    try:
-        yield server.server_address[1]
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
+    def __init__(self, store, folder, *args):
+        self._store = store
+        super().__init__(*args, directory=folder)
+
+    def log_message(self, *args):
+        pass
+
+    def do_HEAD(self):
+        self._store.asked['HEAD'] += 1
+        if self._store.status:
+            self.send_error(self._store.status)
+        else:
+            super().do_HEAD()
+
+    def do_GET(self):
+        self._store.asked['GET'] += 1
+        self._store.gate.wait()
+        wanted = self.headers.get('Range')
+        if self._store.status:
+            self.send_error(self._store.status)
+        elif wanted and self._store.stretches:
+            self._send_stretch(wanted)
+        else:
+            super().do_GET()
+
+    def _send_stretch(self, wanted):
+        data = Path(self.translate_path(self.path)).read_bytes()
+        begin, _, last = wanted.removeprefix('bytes=').partition('-')
+        part = data[int(begin) : int(last) + 1 if last else None]
+        self.send_response(206)
+        self.send_header('Content-Length', str(len(part)))
+        self.send_header('Content-Range', f'bytes {begin}-{int(begin) + len(part) - 1}/{len(data)}')
+        self.end_headers()
+        self.wfile.write(part)
+
+    def send_header(self, keyword, value):
+        if keyword == 'Content-Length' and not self._store.sizes:
+            keyword, value = 'Connection', 'close'
+        super().send_header(keyword, value)
 
 
 class BreakingWay:

@@ -170,6 +170,13 @@ class Recording:
                 name, partial(self._payloads, name), head, columns={**known, **found}, stamps=stamps
             )
 
+    def beginning(self, name: str) -> Series:
+        """Return the first block of messages of a topic, which tells its columns; raises `ReadingError`."""
+        full_name = self.resolve(name)
+        first = next(self._blocks([full_name]), None)
+        payloads = Payloads([] if first is None else [first[1].payloads()])
+        return self._made(full_name, payloads, np.empty(0, HEAD) if first is None else first[1].heads)
+
     def parts(self, names: Iterable[str], size: int) -> Iterator[Series]:
         """Yield the messages of topics in the order of the files; at most their ends have fewer than `size`.
 

@@ -1,7 +1,8 @@
 """Reads one file of a bag in sqlite3 storage, rosbag2's own before MCAP.
 
 The source is never touched. What its writer had not yet brought into the database when it ended stands in a
-log beside it; with one, a copy is read, in which sqlite puts both together.
+log beside it; with one, a copy is read, in which sqlite puts both together. A file packed as a whole is read
+from an unpacked copy.
 """
 
 import shutil
@@ -16,6 +17,7 @@ from mcap.records import Attachment
 
 from mount_bags.container.message_compression import plain
 from mount_bags.container.stored import HEAD, StorageError, StoredMessages, StoredTopic, stored_messages
+from mount_bags.container.whole_files import COMPRESSED_SUFFIXES, unpack
 
 _AT_ONCE = 1000  # rows
 # A column may hold any type, whatever was declared; a name or a text that is no UTF-8 is a `ValueError`.
@@ -39,8 +41,6 @@ class SqliteFile:
         self._logs = [log for log in _logs_of(path) if log.is_file() and log.stat().st_size]
         if not path.is_file():
             raise StorageError(f'{path} cannot be read: no such file')
-        if path.suffix != '.db3':
-            raise StorageError(f'{path} is compressed as a whole; unpack it first')
         try:
             self._base = self._connected()
             self._read_topics()
@@ -86,11 +86,12 @@ class SqliteFile:
         return iter(())
 
     def _connected(self) -> sqlite3.Connection:
+        if self.path.suffix in COMPRESSED_SUFFIXES:
+            return self._unpacked()
         if not self._logs:
             return sqlite3.connect(f'{self.path.absolute().as_uri()}?mode=ro&immutable=1', uri=True)
         try:
-            folder = Path(tempfile.mkdtemp(prefix='engine_mount_'))
-            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+            folder = self._scratch()
             for file in (self.path, *self._logs):
                 shutil.copyfile(file, folder / file.name)
         except OSError as error:
@@ -99,6 +100,24 @@ class SqliteFile:
                 f'{error.strerror}; make room in {tempfile.gettempdir()}'
             ) from None
         return sqlite3.connect(folder / self.path.name)
+
+    def _unpacked(self) -> sqlite3.Connection:
+        """Return the database of a file that is packed as a whole; it needs the space of the unpacked one."""
+        try:
+            copy = self._scratch() / self.path.stem
+            with self.path.open('rb') as packed, copy.open('wb') as target:
+                unpack(packed, target, self.path.suffix)
+        except OSError as error:
+            raise StorageError(
+                f'{self.path} cannot be unpacked: {error.strerror}; make room in {tempfile.gettempdir()}'
+            ) from None
+        return sqlite3.connect(copy)
+
+    def _scratch(self) -> Path:
+        """Return a folder that is removed with this object."""
+        folder = Path(tempfile.mkdtemp(prefix='engine_mount_'))
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        return folder
 
     def _read_topics(self) -> None:
         cursor = self._base.execute('SELECT * FROM topics')

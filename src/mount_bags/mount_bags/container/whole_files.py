@@ -21,7 +21,7 @@ def mapped(path: Path) -> mmap.mmap:
         with path.open('rb') as file:
             if path.suffix in COMPRESSED_SUFFIXES:
                 with tempfile.TemporaryFile() as unpacked:
-                    _unpack(file, unpacked, path.suffix)
+                    unpack(file, unpacked, path.suffix)
                     unpacked.flush()
                     return mmap.mmap(unpacked.fileno(), 0, access=mmap.ACCESS_READ)
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
@@ -40,8 +40,8 @@ def forget(data: mmap.mmap, begin: int, end: int) -> None:
         data.madvise(mmap.MADV_DONTNEED, begin, length)
 
 
-def _unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:
-    """Unpack as far as the packed bytes go; what is cut off there is missing here."""
+def unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:
+    """Unpack `source`, packed as `suffix` says; what is cut off there is missing in `target`."""
     try:
         if suffix == '.lz4':
             import lz4.frame

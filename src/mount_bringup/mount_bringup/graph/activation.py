@@ -117,8 +117,7 @@ class Activation:
             return all(answer.done() for answer in answers.values())
 
         self._graph.wait_until(all_done, TRANSITION_LIMIT, f'activate of {names}')
-        for node, client in clients.items():
-            client.destroy()
+        for node in nodes:
             if answers[node].result().success:
                 self._graph.verdicts.note_active(node)
         for node in nodes:

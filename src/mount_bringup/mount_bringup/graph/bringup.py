@@ -39,7 +39,7 @@ from mount_bringup.graph.transitions import TRANSITION_LIMIT, Transitions
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
 from mount_ros.messages.event import read_mark
-from mount_ros.nodes.leaving import leave_middleware
+from mount_ros.nodes.leaving import Deadline, leave_middleware
 from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION
@@ -48,6 +48,7 @@ from mount_sim.diagnosis import FINISHED
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
 _MOMENT = 0.05  # s, chosen
+_LONGEST_HANG = 30.0  # s, chosen: then the supervisor ends, and its nodes go to 0 A by themselves
 
 
 class Bringup:
@@ -71,6 +72,8 @@ class Bringup:
         self._mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
         self._interrupted = False  # no lock: a second signal may come amid the first
         self._context = Context()
+        self._clients: dict[str, Client] = {}
+        self._deadline = Deadline(code=1)
         self._transitions = Transitions(self)
         self._activation = Activation(self)
         self._recovery = Recovery(self, settings.restart_limit)
@@ -166,21 +169,31 @@ class Bringup:
     def wait_until(self, condition: Callable[[], bool], limit: float, what: str) -> None:
         """Serve the graph until `condition`; raise `GraphError` if it breaks down or `limit` s pass."""
         begin = time.monotonic()
-        while not condition():
-            if self._interrupted:
-                raise Interrupted
-            try:
-                self.check_processes()
-                self.verdicts.check_fatal()
-                if self._makes_good:
-                    self._check_work()
-            except NodesLostError as lost:
-                if not self._makes_good:
-                    raise
-                self._make_good(lost.loss)
-            if time.monotonic() - begin > limit:
-                raise GraphError(f'{what} did not happen within {limit:g} s; {self.verdicts.complaints()}')
-            self.serve_once()
+        try:
+            while not condition():
+                self._deadline.set(_LONGEST_HANG)
+                self._look_after()
+                if time.monotonic() - begin > limit:
+                    raise GraphError(
+                        f'{what} did not happen within {limit:g} s; {self.verdicts.complaints()}'
+                    )
+                self.serve_once()
+        finally:
+            self._deadline.set(0.0)
+
+    def _look_after(self) -> None:
+        """Raise `Interrupted` if asked to end; make good what has been lost, or raise that."""
+        if self._interrupted:
+            raise Interrupted
+        try:
+            self.check_processes()
+            self.verdicts.check_fatal()
+            if self._makes_good:
+                self._check_work()
+        except NodesLostError as lost:
+            if not self._makes_good:
+                raise
+            self._make_good(lost.loss)
 
     def _check_work(self) -> None:
         """Raise `NodesLostError` if a node hangs, or the electronics have lost their initialisation."""
@@ -220,7 +233,7 @@ class Bringup:
 
     def mark_setter(self, say: Callable[[str], None]) -> Callable[[], None]:
         """Return the function that asks the recorder to mark this moment; `say` takes its answer."""
-        client = self._node.create_client(Trigger, f'{RECORDER.name}/mark')
+        client = self.client(Trigger, f'{RECORDER.name}/mark')
 
         def set_mark() -> None:
             if client.service_is_ready():
@@ -239,12 +252,14 @@ class Bringup:
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
+        self._deadline.set(_LONGEST_HANG)
         resting = [self._try_to_deactivate(node) for node in ending_order(self.nodes)]
         self.at_rest = all(resting)
         return self.leave()
 
     def leave(self) -> list[str]:
         """End without a word to the nodes; return a sentence per unclean end."""
+        self._deadline.close()
         if self._context.ok() and not leave_middleware(self._take_down):
             self.notes.append('the middleware of the supervisor did not come to an end and was left behind')
         remove_abandoned()
@@ -256,7 +271,7 @@ class Bringup:
         rclpy.try_shutdown(context=self._context)
 
     def wait_for_service(self, node: GraphNode) -> Client:
-        """Return a client of the transitions of a node when it is there; to be destroyed by who asked."""
+        """Return the client of the transitions of a node when it is there."""
         client = self.client(ChangeState, f'{node.full_name}/change_state')
         self.wait_until(client.service_is_ready, _START_LIMIT, f'start of {node.full_name}')
         return client
@@ -270,13 +285,12 @@ class Bringup:
         if self.figures(node).get('state') != 'active':
             return True
         done = False
-        client = self._node.create_client(ChangeState, f'{node.full_name}/change_state')
+        client = self.client(ChangeState, f'{node.full_name}/change_state')
         if client.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
             answer = client.call_async(request)
             self._executor.spin_until_future_complete(answer, timeout_sec=2.0)
             done = answer.done() and answer.result().success
-        self._node.destroy_client(client)
         return done
 
     def refuse_others(self, own: int) -> None:
@@ -302,8 +316,13 @@ class Bringup:
             raise GraphError(f'{error}: {"; ".join(alone())}') from None
 
     def client(self, kind: Any, service: str) -> Client:
-        """Return a client of a service; to be destroyed by who asked for it."""
-        return self._node.create_client(kind, service)
+        """Return the client of a service, which stays until the end.
+
+        Fast DDS has been seen to wait for itself for ever where an endpoint was destroyed.
+        """
+        if service not in self._clients:
+            self._clients[service] = self._node.create_client(kind, service)
+        return self._clients[service]
 
     def call(self, kind: Any, service: str, request: Any) -> Any:
         """Return the answer of a service."""
@@ -311,5 +330,4 @@ class Bringup:
         self.wait_until(client.service_is_ready, _START_LIMIT, f'service {service}')
         answer = client.call_async(request)
         self.wait_until(answer.done, TRANSITION_LIMIT, f'answer of {service}')
-        self._node.destroy_client(client)
         return answer.result()

@@ -135,7 +135,6 @@ class Recovery:
             )
 
         self._graph.wait_until(born, _BIRTH_LIMIT, f'start of {node.full_name} again')
-        client.destroy()
 
     def _prepare(self, node: GraphNode, chosen: Remedy) -> None:
         if node.is_a(RECORDER):

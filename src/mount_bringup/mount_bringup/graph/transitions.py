@@ -60,12 +60,11 @@ class Transitions:
     def _ask(self, node: GraphNode, transition: int) -> '_Asked':
         client = self._graph.wait_for_service(node)
         request = ChangeState.Request(transition=Transition(id=transition))
-        return _Asked(node, transition, client, client.call_async(request))
+        return _Asked(node, transition, client.call_async(request))
 
     def _take_answer(self, asked: '_Asked') -> None:
         label = _LABELS.get(asked.transition, str(asked.transition))
         self._graph.wait_until(asked.answer.done, TRANSITION_LIMIT, f'{label} of {asked.node.full_name}')
-        asked.client.destroy()
         if not asked.answer.result().success:
             raise self.refusal(asked.node, label)
         if asked.transition == _CONFIGURE:
@@ -82,5 +81,4 @@ class Transitions:
 class _Asked(NamedTuple):
     node: GraphNode
     transition: int
-    client: Client
     answer: Future

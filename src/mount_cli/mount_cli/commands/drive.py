@@ -1,12 +1,24 @@
 """`engine-mount drive`: the simulated car through the whole graph."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mount_bringup.graph.nodes import RESTART_LIMIT
-from mount_cli.commands.options import Domain, JsonFile, Namespace, NewFolder, Settings, Snapshot, Split
+from mount_cli.commands.options import (
+    Columns,
+    Dbc,
+    Domain,
+    JsonFile,
+    MapFile,
+    Namespace,
+    NewFolder,
+    Rate,
+    Settings,
+    Snapshot,
+    Split,
+    TimeColumn,
+)
 from mount_cli.commands.road_arguments import (
     ContactLength,
     Distance,
@@ -16,8 +28,10 @@ from mount_cli.commands.road_arguments import (
     brought_road,
     check_scenario,
     given_without_road,
+    height_column,
 )
 from mount_cli.completion.values import faults, listed, named
+from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
@@ -37,7 +51,7 @@ Examples:
 
 `engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount in the seat
 
-`engine-mount drive --scenario recorded --file drive.csv --column az --scale -1` - your own recording
+`engine-mount drive --scenario recorded --file drive.csv --column az:g --scale -1` - your own recording
 
 `engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
 
@@ -75,19 +89,19 @@ def drive(
         ),
     ] = '',
     file: Annotated[
-        Path | None, typer.Option(help='recorded: CSV, NPY, JSON, folder of NPY pairs, or MCAP')
-    ] = None,
-    column: Annotated[
-        str,
-        typer.Option(
-            help='recorded: column (CSV, JSON), signal.number (NPY), field of the message (MCAP); '
-            'road: NAME[:UNIT] of the height'
-        ),
+        str, typer.Option(metavar='FILE', help='recorded: any file or folder of signals, or its URI')
     ] = '',
-    time_column: Annotated[str, typer.Option(help='recorded: column of the time in s (CSV, JSON)')] = '',
-    topic: Annotated[str, typer.Option(help='recorded: topic (MCAP)')] = '',
+    column: Columns = None,
+    time: TimeColumn = '',
+    rate: Rate = None,
+    map_file: MapFile = None,
+    dbc: Dbc = None,
+    topic: Annotated[str, typer.Option(help='recorded: topic of a bag, --column being the field')] = '',
     scale: Annotated[
-        float | None, typer.Option(help='recorded: factor to m/s^2 upwards; -1 for an axis that points down')
+        float | None,
+        typer.Option(
+            help='recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'
+        ),
     ] = None,
     road: Annotated[
         str, typer.Option(metavar='FILE', help='measured road: height over distance, CSV or OpenCRG')
@@ -176,6 +190,9 @@ def drive(
         raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
     if composed and (lockstep or core):
         raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
+    of_files = {'time': time, 'rate': rate, 'map-file': map_file, 'dbc': dbc, 'topic': topic, 'scale': scale}
+    if not file:
+        given_without_file(**of_files, column=None if road else column)
     if road:
         check_scenario(scenario, file)
         scenario = 'road'
@@ -193,11 +210,6 @@ def drive(
         'mounts': mounts or None,
         'seed': seed,
         'timeline.duration': duration,
-        'recorded.file': str(file.absolute()) if file else None,
-        'recorded.column': (column or None) if not road else None,
-        'recorded.time_column': time_column or None,
-        'recorded.topic': topic or None,
-        'recorded.scale': scale,
     }
     sim = parameters.setdefault('mount_sim', {})
     sim.update({name: value for name, value in given.items() if value is not None})
@@ -214,14 +226,22 @@ def drive(
     mode = 'core' if core else 'lock-step' if lockstep else 'real time'
     chosen = chosen_domain(domain)
     brought: tuple[Brought, ...] = ()
+    console = terminal()
     if road:
-        how = {'lateral': lateral, 'column': column, 'distance': distance}
+        how = {'lateral': lateral, 'column': height_column(column or []), 'distance': distance}
         how |= {'contact_length': contact_length, 'repeat': repeat, 'sim': parameters['mount_sim']}
         brought = (brought_road(road, speed, **how),)
+    elif file:
+        from mount_replay.drive.recorded_file import recorded_acceleration
+
+        said = [f'{topic}.{name}' if topic else name for name in column or []]
+        how = {'time': time, 'rate': rate, 'scale': scale, 'mapping_file': map_file, 'dbc': dbc}
+        recorded, factor = recorded_acceleration(str(local(file, console)), said, **how)
+        brought = (recorded,)
+        parameters['mount_sim']['recorded.scale'] = factor
     order = DriveOrder(
         scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, brought
     )
-    console = terminal()
     screen = TerminalScreen(console)
     folder, run, complaints = record_drive(order, screen)
     recorder = recorder_parameters(order)
@@ -242,6 +262,13 @@ def drive(
         note(console, complaint)
     if complaints:
         raise typer.Exit(1)
+
+
+def given_without_file(**options: object) -> None:
+    """Refuse options that say something of a recording where there is none."""
+    for name, value in options.items():
+        if value not in (None, '', []):
+            raise typer.BadParameter(f'--{name} is for a recording: name it with --file FILE')
 
 
 def _list_faults() -> None:

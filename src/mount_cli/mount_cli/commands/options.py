@@ -38,3 +38,35 @@ Settings = Annotated[
 ]
 Domain = Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')]
 Namespace = Annotated[str, typer.Option(help='namespace of the mount, such as mount_right')]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        '--column',
+        metavar='[QUANTITY=]COLUMN[:UNIT]',
+        help='recording of others: a column by name or number, and its unit, as in acceleration=az:g; '
+        'road: that of the height',
+    ),
+]
+TimeColumn = Annotated[
+    str,
+    typer.Option(
+        '--time',
+        '--time-column',
+        metavar='COLUMN[:UNIT]',
+        help='recording of others: column of its times, and their unit, as in t:ms; default: by title, in s',
+    ),
+]
+RATE = 'recording of others without times: samples per second'
+Rate = Annotated[float | None, typer.Option('--rate', metavar='HZ', help=RATE)]
+MapFile = Annotated[
+    Path | None,
+    typer.Option(
+        '--map-file',
+        metavar='FILE',
+        help='recording of others: YAML file that says columns, units and times of a measuring system',
+    ),
+]
+Dbc = Annotated[
+    Path | None,
+    typer.Option('--dbc', metavar='FILE', help='CAN log: the database by which its frames are decoded'),
+]

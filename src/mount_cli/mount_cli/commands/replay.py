@@ -6,7 +6,16 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from mount_cli.commands.options import Domain, JsonFile, NewFolder, recording_argument
+from mount_cli.commands.options import (
+    RATE,
+    Dbc,
+    Domain,
+    JsonFile,
+    MapFile,
+    NewFolder,
+    TimeColumn,
+    recording_argument,
+)
 from mount_cli.completion.values import listed, named, setting
 from mount_cli.fetching import local
 from mount_cli.terminal import terminal
@@ -22,7 +31,7 @@ Examples:
 
 `engine-mount replay RECORDING --set switch_on_level=0.0006 --set damper=viscous_3000` - what if?
 
-`engine-mount replay drive.mcap --map displacement=/suspension/pot.range --scale 0.001` - a foreign one
+`engine-mount replay drive.mcap --map displacement=/suspension/pot.range:mm` - a foreign one
 
 `engine-mount replay RECORDING --live --rate 2` - to look at with rviz, plotjuggler, ros2 topic echo
 """
@@ -32,7 +41,7 @@ def replay(
     recording: Annotated[
         str,
         recording_argument(
-            instead='folder of a run or recording, MCAP file, or its URI; with --map CSV, NPY and JSON too'
+            instead='folder of a run or recording, MCAP file, or its URI; with --map any file of signals'
         ),
     ],
     core: Annotated[
@@ -60,15 +69,25 @@ def replay(
         list[str] | None,
         typer.Option(
             '--map',
-            metavar='NAME=/TOPIC.FIELD',
-            help='foreign recording: displacement, or engine_displacement and chassis_displacement',
+            metavar='NAME=COLUMN[:UNIT]',
+            help='foreign recording: displacement, or engine_displacement and chassis_displacement; of a '
+            'bag the column is /topic.field',
         ),
     ] = None,
-    scale: Annotated[float, typer.Option(help='foreign recording: factor to m, engine minus chassis')] = 1.0,
+    map_file: MapFile = None,
+    time: TimeColumn = '',
+    dbc: Dbc = None,
+    scale: Annotated[
+        float | None,
+        typer.Option(help='foreign recording: factor to m, or on what --map names with a unit'),
+    ] = None,
     offset: Annotated[
         str,
-        typer.Option(metavar='M', help='foreign recording: what is subtracted after --scale, in m, or mean'),
-    ] = 'mean',
+        typer.Option(
+            metavar='M',
+            help='foreign recording: what is subtracted, in m, or mean; default: that of --map-file, or mean',
+        ),
+    ] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,
     mount: Annotated[
@@ -77,7 +96,7 @@ def replay(
             metavar='NAME', help='which of several mounts, such as left', autocompletion=named('place')
         ),
     ] = '',
-    rate: Annotated[float, typer.Option(help='live: factor on the speed of time')] = 1.0,
+    rate: Annotated[float | None, typer.Option(help=f'live: factor on the speed of time; {RATE}')] = None,
     start: Annotated[float, typer.Option('--from', metavar='S', help='live: where to begin, s')] = 0.0,
     topic_names: Annotated[
         str,
@@ -109,11 +128,11 @@ def replay(
         from mount_cli.screen import TerminalScreen
         from mount_replay.live.live import LiveOrder, play_live
 
-        if maps or table or out or json_file:
+        if maps or map_file or table or out or json_file:
             raise typer.BadParameter('--live only shows; --map, --table, --out and --json do not go with it')
         order = LiveOrder(
             local(recording, console),
-            rate,
+            1.0 if rate is None else rate,
             start,
             topic_names,
             with_control,
@@ -124,13 +143,19 @@ def replay(
         )
         play_live(order, TerminalScreen(console))
         return
-    if rate != 1.0 or start or topic_names or with_control or namespace:
-        raise typer.BadParameter('--rate, --from, --topics, --with-control and --namespace go with --live')
+    if start or topic_names or with_control or namespace:
+        raise typer.BadParameter('--from, --topics, --with-control and --namespace go with --live')
     from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder
 
-    if not maps and (scale != 1.0 or offset != 'mean'):
-        raise typer.BadParameter('--scale and --offset go with --map')
-    foreign = _foreign(maps, scale, offset) if maps else None
+    foreign = None
+    if maps or map_file:
+        from mount_replay.given.foreign import foreign_order
+
+        foreign = foreign_order(
+            maps or [], scale, offset, mapping_file=map_file, time=time, rate=rate, dbc=dbc
+        )
+    elif rate is not None or scale is not None or offset or time:
+        raise typer.BadParameter('--scale, --offset, --time and --rate go with --map or --map-file')
     mode = LOCKSTEP if lockstep else CORE
     place, table = local(recording, console), table and str(local(table, console))
     order = ReplayOrder(place, mode, changes, table, foreign, out, chosen_domain(domain), mount)
@@ -159,12 +184,6 @@ def _replay(
     console.print(f'recording  {outcome.folder.recording}', soft_wrap=True)
     if not outcome.held:
         raise typer.Exit(1)
-
-
-def _foreign(maps: list[str], scale: float, offset: str) -> Any:
-    from mount_replay.given.foreign import foreign_order
-
-    return foreign_order(maps, scale, offset)
 
 
 def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:

@@ -1,8 +1,7 @@
 """Options that say which road, and how it is driven; for `drive` and `road`."""
 
 import math
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -81,6 +80,13 @@ def brought_road(
     return Brought('road.file', over.write, over.told, tuple(notes))
 
 
+def height_column(columns: Sequence[str]) -> str:
+    """Return the one column of the height, '' where none is named."""
+    if len(columns) > 1:
+        raise typer.BadParameter('--column is given once for a road: the column of its height')
+    return columns[0] if columns else ''
+
+
 def given_without_road(**options: Any) -> None:
     """Refuse options that say something of a road where there is none."""
     for name, value in options.items():
@@ -88,10 +94,10 @@ def given_without_road(**options: Any) -> None:
             raise typer.BadParameter(f'--{name.replace("_", "-")} is for a road: name it with --road FILE')
 
 
-def check_scenario(scenario: str, file: Path | None) -> None:
+def check_scenario(scenario: str, file: str) -> None:
     """Refuse a road together with another scenario."""
-    if scenario not in ('motorway', 'road') or file is not None:
-        other = '--file' if file is not None else f'--scenario {scenario}'
+    if scenario not in ('motorway', 'road') or file:
+        other = '--file' if file else f'--scenario {scenario}'
         raise typer.BadParameter(f'--road is a scenario of its own; leave out {other}')
 
 

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mount_experiments.policy.runs import first_extremum
-from mount_experiments.sweep.evaluation import BELOW_ISOLATION, FIRST_FREQUENCY, RATE, peak_in
+from mount_experiments.sweep.evaluation import FIRST_FREQUENCY, RATE, peak_in
 from mount_models.arithmetic.compiled import compiled
+from mount_models.bands import BELOW_ISOLATION
 from mount_models.road import Gap, Sweep, gap_in_road, sweep_road
 from mount_models.sampling import SAMPLE_TIME
 from mount_models.vehicle import Vehicle, resting_vehicle, vehicle_step

@@ -25,7 +25,8 @@ from mount_experiments.sensitivity.maps import (
     share_won,
 )
 from mount_experiments.sensitivity.reference import DAMPER as THERE
-from mount_experiments.sweep.evaluation import BELOW_ISOLATION, FIRST_FREQUENCY, ISOLATION_BANDS, RATE
+from mount_experiments.sweep.evaluation import FIRST_FREQUENCY, RATE
+from mount_models.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from mount_models.damper import damper_curve
 from mount_models.hydromount import Hydromount
 from mount_models.quantity import checked

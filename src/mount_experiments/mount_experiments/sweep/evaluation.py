@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mount_models.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.evaluation import switching
 from mount_report.drive.signals import DriveSignals, FloatArray
@@ -14,8 +15,6 @@ FRICTION, HYDRO, OFF, ALWAYS = 'friction', 'hydromount', 'friction, 0 A', 'frict
 FRICTION_IDLE, HYDRO_IDLE = 'friction, engine idling', 'hydromount, engine idling'
 FIRST_FREQUENCY, RATE = 1.0, 1.0  # Hz, Hz/s: Sec. 6
 RESONANCE = (7.0, 10.0)  # Hz
-BELOW_ISOLATION = (3.0, 14.0)  # Hz
-ISOLATION_BANDS = ((14.0, 20.0), (20.0, 30.0), (30.0, 50.0))  # Hz: damping is off there
 DEFINED_PEAK = 1.25
 """A local maximum of the displacement over frequency is a resonance peak if it exceeds the switch-on level by
 this factor (chosen); below it the switched mount cannot damp."""

@@ -24,13 +24,13 @@ from mount_experiments.sweep.evaluation import (
     FRICTION_IDLE,
     HYDRO,
     HYDRO_IDLE,
-    ISOLATION_BANDS,
     OFF,
     RATE,
     RESONANCE,
     SweepRun,
     figures_of,
 )
+from mount_models.bands import ISOLATION_BANDS
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity
 

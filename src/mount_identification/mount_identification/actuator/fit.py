@@ -22,7 +22,7 @@ from mount_identification.actuator.points import (
 )
 from mount_identification.single_threaded import single_threaded
 from mount_models.actuator.law import ForceLaw, checked_force, coefficients
-from mount_models.actuator.law_check import check_force_law
+from mount_models.actuator.law_check import LOWEST_SHARE, ForceLawRefusedError, check_force_law
 from mount_models.arithmetic.compiled import compiled
 
 FloatArray = npt.NDArray[np.float64]
@@ -38,7 +38,8 @@ class ForceLawFit:
     `relative_rms` and `worst` are relative to the measured force and count forces above 20 N; `rms_error` and
     `largest_error` (N) count all. `gaps` (m, shape (G,)) and `gap_rms` (N) tell where it fits less well.
     `covariance` (P, P) is that of the coefficients a1 .. a5 as the law holds them, one after the other,
-    scaled by the scatter of the residuals; what the law cannot describe counts as scatter.
+    scaled by the scatter of the residuals; what the law cannot describe counts as scatter. `lowest_current`
+    (A) is the lowest that was measured.
     """
 
     law: ForceLaw
@@ -52,6 +53,11 @@ class ForceLawFit:
     points: int
     lowest_current: float
 
+    @property
+    def continued(self) -> bool:
+        """Whether the law holds for currents below the lowest measured one, continued to 0 N at 0 A."""
+        return self.lowest_current > LOWEST_SHARE * self.law.current_high
+
     def figures(self) -> dict[str, Any]:
         """Return parameters and errors for JSON, SI units; None where one is not known."""
         law = self.law
@@ -62,6 +68,7 @@ class ForceLawFit:
             'parameter_std': {part: [float(next(stds)) for _ in values] for part, values in parts.items()},
             'valid_gap_m': [law.gap_low, law.gap_high],
             'valid_current_a': [0.0, law.current_high],
+            'measured_current_a': [self.lowest_current, law.current_high],
             'points': self.points,
             'relative_rms': _known(self.relative_rms),
             'relative_worst': _known(self.worst),
@@ -111,7 +118,7 @@ def fit_force_law(
     found = _best(misfit, slopes, candidates, _bounds(orders, currents, forces), forces, progress)
     law = _law_from(found.x, orders, domain, box)
     check_outliers(gaps, currents, forces, checked_force(law, currents, gaps), tolerance)
-    check_force_law(law)
+    _check(law, float(currents.min()))
     return _judged(law, gaps, currents, forces, _covariance(found, orders, domain))
 
 
@@ -250,6 +257,22 @@ def _unmapping(domain: tuple[float, float], order: int) -> FloatArray:
 
 def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def _check(law: ForceLaw, lowest: float) -> None:
+    """Raise `ForceLawRefusedError` for a law that cannot be inverted; it says where nothing was measured."""
+    try:
+        check_force_law(law)
+    except ForceLawRefusedError as error:
+        if lowest <= LOWEST_SHARE * law.current_high:
+            raise
+        check_force_law(law, lowest)
+        raise ForceLawRefusedError(
+            f'forces were measured from {lowest:.2f} A on only, where the law is right; below it is '
+            'continued to '
+            f'0 N at 0 A, and that fails: {str(error).partition(":")[0]}: measure from '
+            f'{LOWEST_SHARE * law.current_high:.2f} A on'
+        ) from error
 
 
 def _judged(

@@ -7,6 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from mount_identification.coil.few_points import (
+    MOST_POINTS,
+    InductanceTable,
+    TableError,
+    falling_sentence,
+)
 from mount_identification.single_threaded import single_threaded
 from mount_models.coil.crossing import CrossingError, find_crossing
 from mount_models.coil.gap import (
@@ -44,6 +50,8 @@ class GapPoint:
     crossing_current: float
     crossing_std: float
     crossing_slope: float
+    table: tuple[float, float] | None = None
+    """Lowest and highest current (A) of a table of few points that it was interpolated from."""
 
 
 @dataclass(frozen=True)
@@ -83,17 +91,17 @@ def measured_point(
 ) -> GapPoint:
     """Return L_0.2 and i_20 of one recording; raises `GapCurvesRefusedError` naming it."""
     current, inductance = recording.current, recording.inductance
+    if is_table(recording, rest_current):
+        return _from_table(recording, rest_current, crossing_inductance)
     finite = np.isfinite(current) & np.isfinite(inductance)
-    if finite.sum() < _FEWEST_SAMPLES:
-        raise GapCurvesRefusedError(
-            f'{recording.name}: ripple samples with finite readings ({int(finite.sum())}) must be at least '
-            f'{_FEWEST_SAMPLES}; record for longer, or check the ripple measurement'
-        )
     at_rest, rest_std = _rest_inductance(recording.name, current[finite], inductance[finite], rest_current)
     try:
         crossing = find_crossing(current, inductance, crossing_inductance, crossing_half_width)
     except CrossingError as error:
-        raise GapCurvesRefusedError(f'{recording.name}: {error}') from error
+        steps = in_steps(recording)
+        beyond = steps[1].max() < crossing_inductance or steps[1].min() > crossing_inductance
+        sentence = falling_sentence(*steps, crossing_inductance) if beyond else error
+        raise GapCurvesRefusedError(f'{recording.name}: {sentence}') from error
     return GapPoint(
         recording.name,
         recording.gap,
@@ -103,6 +111,25 @@ def measured_point(
         crossing.current,
         crossing.current_std,
         crossing.inductance_slope,
+    )
+
+
+def is_table(recording: RippleRecording, rest_current: float) -> bool:
+    """Return whether it holds few points, as a table does, rather than samples of a ramp."""
+    finite = np.isfinite(recording.current) & np.isfinite(recording.inductance)
+    held = np.abs(recording.current[finite] - rest_current) <= _REST_HALF_WIDTH
+    return bool(finite.sum() <= MOST_POINTS and held.sum() < _FEWEST_AT_REST)
+
+
+def in_steps(recording: RippleRecording) -> tuple[FloatArray, FloatArray]:
+    """Return means of currents (A), rising, and inductances (H) over up to 20 like parts of a recording."""
+    finite = np.isfinite(recording.current) & np.isfinite(recording.inductance)
+    order = np.argsort(recording.current[finite], kind='stable')
+    parts = np.array_split(order, min(_STEPS, order.size))
+    current, inductance = recording.current[finite], recording.inductance[finite]
+    return (
+        np.array([current[part].mean() for part in parts]),
+        np.array([inductance[part].mean() for part in parts]),
     )
 
 
@@ -134,7 +161,7 @@ def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) ->
 
 
 _INDUCTANCE, _CROSSING = 'inductance at the rest current', 'crossing current'
-_FEWEST_SAMPLES = 50  # chosen: fewer are no recording
+_STEPS = 20  # chosen: enough to see rise and fall
 _FEWEST_AT_REST = 20  # chosen
 _REST_HALF_WIDTH = 0.02  # A, chosen: there the inductance is straight over the current
 _FEWEST_GAPS = 6  # chosen: a cubic and two to judge it
@@ -142,6 +169,20 @@ _CONTRADICTION = 3e-6  # m, chosen: below it a point is as good as its gap could
 _FAR = 10.0  # standard deviations, chosen: few points tell their scatter badly
 _NEARLY = 1.1  # chosen
 _INVERSE_ERROR = 0.05e-6  # m
+
+
+def _from_table(recording: RippleRecording, rest_current: float, crossing_inductance: float) -> GapPoint:
+    finite = np.isfinite(recording.current) & np.isfinite(recording.inductance)
+    try:
+        table = InductanceTable(recording.current[finite], recording.inductance[finite])
+        at_rest, rest_std = table.at(rest_current)
+        crossing, crossing_std, crossing_slope = table.falls_through(crossing_inductance)
+    except TableError as error:
+        raise GapCurvesRefusedError(f'{recording.name}: {error}') from error
+    return GapPoint(
+        recording.name, recording.gap, recording.celsius, at_rest, rest_std, crossing, crossing_std,
+        crossing_slope, (float(table.current[0]), float(table.current[-1])),
+    )  # fmt: skip
 
 
 def _rest_inductance(

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from mount_bags.run.screen import Table
+from mount_identification.coil.few_points import levels_of_all
 from mount_identification.coil.gap_calibration import (
     GapCalibration,
     GapPoint,
     RippleRecording,
     calibrate_gap_curves,
+    in_steps,
     measured_point,
 )
 from mount_identification.coil.temperature_fit import measured_compensation, stated_compensation
@@ -59,6 +61,7 @@ class InductanceResult:
             f'and {_intervals(self.region.rising, 1.0)} A (rises), and by its current at '
             f'{_intervals(self.region.levels, 1e3)} mH; elsewhere it is ambiguous or unknown',
             f'temperature compensation: {self.compensated_by}',
+            *_of_tables(self.calibration.points),
             *([_OPTIMISTIC] if any(row['source'] == 'predicted' for row in self.left) else []),
         ]
 
@@ -135,7 +138,7 @@ def calibrate_inductance(
     recordings: Sequence[RippleRecording], law: ForceLaw, order: GapOrder
 ) -> InductanceResult:
     """Return the calibration; raises `GapCurvesRefusedError` and `CompensationError`."""
-    points = [measured_point(each, order.rest_current, order.crossing_inductance) for each in recordings]
+    points = _points(recordings, order)
     fitted = [point for point in points if not _is_held_out(point, order)]
     by_temperature = _by_temperature(fitted)
     if not by_temperature:
@@ -184,6 +187,35 @@ def calibrate_inductance(
     if compensation is not None:
         left += predicted(calibration.curves, compensation, of_coefficient)
     return InductanceResult(calibration, compensation, how, region, left, found)
+
+
+def _points(recordings: Sequence[RippleRecording], order: GapOrder) -> list[GapPoint]:
+    """Return the point of each recording; a refusal names the inductances that all of them fall through."""
+    try:
+        return [measured_point(each, order.rest_current, order.crossing_inductance) for each in recordings]
+    except GapCurvesRefusedError as error:
+        low, high = levels_of_all([in_steps(each) for each in recordings])
+        if 'fall through' not in str(error) or not low < high:
+            raise
+        raise GapCurvesRefusedError(
+            f'{error}; all {len(recordings)} recordings fall through {low * 1e3:.1f} .. {high * 1e3:.1f} mH'
+        ) from error
+
+
+def _of_tables(points: Sequence[GapPoint]) -> list[str]:
+    """Return what is to be said of points that were interpolated from tables of few points."""
+    tables = [point for point in points if point.table is not None]
+    if not tables:
+        return []
+    low, high = max(point.table[0] for point in tables), min(point.table[1] for point in tables)
+    rest, contact = (
+        max(getattr(each, name) for each in tables) for name in ('inductance_std', 'crossing_std')
+    )
+    return [
+        f'{len(tables)} of {len(points)} recordings are tables of few points, measured within {low:.2f} .. '
+        f'{high:.2f} A: in between by interpolation, good to {rest * 1e3:.2g} mH at rest and to '
+        f'{contact * 1e3:.2g} mA of the crossing current, by how well the points predict each other'
+    ]
 
 
 _OPTIMISTIC = (

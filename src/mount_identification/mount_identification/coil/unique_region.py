@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from mount_identification.coil.few_points import MOST_POINTS, InductanceTable
 from mount_identification.coil.gap_calibration import RippleRecording
 
 FloatArray = npt.NDArray[np.float64]
@@ -81,6 +82,8 @@ def _binned(recording: RippleRecording, edges: FloatArray) -> tuple[FloatArray, 
     mean, std = np.full(edges.size - 1, np.nan), np.full(edges.size - 1, np.nan)
     finite = np.isfinite(recording.current) & np.isfinite(recording.inductance)
     current, inductance = recording.current[finite], recording.inductance[finite]
+    if current.size <= MOST_POINTS:
+        return _interpolated(InductanceTable(current, inductance), 0.5 * (edges[1:] + edges[:-1]))
     places = np.digitize(current, edges) - 1
     for place in range(edges.size - 1):
         inside = places == place
@@ -96,6 +99,14 @@ def _binned(recording: RippleRecording, edges: FloatArray) -> tuple[FloatArray, 
         mean[place] = solution[0]
         std[place] = np.sqrt(scatter * np.linalg.inv(powers.T @ powers)[0, 0])
     return mean, std
+
+
+def _interpolated(table: InductanceTable, currents: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return inductance and deviation of a table of few points at `currents` (A); NaN beyond its points."""
+    values = np.full((2, currents.size), np.nan)
+    for place in np.flatnonzero((currents >= table.current[0]) & (currents <= table.current[-1])):
+        values[:, place] = table.at(float(currents[place]))
+    return values[0], values[1]
 
 
 def _direction(gaps: FloatArray, values: FloatArray, stds: FloatArray) -> int:

@@ -12,10 +12,11 @@ class ForceLawRefusedError(ValueError):
     """A force law is not usable, or measurements lead to none; the text says why and the remedy."""
 
 
-def check_force_law(law: ForceLaw) -> None:
+def check_force_law(law: ForceLaw, lowest_current: float = 0.0) -> None:
     """Raise `ForceLawRefusedError` unless `law` can be inverted everywhere within its guarded range.
 
     Looked at on 61 gaps and 119 currents from 1/60 of the highest up; below, the force is next to nothing.
+    With a `lowest_current` (A) above that, from there up only.
     """
     if not (0.0 < law.gap_low < law.gap_high and law.current_high > 0.0):
         raise ForceLawRefusedError(
@@ -24,7 +25,7 @@ def check_force_law(law: ForceLaw) -> None:
             'and currents above 0 A'
         )
     gaps = np.linspace(law.gap_low, law.gap_high, 61)
-    currents = np.linspace(_LOWEST_SHARE * law.current_high, law.current_high, 119)
+    currents = np.linspace(max(LOWEST_SHARE * law.current_high, lowest_current), law.current_high, 119)
     forces = checked_force(law, currents, gaps[:, np.newaxis])
     # written so that NaN fails each of them
     _refuse_where(~(forces > 0.0), gaps, currents, 'be positive')
@@ -32,7 +33,8 @@ def check_force_law(law: ForceLaw) -> None:
     _refuse_where(~(np.diff(forces, axis=0) < 0.0), gaps, currents, 'fall with the air gap')
 
 
-_LOWEST_SHARE = 1.0 / 60.0  # chosen: 0.05 A of 3 A
+LOWEST_SHARE = 1.0 / 60.0
+"""Of the highest current, chosen: 0.05 A of 3 A."""
 
 
 def _refuse_where(failed: npt.NDArray[np.bool_], gaps: FloatArray, currents: FloatArray, what: str) -> None:

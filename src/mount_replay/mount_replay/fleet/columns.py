@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 TABLES = 'a table of a fleet'
 """What a missing library is needed for."""
 
-TEXT, NUMBER, COUNT, FLAG = 'string', 'double', 'int64', 'bool'
-"""Types of columns, as pyarrow names them."""
+TEXT, NUMBER, COUNT, FLAG, TIME = 'string', 'double', 'int64', 'bool', 'timestamp[us]'
+"""Types of columns, as pyarrow names them; times are UTC."""
 
 
 @dataclass(frozen=True)

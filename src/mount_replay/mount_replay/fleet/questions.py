@@ -1,10 +1,12 @@
 """Questions to the tables of a fleet, in SQL, answered by DuckDB from the Parquet files of a folder."""
 
+import json
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mount_replay.fleet.columns import TABLES
+from mount_replay.fleet.what_if.result import ORDER
 from mount_signals.extras import required
 
 if TYPE_CHECKING:
@@ -49,19 +51,50 @@ def query(folder: str | os.PathLike[str], sql: str) -> 'pyarrow.Table':
 
 
 def tables_of(folder: str | os.PathLike[str]) -> dict[str, 'pyarrow.dataset.Dataset']:
-    """Return the tables in a folder by their names, opened but not read; raises `QueryError`."""
+    """Return the tables in a folder by their names, opened but not read.
+
+    Those of a result have the tables of the catalogue beside them that it was made of, if it was. Raises
+    `QueryError`.
+    """
     dataset = required('pyarrow.dataset', TABLES)
-    files = {name: Path(folder) / f'{name}.parquet' for name in NAMES}
-    there = {name: file for name, file in files.items() if file.is_file()}
+    there = _files(Path(folder))
+    if not there and (Path(folder) / ORDER).is_file():
+        raise QueryError(f'{folder} is not finished; the same engine-mount fleet replay goes on with it')
     if not there:
         raise QueryError(
-            f'{folder} holds no table of a fleet ({", ".join(file.name for file in files.values())}); '
+            f'{folder} holds no table of a fleet ({", ".join(f"{name}.parquet" for name in NAMES)}); '
             'engine-mount fleet index or replay makes one'
         )
+    for place in _asked_for(Path(folder)):
+        there = _files(Path(place)) | there
     try:
         return {name: dataset.dataset(file, format='parquet') for name, file in there.items()}
     except (OSError, ValueError) as error:
         raise QueryError(f'{folder} cannot be read: {" ".join(str(error).split())}') from None
+
+
+def result_of(folder: str | os.PathLike[str]) -> 'pyarrow.Table':
+    """Return the table of a result, units and meanings with it; raises `QueryError`."""
+    tables = tables_of(folder)
+    if 'result' not in tables:
+        raise QueryError(f'{folder} is a catalogue; engine-mount fleet replay makes a result of it')
+    table: pyarrow.Table = tables['result'].to_table()
+    return table
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    """Return the tables that are in a folder, by their names."""
+    files = {name: folder / f'{name}.parquet' for name in NAMES}
+    return {name: file for name, file in files.items() if file.is_file()}
+
+
+def _asked_for(folder: Path) -> list[str]:
+    """Return the places that the result in a folder was made of, none where it holds no result."""
+    order = folder / ORDER
+    if not order.is_file():
+        return []
+    places: list[str] = json.loads(order.read_text(encoding='utf-8'))['asked_for']
+    return places
 
 
 def _locked(engine: Any, tables: dict[str, 'pyarrow.dataset.Dataset']) -> 'duckdb.DuckDBPyConnection':

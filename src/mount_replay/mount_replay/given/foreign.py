@@ -1,17 +1,14 @@
-"""A displacement recorded by somebody else: chosen by topic and field, checked, scaled, resampled."""
+"""A displacement recorded by somebody else: chosen by column or field, checked, scaled, resampled."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from mount_bags.run.place import open_run
 from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
-from mount_bags.signals.loading import is_recording, load_signal
 from mount_bags.signals.plausibility import check_size
-from mount_bags.signals.resampling import has_step, resampled
 from mount_bags.signals.signal import SECOND
 from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters
 from mount_init.parameters import InitParameters
@@ -19,63 +16,87 @@ from mount_models.actuator.closing import ClosingMechanics
 from mount_models.arithmetic.averages import mean
 from mount_models.force_table import contact_force, current_force_table, offset_current
 from mount_models.quantity import with_flattened
-from mount_models.sampling import SAMPLE_TIME_NS, sample_time_ns
-from mount_replay.given.input import (
-    Column,
-    ControlRun,
-    Messages,
-    ReplayError,
-    ReplayInput,
-    Times,
-    dated,
-)
+from mount_models.sampling import SAMPLE_TIME_NS
+from mount_replay.given.input import ControlRun, Messages, ReplayError, ReplayInput, dated
 from mount_replay.given.ramps import MeasuredGap, measured_gaps
 from mount_ros import topics
 from mount_ros.messages.force_table import ForceTable
 from mount_ros.messages.scalars import ScalarsLayout
+from mount_signals.formats.content import Stated
+from mount_signals.importing.one_grid import (
+    CHASSIS,
+    DISPLACEMENT,
+    ENGINE,
+    LOWEST_RATE,
+    displacement_on_grid,
+    rate_text,
+)
+from mount_signals.units.columns import place, read_chosen
+from mount_signals.units.mapping import MEAN, Mapping, checked_scale, mapping_in_file, with_options
+from mount_signals.units.signals import ChosenSignal, chosen_signals
 from mount_sim.excitation.recorded import LONGEST_GAP
 
-LOWEST_RATE = 100.0  # Hz, chosen: five times the 20 Hz up to which an engine moves on its mounts
 DEFAULT_TABLE = 'default'
-_DISPLACEMENT = 'displacement'
-_ENGINE, _CHASSIS = 'engine_displacement', 'chassis_displacement'
-_SHORTEST = 0.5  # s, chosen: four periods of the band
+_FIELDS = (DISPLACEMENT, ENGINE, CHASSIS)
 
 
 @dataclass(frozen=True)
 class ForeignOrder:
-    """How a foreign recording becomes a displacement in m: value * scale - offset.
+    """How a foreign recording becomes a displacement in m: its columns in SI, less `offset`.
 
-    `fields` is {`displacement`: place} or {`engine_displacement`: place, `chassis_displacement`: place}, a
-    place being `/topic.field` of a bag or a column of a CSV, NPY or JSON file. `offset` is in m, or `mean`.
+    `mapping` names `displacement`, or `engine_displacement` and `chassis_displacement`. `offset` is in m, or
+    `mean`. `mapping_file` is where the mapping was read from, '' where options alone say it.
     """
 
-    fields: Mapping[str, str]
-    scale: float = 1.0
-    offset: str = 'mean'
+    mapping: Mapping
+    offset: str = MEAN
+    mapping_file: str = ''
+    stated: Stated = field(default_factory=Stated)
 
 
-def foreign_order(maps: list[str], scale: float, offset: str) -> ForeignOrder:
-    """Return the order that the options of the command describe, or raise `ReplayError`."""
-    fields = {}
+def foreign_order(
+    maps: list[str],
+    scale: float | None = None,
+    offset: str = '',
+    *,
+    mapping_file: Path | None = None,
+    time: str = '',
+    rate: float | None = None,
+    dbc: Path | None = None,
+) -> ForeignOrder:
+    """Return the order that the options of the command describe, or raise `ReplayError`.
+
+    `maps` are `NAME=COLUMN[:UNIT]`, `time` is `COLUMN[:UNIT]`. Without `offset` it is that of the mapping
+    file, else the mean.
+    """
     for text in maps:
         name, equals, place = text.partition('=')
-        if not (equals and place) or name not in (_DISPLACEMENT, _ENGINE, _CHASSIS):
+        if not (equals and place) or name not in _FIELDS:
             raise ReplayError(
                 f'--map {text}: write displacement=/topic.field, or engine_displacement=/topic.field and '
                 'chassis_displacement=/topic.field'
             )
-        fields[name] = place
-    if set(fields) not in ({_DISPLACEMENT}, {_ENGINE, _CHASSIS}):
+    mapping = mapping_in_file(mapping_file) if mapping_file else Mapping()
+    mapping = with_options(mapping, maps, time, rate)
+    columns = {name: choice for name, choice in mapping.columns.items() if name in _FIELDS}
+    if set(columns) not in ({DISPLACEMENT}, {ENGINE, CHASSIS}):
         raise ReplayError(
-            f'--map names {" and ".join(fields)}; needed is displacement, or engine_displacement and '
-            'chassis_displacement together: the displacement of the mount is their difference'
+            f'--map names {" and ".join(columns) or "nothing"}; needed is displacement, or '
+            'engine_displacement and chassis_displacement together: the displacement of the mount is their '
+            'difference'
         )
-    if not (math.isfinite(scale) and scale != 0.0):
-        raise ReplayError(f'--scale ({scale:g}) must be a number other than 0')
-    if offset != 'mean' and not _is_number(offset):
+    if scale is not None:
+        columns = {
+            name: replace(choice, scale=checked_scale(scale, '--scale')) for name, choice in columns.items()
+        }
+    if offset not in ('', MEAN) and not _is_number(offset):
         raise ReplayError(f'--offset {offset!r} must be a number of m, or mean')
-    return ForeignOrder(fields, scale, offset)
+    said = next((choice.offset for choice in columns.values() if choice.offset is not None), MEAN)
+    options = '--map {quantity}={column}:{unit}'
+    return ForeignOrder(
+        replace(mapping, columns=columns, others={}, options=options), offset or str(said),
+        mapping_file.name if mapping_file else '', Stated(dbc=dbc),
+    )  # fmt: skip
 
 
 def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: MeasuredGap) -> ReplayInput:
@@ -85,36 +106,40 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     interpolated; a longer one, or a rate below `LOWEST_RATE`, is refused. Raises `ReplayError` or
     `SignalError`.
     """
-    notes: list[str] = []
-    signals = {name: _signal(path, place, LONGEST_GAP, notes) for name, place in order.fields.items()}
+    measured = read_chosen(str(path), order.mapping, order.stated)
+    notes = list(measured.notes)
+    chosen = chosen_signals(measured, order.mapping)
     control = control_parameters(parameters)
-    stamps, values = _on_one_grid(signals, control.sample_rate, notes)
+    even, scale, done = _even(order, chosen)
+    notes += done
+    stamps, values = displacement_on_grid(even, control.sample_rate, notes)
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
         stamps = stamps - stamps[0] + SECOND
-    values = order.scale * values
-    offset = mean(values) if order.offset == 'mean' else float(order.offset)
+    values = scale * values
+    offset = mean(values) if order.offset == MEAN else float(order.offset)
     notes.append(
-        f'factor {order.scale:g} to m; offset {1e3 * offset:.3f} mm removed '
-        f'({"the mean" if order.offset == "mean" else "as given"})'
+        f'factor {scale:g} to m; offset {1e3 * offset:.3f} mm removed '
+        f'({"the mean" if order.offset == MEAN else "as given"})'
     )
-    if order.offset == 'mean':
+    if order.offset == MEAN:
         notes.append('without its mean the rest position is taken as 0; --offset keeps another one')
     displacement = values - offset
     largest = control.displacement_range
     check_size(
-        f'displacement at {_rate_text(control.sample_rate)}', displacement,
+        f'{place(measured)}: displacement at {rate_text(control.sample_rate)}', displacement,
         1.0 / control.sample_rate, largest, 'm',
-        f'with factor {order.scale:g} to m: is its unit another one (--scale) or its zero (--offset), or is '
+        f'with factor {scale:g} to m: is its unit another one (--scale) or its zero (--offset), or is '
         'this sample a fault to cut or repair?',
     )  # fmt: skip
     notes.append(f'largest displacement {1e3 * float(np.max(np.abs(displacement))):.3f} mm')
     run = ControlRun(stamps, displacement, dated(gap, int(stamps[0]) - SAMPLE_TIME_NS))
     layout = ScalarsLayout(topics.DISPLACEMENT)
     pairs = zip(stamps.tolist(), displacement.tolist(), strict=True)
-    messages = Messages('/' + _DISPLACEMENT, [layout.pack(stamp, (value,)) for stamp, value in pairs], stamps)
-    given = {_DISPLACEMENT: messages}
+    messages = Messages('/' + DISPLACEMENT, [layout.pack(stamp, (value,)) for stamp, value in pairs], stamps)
+    given = {DISPLACEMENT: messages}
     name = f'{path.parent.name}/{path.name}' if path.name == 'recording' else path.name
-    source = f'{name}: ' + ', '.join(order.fields.values())
+    columns = order.mapping.columns.values()
+    source = f'{name}: ' + ', '.join(choice.column for choice in columns)
     plain = {node: dict(values) for node, values in parameters.items()}
     return ReplayInput(source, [run], plain, None, given, int(stamps[0]), 0, {}, notes)
 
@@ -156,50 +181,24 @@ def chosen_gap(table: str, parameters: Parameters) -> tuple[MeasuredGap, str]:
 # Signals.
 
 
-def _signal(path: Path, place: str, longest_gap: float, notes: list[str]) -> EvenSignal:
-    if is_recording(path):
-        topic, dot, field = place.partition('.')
-        if not dot:
-            raise ReplayError(f'--map {place}: name a field too, as in {topic}.field')
-        signal = load_signal(path, column=field, topic=topic)
-    else:
-        signal = load_signal(path, column=place)
-    even = evenly_spaced(signal, longest_gap, LOWEST_RATE)
-    notes.append(f'{place}: {len(signal.values)} samples at {even.rate:.4g} Hz, by their {signal.clock}')
-    notes += [f'{place}: {note}' for note in even.notes]
-    return even
-
-
-def _on_one_grid(
-    signals: dict[str, EvenSignal], sample_rate: float, notes: list[str]
-) -> tuple[Times, Column]:
-    """Return stamps of `sample_rate` (Hz) and the displacement on them, not scaled."""
-    step, step_ns = 1.0 / sample_rate, sample_time_ns(sample_rate)
-    begin = max(even.begin for even in signals.values())
-    end = min(even.begin + round(even.length * SECOND) for even in signals.values())
-    count = round((end - begin) / step_ns) + 1
-    if count * step < _SHORTEST:
-        spans = '; '.join(
-            f'{even.name}: {even.begin / 1e9:.3f} .. {even.begin / 1e9 + even.length:.3f} s'
-            for even in signals.values()
+def _even(
+    order: ForeignOrder, chosen: dict[str, ChosenSignal]
+) -> tuple[dict[str, EvenSignal], float, list[str]]:
+    """Return the signals evenly spaced, the factor to m that they have in common, and what was done."""
+    factors = {one.factor for one in chosen.values()}
+    common = factors.pop() if len(factors) == 1 else None
+    even, notes = {}, []
+    for name, one in chosen.items():
+        signal = one.signal if common is not None else replace(one, offset=None).in_si()
+        found = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
+        column = order.mapping.columns[name].column
+        notes.append(
+            f'{column}: {len(signal.values)} samples at {found.rate:.4g} Hz, by their {signal.clock}'
         )
-        raise ReplayError(f'no overlap of {_SHORTEST:g} s or more: {spans}')
-    columns = {
-        name: resampled(even, step, (begin - even.begin) / SECOND, count)[:] for name, even in signals.items()
-    }
-    notes += [
-        f'{even.name}: resampled from {even.rate:.4g} Hz to {_rate_text(sample_rate)}, band-limited'
-        for even in signals.values()
-        if not has_step(even, step)
-    ]
-    stamps = begin + step_ns * np.arange(count, dtype=np.int64)
-    if _DISPLACEMENT in columns:
-        return stamps, columns[_DISPLACEMENT]
-    return stamps, columns[_ENGINE] - columns[_CHASSIS]
-
-
-def _rate_text(sample_rate: float) -> str:
-    return f'{sample_rate / 1000.0:g} kHz'
+        notes += signal.notes
+        notes += [f'{column}: {note}' for note in found.notes[len(signal.notes) :]]
+        even[name] = found
+    return even, 1.0 if common is None else common, notes
 
 
 def _is_number(text: str) -> bool:

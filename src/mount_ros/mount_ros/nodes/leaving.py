@@ -37,11 +37,12 @@ def leave_middleware(
 
     sys.stdout.flush()
     sys.stderr.flush()
-    call_off = end_process_after(last, code)
+    deadline = Deadline(code)
+    deadline.set(last)
     thread = threading.Thread(target=attempt, name=_THREAD, daemon=True)
     thread.start()
     thread.join(limit)
-    call_off()
+    deadline.close()
     if raised:
         raise raised[0]
     return not thread.is_alive()
@@ -64,22 +65,27 @@ _SIGEV_THREAD = 2  # Linux, asm-generic/siginfo.h
 _CLOCK_MONOTONIC = 1  # Linux, linux/time.h
 
 
-def end_process_after(limit: float, code: int) -> Callable[[], None]:
-    """Let the C library end this process with `code` after `limit` s, whatever holds the interpreter then.
+class Deadline:
+    """Lets the C library end this process with `code` at a time, whatever holds the interpreter then."""
 
-    The function that is returned calls it off.
-    """
-    library = ctypes.CDLL(None, use_errno=True)
-    end = ctypes.cast(library._exit, ctypes.c_void_p).value
-    event = _Event(value=code, notify=_SIGEV_THREAD, function=end)
-    timer = ctypes.c_void_p()
-    seconds = int(limit)
-    once = (ctypes.c_long * 4)(0, 0, seconds, round(1e9 * (limit - seconds)))
-    if library.timer_create(_CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)) or (
-        library.timer_settime(timer, 0, once, None)
-    ):
-        raise OSError(ctypes.get_errno(), 'a timer that ends this process cannot be set')
-    return lambda: library.timer_delete(timer)
+    def __init__(self, code: int):
+        self._library = ctypes.CDLL(None, use_errno=True)
+        end = ctypes.cast(self._library._exit, ctypes.c_void_p).value
+        event = _Event(value=code, notify=_SIGEV_THREAD, function=end)
+        self._timer = ctypes.c_void_p()
+        if self._library.timer_create(_CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(self._timer)):
+            raise OSError(ctypes.get_errno(), 'a timer that ends this process cannot be made')
+
+    def set(self, limit: float) -> None:
+        """End the process `limit` s from now on, not when it was set before; 0: never."""
+        seconds = int(limit)
+        once = (ctypes.c_long * 4)(0, 0, seconds, round(1e9 * (limit - seconds)))
+        if self._library.timer_settime(self._timer, 0, once, None):
+            raise OSError(ctypes.get_errno(), 'a timer that ends this process cannot be set')
+
+    def close(self) -> None:
+        """Call it off."""
+        self._library.timer_delete(self._timer)
 
 
 def end_process(code: int) -> NoReturn:

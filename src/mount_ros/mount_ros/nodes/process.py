@@ -24,7 +24,7 @@ from mount_ros.nodes.leaving import end_process, leave_middleware
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
-from mount_ros.nodes.shared_memory import remove_abandoned
+from mount_ros.nodes.shared_memory import remove_abandoned_of_the_dead
 from mount_ros.nodes.starter import Starter, given_priority
 
 Create = Callable[[], SafeLifecycleNode]
@@ -64,7 +64,6 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         node.ending.set()
     if over.starter.ended:
         logger.error(f'{over.starter.name} has ended, so this one ends too, at 0 A: start the graph again')
-        remove_abandoned()  # that of the starter; what it started ends by itself, and takes its own
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()
@@ -72,7 +71,10 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         node.close()
     real_time.close()  # until here no load keeps the coil from 0 A
     code = 1 if over.failed else 0
-    if not leave_middleware(partial(_take_down, nodes), code=code) or code:
+    left = leave_middleware(partial(_take_down, nodes), code=code)
+    if over.starter.ended:
+        remove_abandoned_of_the_dead()  # that of the starter; what it started takes its own
+    if not left or code:
         end_process(code)
 
 

@@ -38,6 +38,12 @@ def remove_abandoned(folder: Path = SHARED_MEMORY, youngest: float = _YOUNGEST) 
     return sorted(removed)
 
 
+def remove_abandoned_of_the_dead() -> list[str]:
+    """Do the same for those who have just died: once what they had made last is old enough."""
+    time.sleep(_YOUNGEST)
+    return remove_abandoned()
+
+
 def _remove_if_free(folder: Path, lock: str, content: str) -> list[str]:
     """Remove the files of `content` unless a process holds their `lock`, which is held meanwhile."""
     with contextlib.suppress(OSError), open(folder / lock, 'rb') as file:

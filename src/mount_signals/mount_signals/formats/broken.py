@@ -10,7 +10,9 @@ _LONGEST = 200  # letters of a library's own words, chosen
 
 
 @contextmanager
-def reading(path: Path, kind: str, remedy: str = 'is it cut off, or another format? Export it again') -> Iterator[None]:
+def reading(
+    path: Path, kind: str, remedy: str = 'is it cut off, or another format? Export it again'
+) -> Iterator[None]:
     """Turn every error of a library that reads `path` as a `kind` of file into a `SignalError`.
 
     Libraries raise whatever a damaged file makes of their own assumptions (KeyError, struct.error,

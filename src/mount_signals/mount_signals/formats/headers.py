@@ -2,27 +2,31 @@
 
 import re
 
-_SYMBOLS = frozenset(
-    's ms us µs μs ns min h '
-    'm mm um µm μm nm cm km in inch ft mil '
-    'N kN mN MN lb lbf kip kips kgf '
-    'g mg G kg t '
-    'A mA V mV kV T mT H mH uH µH Ohm ohm Ω W kW J Wb '
-    'Hz kHz MHz deg rad mrad degree degrees ° K degC °C C °F degF % - '
-    'Pa kPa MPa GPa hPa bar mbar psi Nm '
-    'kmh kph mph mps knots rpm U'.split()
-)
+_SYMBOLS = {
+    's', 'ms', 'us', 'µs', 'μs', 'ns', 'min', 'h',
+    'm', 'mm', 'um', 'µm', 'μm', 'nm', 'cm', 'km', 'in', 'inch', 'ft', 'mil',
+    'N', 'kN', 'mN', 'MN', 'lb', 'lbf', 'kip', 'kips', 'kgf', 'Nm',
+    'g', 'mg', 'G', 'kg', 't',
+    'A', 'mA', 'V', 'mV', 'kV', 'T', 'mT', 'Wb', 'H', 'mH', 'uH', 'µH', 'Ohm', 'ohm', 'Ω', 'W', 'kW', 'J',
+    'Hz', 'kHz', 'MHz', 'rpm', 'U', 'deg', 'degree', 'degrees', '°', 'rad', 'mrad',
+    'K', 'degC', '°C', 'C', '°F', 'degF', '%', '-',
+    'Pa', 'kPa', 'MPa', 'GPa', 'hPa', 'bar', 'mbar', 'psi',
+    'kmh', 'kph', 'mph', 'mps', 'knots',
+}  # fmt: skip
 """What counts as a unit where a title does not bracket it: SI with its prefixes, and those of rigs."""
-_SUFFIXES = frozenset(
-    's ms us ns m mm um cm km in inch ft n N kn kN lb lbf kip g mg A ma mA V mv mV T mt mT H mh mH '
-    'hz Hz khz kHz deg rad K degc degC C pa Pa kpa kPa mpa MPa bar psi kmh kph mph rpm kg nm Nm'.split()
-) - {'n'}
+_SUFFIXES = {
+    's', 'ms', 'us', 'ns', 'm', 'mm', 'um', 'cm', 'km', 'in', 'inch', 'ft', 'N', 'kn', 'kN',
+    'lb', 'lbf', 'kip', 'g', 'mg', 'kg', 'A', 'ma', 'mA', 'V', 'mv', 'mV', 'T', 'mt', 'mT', 'H', 'mh', 'mH',
+    'hz', 'Hz', 'khz', 'kHz', 'deg', 'rad', 'K', 'C', 'degc', 'degC', 'pa', 'Pa', 'kpa', 'kPa', 'mpa', 'MPa',
+    'bar', 'psi', 'kmh', 'kph', 'mph', 'rpm', 'nm', 'Nm',
+}  # fmt: skip
+"""What counts as a unit behind an underscore; of single small letters those that name no axis or phase."""
 _WRITTEN = {'m_s2': 'm/s2', 'mps2': 'm/s2', 'ms2': 'm/s2', 'm_s': 'm/s', 'mps': 'm/s', 'km_h': 'km/h'}
 """Suffixes that leave out the stroke of a fraction."""
 _POWER = r'(?:\^?-?\d|\*\*-?\d|[²³])?'
-_TERM = rf'\(?(?:1|[^\W\d_]+|°[CF]?|%|-){_POWER}\)?'
+_TERM = rf'\(?(?:1|[^\W\d_²³]+|°[CF]?|%|-){_POWER}\)?'
 _UNIT = re.compile(rf'\(?{_TERM}(?:\s*[/*·. ]\s*{_TERM})*\)?')
-_WORD = re.compile(r'°[CF]?|[^\W\d_]+|%|-')
+_WORD = re.compile(r'°[CF]?|[^\W\d_²³]+|%|-')
 _SQUARE = re.compile(r'(.*?)\s*\[\s*([^\[\]]*?)\s*\]\s*')
 _ROUND = re.compile(r'(.*?)\s*[({]\s*(.*?)\s*[)}]\s*')
 _STROKE = re.compile(r'([^/]+?)\s*/\s*(.+?)\s*')
@@ -41,7 +45,7 @@ def name_and_unit(title: str) -> tuple[str, str]:
     for pattern in (_ROUND, _STROKE, _WORDS):
         match = pattern.fullmatch(title)
         if match and match[1] and is_unit(match[2]):
-            return match[1], match[2].strip('()') if pattern is _STROKE else match[2]
+            return match[1].rstrip(' /'), match[2].strip('()') if pattern is _STROKE else match[2]
     match = _SUFFIX.fullmatch(title)
     if match and match[2] in _WRITTEN:
         return match[1], _WRITTEN[match[2]]
@@ -53,7 +57,7 @@ def name_and_unit(title: str) -> tuple[str, str]:
 def is_unit(text: str) -> bool:
     """Return whether a text can be nothing but a unit, such as `m/s^2`, `mm` or `1/min`."""
     text = text.strip()
-    if not text or text == '1' or not _UNIT.fullmatch(text):
+    if not text or text == '1' or text.count('(') != text.count(')') or not _UNIT.fullmatch(text):
         return False
     return all(word in _SYMBOLS for word in _WORD.findall(text))
 

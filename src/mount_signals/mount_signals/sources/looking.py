@@ -49,8 +49,9 @@ def look_inside(uri: str) -> list[Found]:
             count(0, 1)
             info = files.info(name)
         place = PurePosixPath(name.removeprefix(root).lstrip('/'))
+        # A name with `..` is hidden too: it would lead out of the folder.
         if info['type'] != 'directory' and not any(part.startswith('.') for part in place.parts):
-            found.append(_found(inside(uri, str(place)), info, _checked(place, uri)))
+            found.append(_found(inside(uri, str(place)), info, place))
     return sorted(found, key=lambda one: one.entry.uri)
 
 
@@ -122,9 +123,3 @@ def _seconds(time: Any) -> float:
             return nan
     zoned = time if time.tzinfo else time.replace(tzinfo=UTC)
     return float(zoned.timestamp())
-
-
-def _checked(place: PurePosixPath, uri: str) -> PurePosixPath:
-    if place.is_absolute() or '..' in place.parts:
-        raise SourceError(f'{shown(uri)} holds the name {str(place)!r}, which leads out of it')
-    return place

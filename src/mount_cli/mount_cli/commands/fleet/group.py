@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from mount_cli.commands.fleet import example, replay
+from mount_cli.commands.fleet import example, index, query, replay, report, worst
 from mount_cli.help import Command, Group
 
 app = typer.Typer(
@@ -16,16 +16,14 @@ app = typer.Typer(
 )
 
 _COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (
+    ('index', index.index, index.EPILOG),
     ('replay', replay.replay, replay.EPILOG),
+    ('query', query.query, query.EPILOG),
+    ('worst', worst.worst, worst.EPILOG),
+    ('report', report.report, report.EPILOG),
     ('example', example.example, example.EPILOG),
 )
 """Name, function and epilog of each sub-command."""
-
-
-@app.callback()
-def _top() -> None:
-    """Keep sub-commands even while there is only one."""
-
 
 for _name, _function, _epilog in _COMMANDS:
     app.command(name=_name, cls=Command, epilog=_epilog)(_function)

@@ -21,6 +21,7 @@ EXPLAINED = 0.6
 """Share of a force's mean square about its zero that friction with spring and play must explain (chosen)."""
 LARGEST_ERROR = 0.35
 """Error, rms over rms, above which no law of the ladder counts (chosen): an eighth of the square."""
+_BETTER = 1.0 / 3.0  # of what friction leaves over: so little another motion must leave, chosen
 _LONG = 4.0  # so many times the way to and fro that is not sliding makes a stroke, chosen
 
 
@@ -35,8 +36,9 @@ class Case:
 def case_of(recording: FrictionRecording, look: FirstLook) -> Case | None:
     """Return the case that a recording is, or None where it slides and its force is of friction."""
     name, stroke = recording.name, float(np.ptp(recording.displacement))
-    if look.explained < EXPLAINED:
-        return Case('not of friction', f'{name}: {_not_of_friction(recording, look)}')
+    other = _not_of_friction(recording, look)
+    if other:
+        return Case('not of friction', f'{name}: {other}')
     shares = (
         f'it slides on {look.sliding:.0%} of its way, sticks on {look.sticking:.0%}, crosses a play of '
         f'{2e3 * look.play:.2g} mm on {look.in_play:.0%}'
@@ -102,15 +104,21 @@ def _longer(look: FirstLook) -> str:
 
 
 def _not_of_friction(recording: FrictionRecording, look: FirstLook) -> str:
+    """Return what the force goes with instead of friction, in words; '' where friction explains it."""
     shares = _goes_with(recording, look.zero)
     most = max(shares, key=shares.__getitem__)
-    told = f'the force is not of friction: with spring and play it explains {look.explained:.0%} of the mean square; '
-    if shares[most] < EXPLAINED or shares[most] <= look.explained:
+    better = 1.0 - shares[most] < _BETTER * (1.0 - look.explained)
+    if look.explained >= EXPLAINED and not better:
+        return ''
+    told = (
+        f'the force is not of friction: with spring and play it explains {look.explained:.0%} of the mean '
+        'square; '
+    )
+    if shares[most] < EXPLAINED or not better:
         return told + (
             'neither displacement, velocity nor acceleration explains it either: is it the force of this '
-            'motion, '
-            'or noise of a cell that is hardly loaded (a contact that is loosely clamped)? Check channel '
-            'and clamp'
+            'motion, or noise of a cell that is hardly loaded (a contact that is loosely clamped)? Check '
+            'channel and clamp'
         )
     return told + f'{most} explains {shares[most]:.0%}: {_REMEDIES[most]}'
 

@@ -13,17 +13,34 @@ Kind = Literal['number', 'date', 'missing', 'text']
 Decimal = Literal['.', ',']
 COMMENTS = ('#', '%', '//')
 
-_WORDS = ('nan', 'na', 'n/a', 'null', 'none', '-nan', '#n/a', '#nv', '#na', '-', '--', '?', '1.#qnan', '-1.#ind')
-MISSING = ('', *dict.fromkeys(form(word) for word in _WORDS for form in (str.lower, str.upper, str.title)), 'NaN')
+_WORDS = (
+    'nan',
+    'na',
+    'n/a',
+    'null',
+    'none',
+    '-nan',
+    '#n/a',
+    '#nv',
+    '#na',
+    '-',
+    '--',
+    '?',
+    '1.#qnan',
+    '-1.#ind',
+)
+MISSING = (
+    '',
+    *dict.fromkeys(form(word) for word in _WORDS for form in (str.lower, str.upper, str.title)),
+    'NaN',
+)
 """How a missing value is written."""
 _MISSING = frozenset(MISSING)
 _NUMBERS = {
     '.': re.compile(r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?)', re.IGNORECASE),
     ',': re.compile(r'[+-]?(?:(?:\d+|\d*,\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?)', re.IGNORECASE),
 }
-_DATE = re.compile(
-    r'\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?(?:Z|[+-]\d\d:?\d\d)?'
-)  # ISO 8601
+_DATE = re.compile(r'\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?(?:Z|[+-]\d\d:?\d\d)?')  # ISO 8601
 _FRACTION = re.compile(r'\.(\d+)')
 
 

@@ -56,7 +56,7 @@ def _titles(
 ) -> tuple[list[str], list[str], int, list[str]]:
     """Return names, units or [], the first line of the samples, and notes."""
     plain = [(number, split.cells(text)) for number, text in above if not is_comment(text)]
-    lines = {number: text for number, text in above}
+    lines = dict(above)
     found = [(number, _as_wide(cells, lines[number], split)) for number, cells in plain]
     last = found[-1][1] if found else None
     if last is not None and len(found) > 1 and found[-2][1] is not None and _is_unit_row(last, split):
@@ -72,6 +72,8 @@ def _titles(
         numbered = [cell or 'index' for cell in split.rows[0]]
         return numbered, [], split.first + 1, ['the first line is taken as numbers of the columns']
     names = [str(place) for place in range(split.width)]
+    if split.kinds[-1] == 'missing':
+        names[-1] = ''
     return names, [], split.first, [*_left_out(plain), 'no titles: the columns are numbered from 0 on']
 
 

@@ -1,9 +1,10 @@
-"""The samples of a text table: in bulk by pyarrow, and cell by cell where that is missing or finds a fault."""
+"""The samples of a text table: by pyarrow, and cell by cell where that is missing or finds a fault."""
 
 import csv
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from mount_signals.formats.text.cells import (
 from mount_signals.formats.text.dialect import Dialect
 from mount_signals.formats.text.lines import blocks
 
-Values = NDArray[np.float64] | NDArray[np.int64]
+Values = NDArray[Any]
 _NOT_SAMPLES = re.compile(rb'^[ \t]*(?:(?:#|%|//)[^\n]*)?$', re.MULTILINE)
 _MAY_BE_NONE = (b'#', b'%', b'//', b'\n ', b'\n\t')
 _RUNS = re.compile(rb'[ \t]+')

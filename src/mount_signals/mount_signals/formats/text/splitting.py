@@ -106,8 +106,10 @@ def _split(lines: list[Line], later: list[str], delimiter: str, decimal: Decimal
     body += [row for row in (tuple(cells_of(text, delimiter)) for text in later) if len(row) == width]
     kinds = tuple(_kind([row[place] for row in body], decimal) for place in range(width))
     fitting = [_fits(row, kinds, decimal) for row in rows]
-    if 'number' not in kinds or not any(fitting):
+    if 'number' not in kinds or not any(fitting) or (width == 1) != (delimiter == ALONE):
         return None
+    if delimiter == decimal and not any(decimal in cell for row in body for cell in row):
+        return None  # it separates cells, and stands in none
     first = fitting.index(True)
     if sum(fitting[first:]) < _ENOUGH * (len(fitting) - first):
         return None
@@ -192,8 +194,8 @@ def _no_table(path: Path, lines: list[Line]) -> str:
         return f'{path} holds comments and blank lines only; needed are lines of numbers'
     line = lines[len(lines) // 2]
     return (
-        f'{path}, line {line.number}: {line.text.strip()[:80]!r} is no line of a table of numbers; expected are '
-        'lines of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, '
+        f'{path}, line {line.number}: {line.text.strip()[:80]!r} is no line of a table of numbers; expected '
+        'are lines of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, '
         'no signs between thousands'
     )
 
@@ -202,6 +204,4 @@ def _ambiguous(path: Path, possible: list[Split]) -> str:
     ways = ' or '.join(
         f'{split.told} ({", ".join(split.rows[0][:4]).replace(chr(9), " ")})' for split in possible
     )
-    return (
-        f'{path} can be read as {ways}; state the delimiter or the decimal sign, or export with semicolons'
-    )
+    return f'{path} can be read as {ways}; state the delimiter or the decimal sign, or export with semicolons'

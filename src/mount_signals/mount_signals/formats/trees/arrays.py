@@ -1,4 +1,4 @@
-"""NPY and NPZ files, and folders of them: pairs of times and values, as comma2k19 publishes them and by name."""
+"""NPY and NPZ files, and folders of pairs of times and values: by their names, or as comma2k19 has them."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,7 +25,9 @@ def open_npy(path: Path, stated: Stated) -> Leaves:
         found = leaves_of('', _loaded(path), notes)
         _refuse_none(path, found, notes)
         return Leaves('NPY', 'numpy', with_dates(found), notes)
-    name = path.parent.name if times.name in {time for _, time in _PAIRS} else path.name.removesuffix(_NAMED[0])
+    name = (
+        path.parent.name if times.name in {time for _, time in _PAIRS} else path.name.removesuffix(_NAMED[0])
+    )
     return Leaves('NPY with times', 'numpy', _pair(name, path, times, notes), notes)
 
 
@@ -79,7 +81,7 @@ def _pairs_below(path: Path) -> Iterator[tuple[str, Path, Path]]:
 
 def _times_of(file: Path) -> Path | None:
     """Return the file of times that belongs to a file of values."""
-    names = {values: times for values, times in _PAIRS}
+    names = dict(_PAIRS)
     name = names.get(file.name, '')
     if file.name.endswith(_NAMED[0]):
         name = file.name.removesuffix(_NAMED[0]) + _NAMED[1]

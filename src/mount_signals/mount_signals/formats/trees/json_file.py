@@ -82,7 +82,7 @@ def _hold_signals(records: list[dict[str, Any]]) -> bool:
 
 
 def _vector(tree: list[Any]) -> Any:
-    """Return a list as numbers, NaN where it holds null, or as dates; as it is where it holds anything else."""
+    """Return a list as numbers, NaN where it holds null, as dates, or as texts."""
     known = [one for one in tree if one is not None]
     if all(isinstance(one, int | float) for one in known):
         try:

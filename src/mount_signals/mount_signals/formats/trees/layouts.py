@@ -57,7 +57,9 @@ def _timeseries(tree: Mapping[str, Any], notes: list[str], name: str) -> list[Le
     seconds = text_at(tree, 'TimeInfo', 'Units') in ('', 's', 'sec', 'seconds')
     if not seconds:
         return []
-    unit = text_at(tree, 'DataInfo', 'Units') or next(filter(None, (text_at(tree, key) for key in _UNITS)), '')
+    unit = text_at(tree, 'DataInfo', 'Units') or next(
+        filter(None, (text_at(tree, key) for key in _UNITS)), ''
+    )
     return _timed(leaves_of(name, values, notes, unit), time, f'times of the timeseries {name!r}')
 
 
@@ -89,8 +91,8 @@ def _dspace(tree: Mapping[str, Any], notes: list[str], name: str) -> list[Leaf]:
             continue
         time = times.setdefault(axis, Leaf('X', axes[axis]['Data'], axis=_long(axes[axis]['Data'])))
         title, unit = text_at(trace, 'Name') or str(place), text_at(trace, 'Unit')
-        for leaf in leaves_of(title.strip('"'), trace['Data'], notes, unit):
-            found.append(replace(leaf, time=time, told='times of the recording of dSPACE'))
+        leaves = leaves_of(title.strip('"'), trace['Data'], notes, unit)
+        found += [replace(leaf, time=time, told='times of the recording of dSPACE') for leaf in leaves]
     return found
 
 

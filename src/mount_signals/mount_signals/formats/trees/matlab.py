@@ -13,8 +13,8 @@ from mount_signals.formats.trees.layouts import leaves_in
 from mount_signals.formats.trees.leaves import Leaf, Leaves
 
 _OBJECTS = (
-    'objects of MATLAB (timeseries, timetable, table) are read by MATLAB alone, left out; save their numbers: '
-    's.time = ts.Time; s.data = ts.Data'
+    'objects of MATLAB (timeseries, timetable, table) are read by MATLAB alone, left out; save their '
+    'numbers: s.time = ts.Time; s.data = ts.Data'
 )
 _DEEPEST = 16  # levels, chosen
 _MOST = 4096  # elements of an array of structs or cells, chosen
@@ -105,7 +105,7 @@ class _Turned:
         self.attrs = dataset.attrs
 
     def __getitem__(self, key: Any) -> Any:
-        return self._dataset[...] .T if key is Ellipsis else self._dataset[key[::-1]]
+        return self._dataset[...].T if key is Ellipsis else self._dataset[key[::-1]]
 
 
 def _refuse_none(path: Path, found: list[Leaf], notes: list[str]) -> None:

@@ -1,0 +1,102 @@
+"""A catalogue brought up to date: what did not change is not read again, what was stopped goes on."""
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mount_replay.fleet.catalogue.columns import UNREADABLE
+from mount_replay.fleet.catalogue.journal import Journal
+from mount_replay.fleet.catalogue.places import Place, below, places
+from mount_replay.fleet.catalogue.rows import Row, Rows, read_place, unreadable
+from mount_replay.fleet.catalogue.stored import read_rows, write_catalogue
+from mount_replay.fleet.runner import run_tasks
+
+if TYPE_CHECKING:
+    import pyarrow
+
+Told = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Indexed:
+    """What came of it: the table of all recordings, and how many were read, unchanged, and are gone."""
+
+    recordings: 'pyarrow.Table'
+    read: int
+    unchanged: int
+    vanished: int
+    unreadable: int
+
+
+def index(
+    uris: Iterable[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    scheduler: str = 'local',
+    workers: int = 0,
+    memory: int = 0,
+    told: Told = lambda done, of: None,
+) -> 'pyarrow.Table':
+    """Return the recordings at and below `uris` as the table of the catalogue in the folder `out`.
+
+    As `indexed`, which tells besides what was done.
+    """
+    return indexed(uris, out, scheduler=scheduler, workers=workers, memory=memory, told=told).recordings
+
+
+def indexed(
+    uris: Iterable[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    scheduler: str = 'local',
+    workers: int = 0,
+    memory: int = 0,
+    told: Told = lambda done, of: None,
+) -> Indexed:
+    """Bring the catalogue in the folder `out` up to date with the recordings at and below `uris`.
+
+    Recordings whose files have the same sizes, times and etags are not read again; those that are no more
+    below `uris` leave the catalogue, those that lie elsewhere stay. Stopped by whatever, the same order goes
+    on where it stopped. `told` takes how many are done, of how many; `scheduler`, `workers` and `memory` are
+    those of `run_tasks`. Rows depend on the recordings alone. Raises `SourceError`, `SchedulerLostError`, and
+    `OSError` where `out` cannot be written.
+    """
+    roots = [os.fspath(uri) for uri in uris]
+    found = places(roots)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = read_rows(folder)
+    with Journal(folder) as journal:
+        known = {
+            uri: rows for uri, rows in (kept | journal.rows).items() if _is_current(rows, found.get(uri))
+        }
+        waiting = [place for uri, place in found.items() if uri not in known]
+        told(0, len(waiting))
+        tasks = run_tasks(read_place, waiting, scheduler=scheduler, workers=workers, memory=memory)
+        for count, done in enumerate(tasks, 1):
+            place = waiting[done.place]
+            rows = done.result or unreadable(place, done.reason, fingerprint='')
+            journal.add(place.uri, rows)
+            known[place.uri] = rows
+            told(count, len(waiting))
+        elsewhere = {uri: rows for uri, rows in kept.items() if not below(uri, roots)}
+        recordings = write_catalogue(folder, known | elsewhere)
+        journal.finish()
+    return Indexed(
+        recordings,
+        read=len(waiting),
+        unchanged=len(found) - len(waiting),
+        vanished=len(kept.keys() - found.keys() - elsewhere.keys()),
+        unreadable=sum(_is_unreadable(rows.recordings) for uri, rows in known.items() if uri in found),
+    )
+
+
+def _is_current(rows: Rows, place: Place | None) -> bool:
+    """Return whether rows tell of the files as they are now; what could not be fetched is tried again."""
+    return place is not None and rows.recordings[0]['fingerprint'] == place.fingerprint
+
+
+def _is_unreadable(rows: list[Row]) -> bool:
+    return rows[0]['kind'] == UNREADABLE

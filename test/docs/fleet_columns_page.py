@@ -1,0 +1,51 @@
+"""Writes docs/reference/fleet_columns.md: every column of a fleet's tables, as the code declares it.
+
+`python test/docs/fleet_columns_page.py` renews the page; `test_generated_pages.py` holds it against the
+declarations.
+"""
+
+from collections.abc import Sequence
+
+from generated import PAGES, table, written_by
+
+from mount_replay.fleet.catalogue.columns import EVENTS, RECORDINGS
+from mount_replay.fleet.columns import COUNT, FLAG, NUMBER, TEXT, TIME, Column
+from mount_replay.fleet.what_if.columns import REPLAY_COLUMNS
+
+PAGE = PAGES / 'fleet_columns.md'
+
+HEAD = f"""# Columns of a fleet
+
+What `engine-mount fleet query` can be asked: the tables `recordings` and `events` of a catalogue, `result` of
+a replay, each a Parquet file of that name. {written_by(__file__)}
+How they are made and asked: [fleet](../how-to/fleet.md). What is unknown is null.
+"""
+TYPES = {
+    TEXT: 'text',
+    NUMBER: 'number',
+    COUNT: 'whole number',
+    FLAG: 'true or false',
+    TIME: 'time, UTC',
+}
+
+
+def page() -> str:
+    """Return the text of the page."""
+    parts = [HEAD]
+    for name, of, columns in (
+        ('recordings', '`engine-mount fleet index`, a row for each mount of each recording', RECORDINGS),
+        ('events', '`engine-mount fleet index`, a row for each event', EVENTS),
+        ('result', '`engine-mount fleet replay`, a row for each mount of each recording', REPLAY_COLUMNS),
+    ):
+        parts += [f'## {name}', f'Made by {of}.', columns_table(columns)]
+    return '\n\n'.join(part.rstrip() for part in parts) + '\n'
+
+
+def columns_table(columns: Sequence[Column]) -> str:
+    """Return the table of the columns of one table."""
+    rows = [(f'`{each.name}`', TYPES[each.type], each.unit, each.meaning) for each in columns]
+    return table(('column', 'type', 'unit', 'meaning'), rows)
+
+
+if __name__ == '__main__':
+    PAGE.write_text(page(), encoding='utf-8')
