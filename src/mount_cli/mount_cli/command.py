@@ -26,6 +26,7 @@ from mount_cli.commands import (
     recover,
     replay,
     report,
+    road,
     version,
     view,
 )
@@ -106,6 +107,7 @@ for _panel, _name, _function, _epilog in _COMMANDS:
 app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
 app.add_typer(identify.app, rich_help_panel=_MOUNT)
+app.add_typer(road.app, rich_help_panel=_RECORDINGS)
 
 
 def main(arguments: list[str] | None = None) -> None:

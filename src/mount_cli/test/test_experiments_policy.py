@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from mount_experiments.harness.contract import Order
-from mount_experiments.policy import excitations, learnable, limits, runs
 from mount_experiments.policy import experiment as policy
+from mount_experiments.policy import learnable, limits, runs
 from mount_experiments.policy.cases import CONTINUOUS, POLICIES
 from mount_models.road import RandomRoad, random_road
 from mount_models.sampling import SAMPLE_TIME
 from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from mount_signals.roads.inversion import road_of
 from mount_sim.excitation.scenario import STEP_TIME
 
 SHORT = {
@@ -62,7 +63,7 @@ def test_road_behind_an_acceleration_gives_that_acceleration_again():
     within = np.sin(np.pi * time / time[-1]) ** 2  # begins and ends at rest
     road = within * random_road(time, RandomRoad(highest_frequency=0.6, lowest_frequency=0.06))
     _, wanted = ride_without_friction(Vehicle(), resting_vehicle(), road, np.zeros(road.size), STEP_TIME)
-    found = excitations.road_of(wanted, STEP_TIME, Vehicle())
+    found = road_of(wanted, STEP_TIME, Vehicle())
     _, again = ride_without_friction(Vehicle(), resting_vehicle(), found, np.zeros(road.size), STEP_TIME)
     middle = slice(road.size // 4, 3 * road.size // 4)
     assert np.std(again[middle] - wanted[middle]) < 0.1 * np.std(wanted[middle])

@@ -18,6 +18,7 @@ NAMES = (
     'sensitivity',
     'policy',
     'recorded_drive',
+    'measured_road',
 )
 """The names of the experiments, which are those of their folders."""
 

@@ -64,7 +64,7 @@ def wheel_height(
     """
     contact = (0.0 if profile.effective else CONTACT_LENGTH) if contact_length is None else contact_length
     notes = [*profile.notes, *speed.notes()]
-    reached = _KEPT * speed.mean / profile.spacing
+    reached = kept_frequency(profile, speed)
     if reached < _ENGINE:
         raise ProfileError(
             f'{profile.name}: places {profile.spacing:g} m apart at {speed.mean:.3g} m/s hold {reached:.2g} '
@@ -91,6 +91,11 @@ def wheel_height(
     return WheelHeight(
         series * np.minimum(STEP_TIME * np.arange(series.size) / _RAMP_IN, 1.0), told, tuple(notes)
     )
+
+
+def kept_frequency(profile: RoadProfile, speed: Speed) -> float:
+    """Return up to which frequency (Hz) a road holds its unevenness at the mean speed."""
+    return _KEPT * min(speed.mean / profile.spacing, 1.0 / STEP_TIME)
 
 
 def _needed(speed: Speed, duration: float) -> float:

@@ -42,14 +42,13 @@ def even_places(name: str, distance: FloatArray, height: FloatArray) -> EvenPlac
     notes += again
     _check_length(name, places)
     spacing = float(np.median(np.diff(places)))
-    notes += _gaps(name, places, spacing)
-    count = round((places[-1] - places[0]) / spacing) + 1
+    gaps = _gaps(name, places, spacing)
+    count = round((places[-1] - places[0]) / spacing) + 1 if gaps else places.size
     exact = (places[-1] - places[0]) / (count - 1)
     grid = places[0] + exact * np.arange(count)
-    if places.size == count and np.abs(places - grid).max() <= _ON_THE_GRID * exact:
+    if not gaps and np.abs(places - grid).max() <= _ON_THE_GRID * exact:
         return EvenPlaces(float(places[0]), float(exact), heights, tuple(notes))
-    if places.size == count:
-        notes.append(f'brought from uneven places onto an even grid of {exact:.4g} m')
+    notes += gaps or [f'brought from uneven places onto an even grid of {exact:.4g} m']
     return EvenPlaces(float(places[0]), float(exact), interpolated(places, heights, grid), tuple(notes))
 
 

@@ -22,6 +22,9 @@ _PARTS = 8  # chosen: so many averages make a peak of chance unlikely
 _PEAK = 5.0  # chosen: of eight averages one in 10^8 is so far above its neighbours
 _NEIGHBOURS = 0.75  # octaves to either side
 _FEWEST_BANDS = 4
+_LONG = 0.3  # cycles/m, chosen: a road's density has its maximum below
+_CLIFF = 30.0  # chosen: no road falls so far below all that it was before, but a filter does
+_FADED = 3  # bands, chosen: what a filter took before that
 _HANN_WIDTH = 1.5  # lines of the spectrum: what a sine is spread over
 _LOWEST_WAVE = 1e-4  # m, chosen: less is not felt beside the roughness of asphalt
 _MOST = 3
@@ -78,7 +81,8 @@ def unevenness(profile: RoadProfile) -> Unevenness:
     """Return class, roughness, waviness and periodic content of a road."""
     raw, density = _density(profile.height, profile.spacing, min(profile.length, _LONGEST_SEGMENT))
     frequency, smoothed = _smoothed(raw, density)
-    used = (frequency >= FITTED[0]) & (frequency <= FITTED[1])
+    lowest, highest = _held(frequency, smoothed)
+    used = (frequency >= max(FITTED[0], lowest)) & (frequency <= min(FITTED[1], highest))
     if np.count_nonzero(used) < _FEWEST_BANDS:
         used = np.ones(frequency.size, bool)
     slope, level = np.polyfit(np.log(frequency[used] / REFERENCE_FREQUENCY), np.log(smoothed[used]), 1)
@@ -91,8 +95,19 @@ def unevenness(profile: RoadProfile) -> Unevenness:
         smoothed,
         float(frequency[used][0]),
         float(frequency[used][-1]),
-        _periods(profile, (roughness, -float(slope))),
+        _periods(profile, (roughness, -float(slope)), highest),
     )
+
+
+def _held(frequency: FloatArray, density: FloatArray) -> tuple[float, float]:
+    """Return the band that a road holds: filters, and inversion, leave nothing below or above."""
+    long = max(int(np.count_nonzero(frequency <= _LONG)), 1)
+    first = int(np.argmax(density[:long]))
+    before = np.minimum.accumulate(density[first:])[:-1]
+    behind = np.maximum.accumulate(density[:first:-1])[::-1]
+    cliffs = np.flatnonzero(behind * _CLIFF < before)
+    last = first + int(cliffs[0]) - _FADED if cliffs.size else frequency.size - 1
+    return float(frequency[first]), float(frequency[max(last, first)])
 
 
 def class_of(roughness: float) -> str:
@@ -125,17 +140,18 @@ def _smoothed(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, F
     return np.array(centres), np.array(means)
 
 
-def _periods(profile: RoadProfile, line: tuple[float, float]) -> tuple[Period, ...]:
+def _periods(profile: RoadProfile, line: tuple[float, float], highest: float) -> tuple[Period, ...]:
     """Return the waves that stand out of their neighbours and of the fitted line, the highest first.
 
-    At most three, and none that is a harmonic of one of them.
+    At most three up to `highest` (cycles/m), and none that is a harmonic of one of them.
     """
     frequency, density = _density(profile.height, profile.spacing, profile.length / _PARTS)
     fitted = line[0] * (frequency / REFERENCE_FREQUENCY) ** -line[1]
     amplitude = np.sqrt(2.0 * density * _HANN_WIDTH * frequency[0])
     found: list[Period] = []
     for place in np.argsort(-amplitude):
-        if not 2 <= place < frequency.size - 2 or amplitude[place] < _LOWEST_WAVE or len(found) == _MOST:
+        inside = 2 <= place < frequency.size - 2 and frequency[place] <= highest
+        if not inside or amplitude[place] < _LOWEST_WAVE or len(found) == _MOST:
             continue
         near = np.abs(np.log2(frequency / frequency[place])) < _NEIGHBOURS
         near[place - 2 : place + 3] = False

@@ -1,5 +1,7 @@
 """Class and waviness of roads of known density, and what comes again in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -45,3 +47,16 @@ def test_of_a_short_road_the_class_is_called_a_guess(made_road):
     found = unevenness(made_road(length=8.0, spacing=0.01))
     assert found.beyond
     assert 'a guess' in found.sentences()[1]
+
+
+def test_of_a_road_cut_to_a_band_the_class_is_that_of_the_band(made_road):
+    whole = made_road(64e-6, length=600.0, spacing=0.02, seed=7)
+    spectrum, frequency = np.fft.rfft(whole.height), np.fft.rfftfreq(whole.height.size, whole.spacing)
+    held = np.clip(frequency / 0.05 - 3.0, 0.0, 1.0) * np.clip(5.0 * (1.0 - frequency / 2.0), 0.0, 1.0)
+    cut = np.round(np.fft.irfft(spectrum * held, whole.height.size), 7)
+    found = unevenness(replace(whole, height=cut))
+    assert found.roughness == pytest.approx(64e-6, rel=0.4)
+    assert found.waviness == pytest.approx(2.0, abs=0.25)
+    assert found.beyond  # the band begins at 0.2 cycles/m
+    assert found.highest < 2.0
+    assert not found.periods
