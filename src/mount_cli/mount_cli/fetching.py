@@ -11,12 +11,11 @@ def local(recording: str, console: Console) -> Path:
     """Return where a recording lies: a URI is fetched whole, with a bar; raises `SourceError`."""
     if not is_uri(recording):
         return Path(recording)
-    from mount_cli.screen import progress_bar
+    from mount_cli.screen import TerminalScreen
     from mount_signals.sources.stores import fetched
 
-    with progress_bar(console, transient=True) as bar:
-        task = bar.add_task(f'fetching {shown(recording)}', total=None)
-        return fetched(recording, tell=lambda done, of: bar.update(task, completed=done, total=of))
+    with TerminalScreen(console).bar(f'fetching {shown(recording)}', transient=True) as bar:
+        return fetched(recording, tell=lambda done, of: bar(done / of, detail=f'{of / 1e6:.1f} MB'))
 
 
 def beside(recording: Path) -> Path:
@@ -24,6 +23,13 @@ def beside(recording: Path) -> Path:
     if is_fetched(recording):
         return Path.cwd()
     return recording.absolute().parent
+
+
+def named(recording: Path) -> str:
+    """Return what a recording is called to whom asked for it: its path, or the URI that it was fetched by."""
+    from mount_signals.sources.stores import uri_of
+
+    return uri_of(recording) or str(recording)
 
 
 def is_fetched(recording: Path) -> bool:

@@ -4,6 +4,7 @@ import os
 import signal
 from typing import Any
 
+from mount_bringup.graph.ending_signals import interrupt_and_remember
 from mount_bringup.graph.errors import INTERRUPTED
 
 
@@ -17,7 +18,7 @@ def main() -> None:
         complete_in_bash(app)
     from mount_cli.command import main as run
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, interrupt_and_remember)
     run()
 
 

@@ -176,7 +176,7 @@ def one_missing(table):
         ),
         ({'force_n': lambda t: 0.0 * t['current_a'] + 50.0}, 'force is constant (50 N in all 885 rows)'),
         ({'force_n': one_stuck}, 'force stayed at'),
-        ({'force_n': one_missing}, 'line 9: force_n is nan (1 such of 885)'),
+        ({'force_n': one_missing}, 'row 8: force_n is nan (1 such of 885)'),
         ({'force_n': one_outlier}, '1 of 885 points are outliers'),
         ({'force_n': lambda t: -t['force_n']}, 'is the sign of the load cell right?'),
     ],
@@ -192,9 +192,13 @@ def test_doubtful_points_are_refused_and_no_file_is_written(files, tmp_path, cap
     ('content', 'suffix', 'sentence'),
     [
         (b'gap_um,current_a,force_n\n300,1,100\n310,1,90\n', '.csv', 'holds 2 points, at least 8 are needed'),
-        (b'gap_um,current_a,force_n\n300,1,abc\n', '.csv', "line 2: '300,1,abc' is not a line of numbers"),
+        (
+            b'gap_um,current_a,force_n\n300,1,abc\n',
+            '.csv',
+            'force_n: no numbers, left out',
+        ),
         (b'no recording at all', '.mcap', 'mcap'),
-        (b'x', '.xlsx', 'files of type .xlsx are not read'),
+        (b'x', '.xlsx', 'no readable Excel workbook'),
     ],
 )
 def test_files_that_are_no_measurement_are_refused(tmp_path, capsys, content, suffix, sentence):

@@ -23,6 +23,7 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
+from mount_signals.units.mapping import ColumnChoice
 from mount_sim.electronics.electronics import status_every
 from mount_sim.rack.coil import drawn_rack, record_ripple
 
@@ -140,9 +141,9 @@ def test_a_recording_without_what_is_needed_is_refused(tmp_path):
         read_ripple([bag], {}, NOTHING, AREA)
     given = GivenValues({bag: 349e-6}, {})
     with pytest.raises(RackRecordingError, match=r'has no topic sim/mount_force; it holds .*clamp_force'):
-        read_force([bag], {'force': 'sim/mount_force:wrench.force.z'}, given)
+        read_force([bag], {'force': ColumnChoice('sim/mount_force:wrench.force.z')}, given)
     with pytest.raises(RackRecordingError, match='of an MCAP recording write TOPIC:FIELD'):
-        read_force([bag], {'force': 'kraft'}, given)
+        read_force([bag], {'force': ColumnChoice('kraft')}, given)
 
 
 def test_a_recording_whose_slopes_are_mostly_missing_is_refused(tmp_path):

@@ -13,7 +13,8 @@ from mount_cli.command import main
 from mount_cli.commands.identify_arguments import with_repeated_options
 from mount_experiments.harness.rack_recording import record_friction_rack
 from mount_identification.friction import ladder
-from mount_identification.friction.files import parsed_channels, read_recording
+from mount_identification.friction.channels import parsed_channels
+from mount_identification.friction.files import read_recording
 from mount_identification.friction.looks.force_zero import zeroed
 from mount_identification.friction.recording import IdentificationError
 from mount_identification.rack.recordings import described
@@ -109,10 +110,10 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
     [
         (lambda f: f.with_suffix('.csv').write_text('time_s,displacement_mm,friction_force_n,normal_force_n\n'
                                                     '0,0,1,9\n1,1,1,9\n'), '2 samples'),
-        (lambda f: f.with_suffix('.csv').write_text('time_s,force_n\n0,1\n'), 'no column for displacement'),
+        (lambda f: f.with_suffix('.csv').write_text('t,f\n0.0,1.5\n'), 'no column for displacement'),
         (lambda f: f.with_suffix('.mcap').write_bytes(b'no recording at all' * 9), 'MCAP'),
         (lambda f: f.with_suffix('.json').write_text('{"data": [[1, 2]]}'), 'shape'),
-        (lambda f: f.with_suffix('.png').write_text(''), 'are not read'),
+        (lambda f: f.with_suffix('.png').write_bytes(b'\x89PNG\r\n\0' * 9), 'are not read'),
     ],
 )  # fmt: skip
 def test_bad_files_are_refused_and_nothing_is_written(make, words, tmp_path, capsys):
@@ -344,8 +345,8 @@ def test_a_channel_that_json_does_not_have_is_refused(text, words, tmp_path):
         read_recording(_rig_file(tmp_path), parsed_channels([text]))
 
 
-def test_a_channel_that_cannot_be_heard_is_refused(tmp_path):
-    with pytest.raises(IdentificationError, match='time is in s and takes no unit'):
+def test_a_channel_that_cannot_be_heard_is_refused(in_mcap):
+    with pytest.raises(IdentificationError, match="unit 'mm' is none of time; known are s, ms"):
         parsed_channels(['time=t:mm'])
     with pytest.raises(IdentificationError, match='the times of a recording are its stamps'):
-        read_recording(tmp_path, parsed_channels(['time=t']))
+        read_recording(in_mcap[1], parsed_channels(['time=t']))

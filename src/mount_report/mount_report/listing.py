@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,9 @@ from mount_bags.run.place import open_run
 from mount_bags.run.session import session_parameters
 from mount_bags.run.told import duration_of, started_of, told_session
 from mount_bringup.recorded_mount import simulated_mounts
+from mount_signals.sources.local import local_path
+from mount_signals.sources.source import SourceError
+from mount_signals.sources.stores import is_local, outline
 
 _SOUND = 'nothing lost, no faults'
 _COUNTS = {
@@ -30,10 +33,11 @@ _COUNTS = {
 class Listed:
     """One recording; `started` with its zone, `duration` in s of its stamps, empty or None where unknown.
 
-    `sound` is None where no summary of a run tells whether anything was lost or went wrong.
+    `path` is its URI where it lies in a store. `sound` is None where no summary of a run tells whether
+    anything was lost or went wrong.
     """
 
-    path: Path
+    path: Path | str
     started: datetime | None = None
     duration: float | None = None
     scenario: str = ''
@@ -55,9 +59,13 @@ class Listed:
         }
 
 
-def listed(folders: Sequence[Path]) -> list[Listed]:
-    """Return the recordings in `folders`, and those that these are themselves, the newest first."""
-    found = [listed_one(place) for folder in folders for place in _places(folder)]
+def listed(folders: Sequence[Path | str]) -> list[Listed]:
+    """Return the recordings in `folders`, and those that these are themselves, the newest first.
+
+    A folder is a path or a URI; of what lies in a store only the ends are read. Raises `SourceError` where a
+    store does not tell what is there.
+    """
+    found = [one for folder in folders for one in _listed_at(str(folder))]
     return sorted(found, key=lambda one: one.started.timestamp() if one.started else 0.0, reverse=True)
 
 
@@ -81,6 +89,20 @@ def listed_one(path: Path) -> Listed:
         verdict,
         sound,
     )
+
+
+def _listed_at(folder: str) -> Iterator[Listed]:
+    if is_local(folder):
+        yield from map(listed_one, _places(local_path(folder)))
+        return
+    from mount_signals.sources.outlines import recordings_at
+
+    for uri in recordings_at(folder):
+        try:
+            with outline(uri) as path:
+                yield replace(listed_one(path), path=uri)
+        except SourceError as error:
+            yield Listed(uri, verdict=str(error), sound=False)
 
 
 def _places(folder: Path) -> Iterator[Path]:

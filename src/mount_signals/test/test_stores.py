@@ -169,3 +169,14 @@ def test_letters_of_names_stay_as_they_are(sftp):
     (folder / name).write_bytes(b'x')
     (entry,) = entries(f'sftp://127.0.0.1:{port}/')
     assert fetched(entry.uri).name == name
+
+
+def test_the_recordings_of_a_folder_in_a_store_are_found(s3):
+    for key in (
+        'day/a/metadata.yaml', 'day/a/a_0.mcap', 'day/b/recording/metadata.yaml', 'day/b/summary.json',
+        'day/b/log/x.txt', 'day/c/notes.txt', 'day/d/deeper/d_0.mcap', 'day/e.csv',
+    ):  # fmt: skip
+        s3.put(key, b'x')
+    assert outlines.recordings_at('s3://drives/day') == ['s3://drives/day/a', 's3://drives/day/b']
+    assert outlines.recordings_at('s3://drives/day/b') == ['s3://drives/day/b']
+    assert outlines.recordings_at('s3://drives/day/a/a_0.mcap') == ['s3://drives/day/a/a_0.mcap']

@@ -188,16 +188,20 @@ class Recording:
             waiting[name].append(block)
             counts[name] += len(block)
             if sum(map(len, waiting[name])) >= size:
-                yield self._part(name, waiting[name])
+                yield self.series_of(name, waiting[name])
                 waiting[name] = []
         for name, blocks in waiting.items():
             self._note_damage(name, counts[name])
             if blocks:
-                yield self._part(name, blocks)
+                yield self.series_of(name, blocks)
 
-    def axis_from(self, first: Series) -> TimeAxis:
-        """Return the time axis by the first messages of its topic alone, as they come from `parts`."""
-        return self._axis_of({first.topic: first}.__getitem__)
+    def numbers_in(self, file: StoredFile, name: str) -> list[int]:
+        """Return by which numbers a file knows the topic with this full name."""
+        return [int(number) for number in self._declared[name].numbers_in(file)]
+
+    def axis_from(self, topic: str, first: Arrivals) -> TimeAxis:
+        """Return the time axis by the first messages of its topic alone."""
+        return self._axis_of({topic: first}.__getitem__)
 
     def latched(self, name: str) -> Any:
         """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
@@ -321,9 +325,10 @@ class Recording:
 
     def _series_of(self, name: str, blocks: list[StoredMessages]) -> Series:
         self._note_damage(name, sum(map(len, blocks)))
-        return self._part(name, blocks)
+        return self.series_of(name, blocks)
 
-    def _part(self, name: str, blocks: list[StoredMessages]) -> Series:
+    def series_of(self, name: str, blocks: Sequence[StoredMessages]) -> Series:
+        """Return messages of the topic with this full name as a series."""
         head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, HEAD)
         return self._made(name, Payloads([block.payloads() for block in blocks]), head)
 

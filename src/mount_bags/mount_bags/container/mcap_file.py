@@ -14,6 +14,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
+from zstandard import ZstdDecompressor
 
 from mount_bags.container.chunks import (
     MESSAGE_HEAD,
@@ -27,6 +28,7 @@ from mount_bags.container.chunks import (
     messages_at,
     partial_chunk,
     scattered_chunks,
+    unpacked,
 )
 from mount_bags.container.message_compression import plain
 from mount_bags.container.stored import ACCOUNTS, StorageError, StoredMessages, StoredTopic
@@ -66,6 +68,7 @@ class McapFile:
         self.lost_beside: list[str] = []  # names of metadata and attachments
         self.chunks: list[Chunk] = []
         self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
+        self._decompressor = ZstdDecompressor()
         self.closed = False  # whether the writer came to the end of its messages
         self.undeclared = 0  # messages whose topic is not known
         self.tail: Chunk | None = None  # begun at the end of the file, cut off before its own
@@ -149,6 +152,23 @@ class McapFile:
         elif not contents.whole:
             self._warn(f'the chunk at byte {chunk.position} ends with what is no record')
         return contents
+
+    @property
+    def plain(self) -> bool:
+        """Whether a checksum vouches for all of it, and its messages are in chunks that tell their topics."""
+        if not self.proven or self._loose or self.data_proof() is not Proof.SOUND:
+            return False
+        return all(
+            chunk.channels is not None and chunk.compression in ('', 'zstd') and not chunk.damaged
+            for chunk in self.chunks
+        )
+
+    def unpacked(self, chunk: Chunk) -> bytes | None:
+        """Return the bytes in a chunk of a `plain` file, which need no checksum of their own.
+
+        None if it is damaged.
+        """
+        return unpacked(self._data[chunk.begin : chunk.end], chunk, self._decompressor)
 
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""

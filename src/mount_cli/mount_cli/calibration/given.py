@@ -2,11 +2,15 @@
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+if TYPE_CHECKING:
+    from mount_signals.units.mapping import ColumnChoice
+
 _CHANNELS = ('gap', 'current', 'force', 'inductance', 'current_rate', 'flux_rate', 'coil_temperature')
+_MAPPED = {'air_gap': 'gap', 'temperature': 'coil_temperature'}
 
 
 def orders_of(text: str) -> tuple[int, int, int, int, int]:
@@ -18,16 +22,28 @@ def orders_of(text: str) -> tuple[int, int, int, int, int]:
     return a, b, c, d, e
 
 
-def columns_of(settings: list[str]) -> dict[str, str]:
-    """Return {channel: HEADER[:UNIT]} of `--column` settings; raises `typer.BadParameter`."""
+def columns_of(settings: list[str], map_file: Path | None = None) -> dict[str, 'ColumnChoice']:
+    """Return the column of each channel, of a mapping file and of `--column`, which goes before it.
+
+    Raises `typer.BadParameter` and `MappingError`.
+    """
+    from mount_signals.units.mapping import ColumnChoice, mapping_in_file
+
     chosen = {}
+    if map_file is not None:
+        mapping = mapping_in_file(map_file)
+        said = {
+            _MAPPED.get(name, name): choice
+            for name, choice in (*mapping.others.items(), *mapping.columns.items())
+        }
+        chosen = {name: choice for name, choice in said.items() if name in _CHANNELS}
     for setting in settings:
         name, equals, header = setting.partition('=')
         if not (equals and name and header):
             raise typer.BadParameter(f'--column {setting}: write NAME=HEADER:UNIT, as in gap=Spalt:um')
         if name not in _CHANNELS:
             raise typer.BadParameter(f'--column {setting}: {name!r} is none of {", ".join(_CHANNELS)}')
-        chosen[name] = header
+        chosen[name] = ColumnChoice(header)
     return chosen
 
 

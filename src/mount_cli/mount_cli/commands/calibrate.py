@@ -8,6 +8,8 @@ from rich.table import Table
 
 from mount_cli.calibration.given import columns_of, given_ripple, orders_of, per_file, positive
 from mount_cli.calibration.written import write_results
+from mount_cli.commands.options import MapFile
+from mount_cli.fetching import local
 from mount_cli.help import Command, Group
 from mount_cli.terminal import note, terminal
 
@@ -31,7 +33,8 @@ Examples:
 
 `engine-mount calibrate actuator bags/ramp_349um bags/ramp_400um ...` - MCAP, one gap each
 
-CSV columns are `gap_um`, `current_a`, `force_n`, or the same with another unit (mm, m, ma, kn).
+Columns are `gap_um`, `current_a`, `force_n`, or the same with another unit (mm, in, ma, kn, lbf), of CSV,
+MATLAB, Excel, MDF4 and others.
 """
 _INDUCTANCE_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
 
@@ -43,7 +46,7 @@ Examples:
 
 `engine-mount calibrate inductance cold/*.csv warm/*.csv` - two temperatures: compensation is measured
 
-CSV columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
+Columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
 `flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
 tells them.
 """
@@ -55,7 +58,9 @@ Example:
 `calibrate inductance rack/ripple_*.csv`, `identify friction --train rack/friction_*.csv`
 """
 
-Files = Annotated[list[Path], typer.Argument(help='CSV files, MCAP files or folders of recordings')]
+Files = Annotated[
+    list[str], typer.Argument(help='files of any format that is read, recordings or their folders, or URIs')
+]
 Columns = Annotated[
     list[str] | None,
     typer.Option('--column', metavar='NAME=HEADER[:UNIT]', help='which column is what, and its unit'),
@@ -81,6 +86,7 @@ def actuator(
         str, typer.Option(help='numbers of coefficients of a1 .. a5; 18 in all, as in Table 1')
     ] = '4,4,4,2,4',
     columns: Columns = None,
+    map_file: MapFile = None,
     gaps: Gaps = None,
     base: Base = None,
     name: Name = '',
@@ -102,11 +108,12 @@ def actuator(
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
-    given = GivenValues(per_file(gaps or [], files, '--gap', 1e-6), {})
+    places = [local(file, console) for file in files]
+    given = GivenValues(per_file(gaps or [], places, '--gap', 1e-6), {})
     chosen_orders = orders_of(orders)
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=None)
-        points = read_force(files, columns_of(columns or []), given)
+        points = read_force(places, columns_of(columns or [], map_file), given)
         progress.update(task, description='fitting')
         fit = fit_force_law(
             points.gap,
@@ -116,7 +123,7 @@ def actuator(
             force_floor=_FLOOR * float(points.force.max()),
             progress=lambda done, total: progress.update(task, completed=done, total=total),
         )
-    specimen = with_force_law(starting, name, fit, files)
+    specimen = with_force_law(starting, name, fit, places)
     law = fit.law
     table = Table(
         title=f'force law of {specimen.name!r}, {sum(chosen_orders)} parameters', title_justify='left'
@@ -175,6 +182,7 @@ def inductance(
         typer.Option('--held-out-temperature', help='degC; recordings there only judge the compensation'),
     ] = None,
     columns: Columns = None,
+    map_file: MapFile = None,
     base: Base = None,
     name: Name = '',
     out: Out = None,
@@ -196,6 +204,7 @@ def inductance(
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
+    places = [local(file, console) for file in files]
     order = GapOrder(
         rest_current=positive(rest_current, '--rest-current', 'A') or starting.rest_current,
         crossing_inductance=1e-3 * (positive(crossing_inductance, '--crossing-inductance', 'mH') or 0.0)
@@ -204,10 +213,10 @@ def inductance(
         held_out=tuple(held_out or ()),
     )
     area = positive(turns_area, '--turns-area', 'm^2') or starting.turns_area
-    given = given_ripple(files, gaps or [], temperatures or [])
+    given = given_ripple(places, gaps or [], temperatures or [])
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=2)
-        recordings = read_ripple(files, columns_of(columns or []), given, area)
+        recordings = read_ripple(places, columns_of(columns or [], map_file), given, area)
         progress.update(task, description='fitting', completed=1)
         result = calibrate_inductance(recordings, starting.force_law, order)
         progress.update(task, completed=2)
@@ -222,7 +231,7 @@ def inductance(
         ),
     )
     specimen = with_gap_curves(
-        starting, name, result.calibration, result.compensation, result.compensated_by, area, files
+        starting, name, result.calibration, result.compensation, result.compensated_by, area, places
     )
     screen = TerminalScreen(console)
     for table in result.tables():

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import JsonFile, recording_argument
-from mount_cli.fetching import local
+from mount_cli.fetching import local, named
 from mount_cli.terminal import note, refuse, terminal
 
 EPILOG = """Examples:
@@ -77,7 +77,7 @@ def _told(
     )
     for recording in recordings:
         for warning in recording.warnings:
-            note(console, f'{recording.path}: {warning}')
+            note(console, f'{named(recording.path)}: {warning}')
     if json_file is not None:
         write_json(as_json(comparison), json_file)
     if figure is not None:

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.commands.options import MapFile
 from mount_cli.completion.values import recordings
+from mount_cli.fetching import local
 from mount_cli.help import Command, Group
 from mount_cli.terminal import terminal
 
@@ -26,7 +28,9 @@ Examples:
 
 `engine-mount identify friction --file a.json b.json c.json` - trained on each, tried on each other one
 
-`engine-mount identify friction --train rig.csv --channel friction_force=cell:kN --step ladder`
+`engine-mount identify friction --train rig.mat --column friction_force=cell:lbf --step ladder` - any format
+
+`engine-mount identify friction --train a.mf4 --held-out b.mf4 --map-file rig_2.yaml` - what a team agreed on
 """
 
 
@@ -38,23 +42,27 @@ def _top() -> None:
 @app.command(cls=Command, epilog=EPILOG)
 def friction(
     train: Annotated[
-        list[Path] | None, typer.Option(metavar='FILE...', help='recordings to fit: CSV, MCAP or JSON')
+        list[str] | None,
+        typer.Option(metavar='FILE...', help='recordings to fit: files of any format, recordings, URIs'),
     ] = None,
     held_out: Annotated[
-        list[Path] | None, typer.Option(metavar='FILE...', help='recordings that no fit sees, to judge by')
+        list[str] | None, typer.Option(metavar='FILE...', help='recordings that no fit sees, to judge by')
     ] = None,
     file: Annotated[
-        list[Path] | None,
+        list[str] | None,
         typer.Option(metavar='FILE...', help='train on each, predict each other one; of one, its halves'),
     ] = None,
     step: Annotated[str, typer.Option(help='auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     channel: Annotated[
         list[str] | None,
         typer.Option(
+            '--channel',
+            '--column',
             metavar='NAME=COLUMN:UNIT',
-            help='CSV or JSON column, or MCAP topic.field, of a quantity; repeatable',
+            help='column, or MCAP topic.field, of a quantity; repeatable',
         ),
     ] = None,
+    map_file: MapFile = None,
     clamp: Annotated[
         str,
         typer.Option(help="JSON: normal force from the band's pull while sliding, at rest, or none"),
@@ -85,20 +93,23 @@ def friction(
     from mount_cli.calibration.friction_screen import print_friction
     from mount_cli.calibration.written import note_foreign
     from mount_cli.screen import progress_bar
+    from mount_identification.friction.channels import mapped_channels, parsed_channels
     from mount_identification.friction.figures import figures
-    from mount_identification.friction.files import parsed_channels
     from mount_identification.friction.found import IdentifyOrder
     from mount_identification.friction.identify import identify
     from mount_identification.specimen import check_targets, foreign_parts, with_friction
     from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
     from mount_report.json_file import write_json
+    from mount_signals.units.mapping import mapping_in_file
 
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
+    channels = mapped_channels(mapping_in_file(map_file)) if map_file else {}
+    channels |= parsed_channels(channel or [])
     order = IdentifyOrder(
-        train or [], held_out or [], file or [], step, clamp, zero, parsed_channels(channel or []), seed,
-        friction_contact(starting.friction),
+        *([local(each, console) for each in places or []] for places in (train, held_out, file)),
+        step, clamp, zero, channels, seed, friction_contact(starting.friction),
     )  # fmt: skip
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)

@@ -49,8 +49,8 @@ def import_files(
 ) -> None:
     """Make a recording of files of others, in SI units, with a session that tells what it was made of.
 
-    The displacement is brought to 1 kHz, the acceleration of the chassis to an even grid of its own rate;
-    other quantities stay as they were sampled. A gap of more than 0.125 s parts the recording.
+    The displacement and the acceleration of the chassis are brought to 1 kHz; other quantities stay as they
+    were sampled. A gap of more than 0.125 s parts the recording.
     """
     from mount_cli.screen import progress_bar
     from mount_report.json_file import write_json

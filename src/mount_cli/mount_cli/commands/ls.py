@@ -1,13 +1,12 @@
 """`engine-mount ls` and `info`: which recordings there are, and what one of them is."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from mount_cli.commands.options import JsonFile, RecordingPlace
-from mount_cli.fetching import local
+from mount_cli.fetching import local, named
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
@@ -22,6 +21,8 @@ Examples:
 `engine-mount ls` - the recordings in bags, the newest first
 
 `engine-mount ls bags /data/drives --json recordings.json` - of several folders
+
+`engine-mount ls s3://bucket/drives` - by URI only the ends of the files are read
 
 The verdict is that of the run's summary: what `drive` printed. A recording without one is `whole` when
 nothing of its files is missing; `engine-mount audit` tells more.
@@ -42,25 +43,29 @@ by the exit code of `engine-mount audit`.
 
 def ls(
     folders: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar='[FOLDER]...', help='folders of runs, or runs; default: bags'),
+        list[str] | None,
+        typer.Argument(metavar='[FOLDER]...', help='folders of runs, or runs, or their URIs; default: bags'),
     ] = None,
     json_file: JsonFile = None,
 ) -> None:
     """List recordings: when, how long, what was driven, and whether anything was lost or went wrong."""
     from mount_report.json_file import write_json
     from mount_report.listing import listed
+    from mount_signals.sources.local import local_path
+    from mount_signals.sources.stores import is_local
+    from mount_signals.sources.uris import shown
 
     console = terminal()
-    places = folders or [Path('bags')]
-    missing = [str(place) for place in places if not place.exists()]
+    places = folders or ['bags']
+    missing = [place for place in places if is_local(place) and not local_path(place).exists()]
     if missing:
         raise ValueError(f'{", ".join(missing)}: no such folder; engine-mount drive makes bags')
-    found = listed(places)
+    with console.status('reading'):
+        found = listed(places)
     if json_file is not None:
         write_json({'recordings': [one.as_json() for one in found]}, json_file)
     if not found:
-        console.print(f'no recordings in {", ".join(map(str, places))}', soft_wrap=True)
+        console.print(f'no recordings in {", ".join(map(shown, places))}', soft_wrap=True)
     _print_listed(found, console)
 
 
@@ -116,7 +121,7 @@ def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
 
     opened, session = facts.recording, facts.session
     started, duration = started_of(session, opened), duration_of(session, opened)
-    tell('recording', f'{opened.path}, {"whole" if opened.whole else "not whole"}')
+    tell('recording', f'{named(opened.path)}, {"whole" if opened.whole else "not whole"}')
     tell('started', f'{started:%Y-%m-%d %H:%M:%S}' if started else 'unknown')
     tell('duration', 'unknown' if duration is None else f'{duration:.3f} s')
     replay = 'replay of ' if 'replay' in session else ''
@@ -126,10 +131,10 @@ def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
         texts = [f'{name} {_gap_text(gap, f"{name}_gap")}' for name in ('rest', 'contact')]
         tell(f'gap {mount}'.strip(), ', '.join(texts))
     if facts.versions:
-        named = ('mount_bringup', 'rclpy', 'python', 'numpy')
+        parts = ('mount_bringup', 'rclpy', 'python', 'numpy')
         tell(
             'versions',
-            ', '.join(f'{name} {facts.versions[name]}' for name in named if name in facts.versions),
+            ', '.join(f'{name} {facts.versions[name]}' for name in parts if name in facts.versions),
         )
     if session:
         console.print(versions_sentence(facts.others, versions()), soft_wrap=True)

@@ -8,7 +8,7 @@ import typer
 
 from mount_cli.commands.options import RecordingPlaces
 from mount_cli.completion.values import recordings as offered
-from mount_cli.fetching import beside, is_fetched, local
+from mount_cli.fetching import beside, is_fetched, local, named
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the page is written, also about a damaged recording; 1 when nothing can be read
@@ -65,7 +65,7 @@ def report(
     files = write_report(opened, compared, file, pictures or default_pictures(file), TerminalScreen(console))
     for recording in (*opened, *([compared] if compared else [])):
         for warning in recording.warnings:
-            note(console, f'{recording.path}: {warning}')
+            note(console, f'{named(recording.path)}: {warning}')
     console.print(f'report     {file}', soft_wrap=True)
     console.print(_pictures_line(files), soft_wrap=True)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_identification.friction.files import Channel
+from mount_identification.friction.channels import Channel
 from mount_identification.friction.ladder import Rung
 from mount_identification.friction.looks.cases import Case, explained
 from mount_identification.friction.looks.first_look import FirstLook

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_hash
+from mount_bags.signals.loading import is_recording
 from mount_identification.actuator.points import gap_groups
 from mount_identification.coil.gap_calibration import RippleRecording
 from mount_identification.rack.columns import (
@@ -27,6 +28,7 @@ from mount_identification.rack.columns import (
 )
 from mount_models.coil.gap import measured_inductance
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
+from mount_signals.units.mapping import ColumnChoice
 
 FloatArray = NDArray[np.float64]
 FORCE_SIGNAL = 'sim/clamp_force:wrench.force.z'
@@ -50,7 +52,7 @@ class GivenValues:
     celsius_of_others: float | None = None
 
 
-def read_force(files: Sequence[Path], chosen: Mapping[str, str], given: GivenValues) -> ForcePoints:
+def read_force(files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given: GivenValues) -> ForcePoints:
     """Return the points of all files, each with a gap by column, by option or by its name.
 
     Raises `RackRecordingError` and the readers' errors.
@@ -77,7 +79,7 @@ def read_force(files: Sequence[Path], chosen: Mapping[str, str], given: GivenVal
 
 
 def read_ripple(
-    files: Sequence[Path], chosen: Mapping[str, str], given: GivenValues, turns_area: float
+    files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given: GivenValues, turns_area: float
 ) -> list[RippleRecording]:
     """Return one recording for each file and gap; `turns_area` (m^2) makes inductances of slopes.
 
@@ -108,7 +110,6 @@ def described(files: Sequence[Path]) -> list[dict[str, str]]:
 _FEWEST = 8  # chosen: fewer points are no measurement
 _LARGEST_INVALID = 0.1
 _BINS = 100  # chosen: points from one recorded ramp
-_TABLES = ('.csv', '.txt')
 _GAP_IN_NAME = re.compile(r'(?<![\d.])(\d+(?:\.\d+)?)um(?![a-z])', re.IGNORECASE)
 _CELSIUS_IN_NAME = re.compile(r'([+-]?\d+(?:\.\d+)?)degC', re.IGNORECASE)
 
@@ -117,11 +118,7 @@ def _checked_files(files: Sequence[Path]) -> Sequence[Path]:
     seen: dict[str, Path] = {}
     for file in files:
         if not file.exists():
-            raise RackRecordingError(f'{file} does not exist; give CSV files or MCAP recordings')
-        if not (_is_table(file) or file.is_dir() or '.mcap' in file.name):
-            raise RackRecordingError(
-                f'{file}: files of type {file.suffix or "(none)"} are not read; use .csv or .mcap'
-            )
+            raise RackRecordingError(f'{file} does not exist; give files of measured columns, or recordings')
         digest = recording_hash(file)
         if digest in seen:
             raise RackRecordingError(
@@ -132,7 +129,8 @@ def _checked_files(files: Sequence[Path]) -> Sequence[Path]:
 
 
 def _is_table(file: Path) -> bool:
-    return file.is_file() and file.suffix.lower() in _TABLES
+    """Return whether a file holds columns, and is no recording of ours in topics."""
+    return not (is_recording(file) or '.mcap' in file.name)
 
 
 def _gap_of(file: Path, given: Mapping[Path, float]) -> float:
@@ -169,7 +167,7 @@ def _celsius_of(file: Path, given: GivenValues) -> float:
 
 
 def _ripple_from_table(
-    file: Path, chosen: Mapping[str, str], given: GivenValues, turns_area: float
+    file: Path, chosen: Mapping[str, ColumnChoice], given: GivenValues, turns_area: float
 ) -> list[RippleRecording]:
     columns = read_columns(file, (CURRENT,), (INDUCTANCE, CURRENT_RATE, FLUX_RATE, GAP, TEMPERATURE), chosen)
     current = columns['current']
@@ -259,12 +257,12 @@ def _celsius_of_bag(recording: Recording, file: Path, given: GivenValues) -> flo
 
 
 def _force_from_bag(
-    file: Path, chosen: Mapping[str, str], given: GivenValues
+    file: Path, chosen: Mapping[str, ColumnChoice], given: GivenValues
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return up to `_BINS` points of a recorded ramp: means over small steps of the current."""
     recording = open_run(file)
     ripple = _topic(recording, COIL_RIPPLE.name)
-    topic, colon, signal = chosen.get('force', FORCE_SIGNAL).partition(':')
+    topic, colon, signal = chosen.get('force', ColumnChoice(FORCE_SIGNAL)).column.partition(':')
     if not colon:
         raise RackRecordingError(
             f'--column force={topic}: of an MCAP recording write TOPIC:FIELD, as {FORCE_SIGNAL}'

@@ -1,4 +1,7 @@
-"""Many recordings: indexed, replayed with other parameters, asked."""
+"""Many recordings: indexed, replayed with other parameters, asked.
+
+What the three steps need is loaded when they are called.
+"""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -7,11 +10,26 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pyarrow
 
+Place = str | os.PathLike[str]
+
+
+def index(
+    places: Sequence[Place], out: Place, *, scheduler: str = 'local', workers: int = 0
+) -> 'pyarrow.Table':
+    """Return the table `recordings` of `engine-mount fleet index`: what each recording is and holds.
+
+    `places` are folders, recordings and URIs, `out` the folder of the catalogue, which is brought up to date.
+    Raises an `OSError` with the reason where a place cannot be listed or `out` not be written.
+    """
+    from mount_replay.fleet.catalogue.index import indexed
+
+    return indexed(places, out, scheduler=scheduler, workers=workers).recordings
+
 
 def replay(
-    places: Sequence[str],
+    places: Sequence[Place],
     settings: Mapping[str, Any],
-    out: str | os.PathLike[str],
+    out: Place,
     *,
     closed_loop: bool = False,
     scheduler: str = 'local',
@@ -28,5 +46,15 @@ def replay(
     from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
     from mount_replay.replay import parsed_changes
 
-    order = FleetOrder([str(place) for place in places], parsed_changes(settings), closed_loop)
+    order = FleetOrder([os.fspath(place) for place in places], parsed_changes(settings), closed_loop)
     return replay_fleet(order, Path(out), scheduler=scheduler, workers=workers).table
+
+
+def query(folder: Place, sql: str) -> 'pyarrow.Table':
+    """Return the answer to one SELECT about a catalogue or result, as `engine-mount fleet query` does.
+
+    Tables and columns: docs/reference/fleet_columns.md. Raises a `ValueError` with the reason.
+    """
+    from mount_replay.fleet.questions import query as answer_of
+
+    return answer_of(folder, sql)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.bag.column_parts import ColumnPart, column_parts
 from mount_bags.bag.recording import Recording
-from mount_bags.messages.series import Series
 from mount_control.parameters import ControlParameters
 from mount_models.sampling import sample_time_ns
 from mount_replay.given.input import has
@@ -97,12 +97,14 @@ class Stretches:
         waiting = {topic.name: _Waiting(topic, names) for topic, names in self._columns().items()}
         displacement = waiting[DISPLACEMENT.name]
         divided, due = False, length
-        for series in self._recording.parts(waiting, _READ_AT_ONCE):
-            topic = next(name for name in waiting if self._recording.resolve(name) == series.topic)
+        names = {self._recording.resolve(name): name for name in waiting}
+        wanted = {topic.name: columns for topic, columns in self._columns().items()}
+        for part in column_parts(self._recording, wanted, _READ_AT_ONCE):
+            topic = names[part.topic]
             if topic == DISPLACEMENT.name:
-                self._take_first(series, displacement)
-                self._check_order(series, displacement)
-            waiting[topic].add(series)
+                self._take_first(part, displacement)
+                self._check_order(part, displacement)
+            waiting[topic].add(part)
             if not length or displacement.count < due:
                 continue
             cut = self._cut(waiting)
@@ -121,12 +123,12 @@ class Stretches:
             columns[CONTROL_TRACE] = tuple(dict.fromkeys(('displacement', 'bridged_samples', *self._quiet)))
         return columns
 
-    def _take_first(self, series: Series, displacement: '_Waiting') -> None:
-        if displacement.newest is None and len(series):
-            self.zero = self._notes.zero = self._recording.axis_from(series).zero
+    def _take_first(self, part: ColumnPart, displacement: '_Waiting') -> None:
+        if displacement.newest is None and len(part):
+            self.zero = self._notes.zero = self._recording.axis_from(part.topic, part).zero
 
-    def _check_order(self, series: Series, displacement: '_Waiting') -> None:
-        stamps = series.stamps
+    def _check_order(self, part: ColumnPart, displacement: '_Waiting') -> None:
+        stamps = part.stamps
         if displacement.newest is not None:
             stamps = np.concatenate([[displacement.newest], stamps])
         back = np.flatnonzero(np.diff(stamps) < -BREAK)
@@ -187,18 +189,18 @@ class _Waiting:
         self._columns: dict[str, list[Column]] = {}
         self._cut: int | None = None
 
-    def add(self, series: Series) -> None:
+    def add(self, part: ColumnPart) -> None:
         """Take the messages that follow; raises `OutOfOrderError` for one of before the last cut."""
-        stamps = series.stamps
+        stamps = part.stamps
         if not len(stamps):
             return
         if self._cut is not None and stamps.min() < self._cut:
             raise OutOfOrderError(f'{self._name} came in later than those behind it')
         if not self._columns:
-            self._columns = {name: [] for name in self._names if name in series.names}
+            self._columns = {name: [] for name in self._names if name in part.columns}
         self._stamps.append(stamps)
         for name, parts in self._columns.items():
-            parts.append(series[name])
+            parts.append(part.columns[name])
         self.newest, self.count = int(stamps[-1]), self.count + len(stamps)
 
     def columns(self) -> tuple[Times, dict[str, Column]]:

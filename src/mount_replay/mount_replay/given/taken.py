@@ -108,7 +108,7 @@ def _samples_taken(
         return stamps[after], values[after]
     answered = _answered_by_control(answers, ramps, gaps)
     answered = _without_foreign(answered, answers, period, notes)
-    taken = np.union1d(answered, _taken_without_answer(stamps, answered, answers, period, notes))
+    taken = _union(answered, _taken_without_answer(stamps, answered, answers, period, notes))
     _note_lost(stamps, taken, notes)
     return _with_values(taken, displacement, answers, notes)
 
@@ -118,11 +118,11 @@ def _answered_by_control(
 ) -> Times:
     """Return the stamps of the samples with a setpoint or a trace of mount_control."""
     by_init = np.concatenate([ramp.stamps for ramp in ramps]) if ramps else np.empty(0, np.int64)
-    setpoints = np.setdiff1d(answers.stamps, by_init, assume_unique=True)
+    setpoints = _without(answers.stamps, np.sort(by_init))
     beginning = gaps[0].stamp
     if answers.trace_stamps.size:
         beginning = min(beginning, int(answers.trace_stamps[0]) - 1)
-    answered = np.union1d(setpoints, answers.trace_stamps)
+    answered = _union(setpoints, answers.trace_stamps)
     return answered[answered > beginning]
 
 
@@ -133,7 +133,7 @@ def _without_foreign(answered: Times, answers: RecordedAnswers, period: int, not
     """
     if not answers.trace_stamps.size:
         return answered
-    traced = np.isin(answered, answers.trace_stamps, assume_unique=True)
+    traced = _among(answered, answers.trace_stamps)
     currents = answers.currents[
         np.clip(np.searchsorted(answers.stamps, answered), 0, len(answers.stamps) - 1)
     ]
@@ -149,7 +149,7 @@ def _without_foreign(answered: Times, answers: RecordedAnswers, period: int, not
             f'{foreign.size} setpoints from {span} are of no step of the controller and of no complete '
             'initialisation (a ramp that was given up?): not replayed'
         )
-    return np.setdiff1d(answered, foreign, assume_unique=True)
+    return _without(answered, foreign)
 
 
 def _taken_without_answer(
@@ -187,7 +187,7 @@ def _moved_then_afresh(answers: RecordedAnswers) -> NDArray[np.bool_]:
 
 def _note_lost(stamps: Times, taken: Times, notes: Notes) -> None:
     inside = stamps[(stamps >= taken[0]) & (stamps <= taken[-1])]
-    late = np.setdiff1d(inside, taken, assume_unique=True)
+    late = _without(inside, taken)
     if late.size:
         notes.append(
             f'{late.size} recorded samples did not reach the controller in time, the first at '
@@ -215,6 +215,23 @@ def _with_values(
             'recorded displacement; they cannot be replayed'
         )
     return taken[found], column[found]
+
+
+def _union(stamps: Times, others: Times) -> Times:
+    """Return all of two rows of rising stamps, rising; mostly the others are among the first."""
+    lacking = others[~_among(others, stamps)]
+    return np.union1d(stamps, lacking) if lacking.size else stamps
+
+
+def _without(stamps: Times, others: Times) -> Times:
+    """Return those of rising stamps that are not among others, which rise too."""
+    return stamps[~_among(stamps, others)]
+
+
+def _among(stamps: Times, others: Times) -> NDArray[np.bool_]:
+    if not len(others):
+        return np.zeros(len(stamps), np.bool_)
+    return others[np.clip(np.searchsorted(others, stamps), 0, len(others) - 1)] == stamps
 
 
 def looked_up(wanted: Times, stamps: Times, values: Column) -> tuple[NDArray[np.bool_], Column]:

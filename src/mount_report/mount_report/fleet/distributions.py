@@ -31,6 +31,7 @@ class Pair:
     meaning: str
     before: Array
     after: Array
+    whole: bool = False  # it counts something
 
     @property
     def moved(self) -> bool:
@@ -54,7 +55,8 @@ def pairs_of(result: 'pyarrow.Table') -> list[Pair]:
         if known.any():
             told = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
             before, after = both[0][known], both[1][known]
-            found.append(Pair(name, told.get('unit', ''), told.get('meaning', name), before, after))
+            unit, meaning = told.get('unit', ''), told.get('meaning', name)
+            found.append(Pair(name, unit, meaning, before, after, str(field.type) == 'int64'))
     return found
 
 
@@ -64,12 +66,12 @@ def spread(pair: Pair) -> Section:
     before, after = factor * pair.before, factor * pair.after
     label = f'{pair.name} ({unit})' if unit else pair.name
     low, high = float(min(before.min(), after.min())), float(max(before.max(), after.max()))
-    edges = np.linspace(low, high, _BINS + 1) if high > low else np.array([low - 0.5, low + 0.5])
+    edges = _edges(low, high, pair.whole)
     panels = [
         Panel('rows', _curves(*_bars(before, edges), *_bars(after, edges))),
-        Panel('share with at most this', _curves(*_shares(before), *_shares(after)), share=0.8),
+        Panel('share with at most this', _curves(*_shares(before, edges), *_shares(after, edges)), share=0.8),
     ]
-    title = f'{pair.meaning[:1].upper()}{pair.meaning[1:]}'
+    title = f'{pair.meaning[:1].upper()}{pair.meaning[1:]} ({pair.name})'
     chart = Chart(pair.name, title, label, panels, limits=(float(edges[0]), float(edges[-1])))
     rows = [
         (word, *(f'{np.quantile(values, share):.4g}' for values in (before, after)))
@@ -77,7 +79,7 @@ def spread(pair: Pair) -> Section:
     ]
     table = Table((unit or 'value', 'as recorded', 'changed'), rows, title='Quantiles', folded=True)
     words = [f'{np.count_nonzero(before != after)} of {len(before)} rows have another value.']
-    return Section(pair.name, pair.name, words, chart, [table])
+    return Section(pair.name, title, words, chart, [table])
 
 
 def _changed_name(name: str, names: Sequence[str]) -> str | None:
@@ -99,6 +101,15 @@ def _bars(values: Array, edges: Array) -> tuple[Array, Array]:
     return edges, np.append(counts, counts[-1])
 
 
-def _shares(values: Array) -> tuple[Array, Array]:
+def _shares(values: Array, edges: Array) -> tuple[Array, Array]:
     known = np.sort(values)
-    return known, np.arange(1, len(known) + 1) / len(known)
+    shares = np.arange(len(known) + 1) / len(known)
+    return np.concatenate([edges[:1], known, edges[-1:]]), np.append(shares, 1.0)
+
+
+def _edges(low: float, high: float, whole: bool) -> Array:
+    """Return the limits of the bins; of what is counted, each bin holds so many whole numbers."""
+    if whole or high == low:
+        step = max(1.0, np.ceil((high - low) / _BINS))
+        return np.arange(low - 0.5, high + 0.5 + step, step)
+    return np.linspace(low, high, _BINS + 1)

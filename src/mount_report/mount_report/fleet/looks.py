@@ -17,8 +17,8 @@ _MM = 1e3
 class Look:
     """One recording: what is known of it, the commands that open it, and its signals if they could be read.
 
-    `value` is that by which it was chosen. Signals are (n,) over `time` (s): displacement (m), setpoints (A)
-    as recorded and with the change. `reason` says why there are none.
+    `value` is that of the column by which it was chosen. Signals are (n,) over `time` (s): displacement (m),
+    setpoints (A) as recorded and with the change. `reason` says why there are none.
     """
 
     recording: str
@@ -31,10 +31,10 @@ class Look:
     reason: str = ''
 
 
-def look_section(number: int, look: Look) -> Section:
-    """Return the section about the recording at place `number` (1: the first) of the worst."""
+def look_section(number: int, look: Look, by: str) -> Section:
+    """Return the section about the recording at place `number` (1: the first) of the worst in column `by`."""
     title, name = f'{number}. {look.recording}', f'look_{number}'
-    words = [f'{look.value}.', *look.commands]
+    words = [f'{by}: {look.value}', *look.commands]
     if look.time is None or look.displacement is None or look.before is None or look.after is None:
         return Section(name, title, [*words, f'No picture: {look.reason}'])
     return Section(

@@ -39,7 +39,7 @@ def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, title:
         _overview(result),
         _worst(looks, by),
         *(spread(pair) for pair in pairs),
-        *(look_section(number, look) for number, look in enumerate(looks, 1)),
+        *(look_section(number, look, by) for number, look in enumerate(looks, 1)),
         _failures(result),
     ]
     return Report(title, sections)
@@ -66,8 +66,9 @@ def _overview(result: 'pyarrow.Table') -> Section:
 def _recordings(rows: Sequence[dict]) -> Finding:
     names = {row['recording'] for row in rows}
     failed = {row['recording'] for row in rows if row['reason']}
-    hours = sum(row['duration_s'] or 0.0 for row in rows) / 3600.0
-    text = [f'{len(names)} recordings, {hours:.3g} h of them replayed;']
+    seconds = sum(row['duration_s'] or 0.0 for row in rows)
+    length = f'{seconds / 3600.0:.1f} h' if seconds >= 3600.0 else f'{seconds:.0f} s'
+    text = [f'{len(names)} recordings, {length} of them replayed;']
     if not failed:
         return Finding('Recordings', GOOD, [*text, 'none failed'])
     return Finding('Recordings', LOOK, [*text, Link(f'{len(failed)} failed', 'failures')])
@@ -81,7 +82,7 @@ def _differing(rows: Sequence[dict]) -> Finding:
         for row in done
     )
     text = [f'{differing} of {len(done)} have other setpoints, {switched} are damped at other times;']
-    return Finding('Difference', UNKNOWN, [*text, Link('the worst', 'worst')])
+    return Finding('Difference', LOOK if differing else GOOD, [*text, Link('the worst', 'worst')])
 
 
 def _trusted(rows: Sequence[dict]) -> Finding:

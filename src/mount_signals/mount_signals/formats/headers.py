@@ -24,9 +24,9 @@ _SUFFIXES = {
 _WRITTEN = {'m_s2': 'm/s2', 'mps2': 'm/s2', 'ms2': 'm/s2', 'm_s': 'm/s', 'mps': 'm/s', 'km_h': 'km/h'}
 """Suffixes that leave out the stroke of a fraction."""
 _POWER = r'(?:\^?-?\d|\*\*-?\d|[²³])?'
-_TERM = rf'\(?(?:1|[^\W\d_]+|°[CF]?|%|-){_POWER}\)?'
+_TERM = rf'\(?(?:1|[^\W\d_²³]+|°[CF]?|%|-){_POWER}\)?'
 _UNIT = re.compile(rf'\(?{_TERM}(?:\s*[/*·. ]\s*{_TERM})*\)?')
-_WORD = re.compile(r'°[CF]?|[^\W\d_]+|%|-')
+_WORD = re.compile(r'°[CF]?|[^\W\d_²³]+|%|-')
 _SQUARE = re.compile(r'(.*?)\s*\[\s*([^\[\]]*?)\s*\]\s*')
 _ROUND = re.compile(r'(.*?)\s*[({]\s*(.*?)\s*[)}]\s*')
 _STROKE = re.compile(r'([^/]+?)\s*/\s*(.+?)\s*')
@@ -45,7 +45,7 @@ def name_and_unit(title: str) -> tuple[str, str]:
     for pattern in (_ROUND, _STROKE, _WORDS):
         match = pattern.fullmatch(title)
         if match and match[1] and is_unit(match[2]):
-            return match[1], match[2].strip('()') if pattern is _STROKE else match[2]
+            return match[1].rstrip(' /'), match[2].strip('()') if pattern is _STROKE else match[2]
     match = _SUFFIX.fullmatch(title)
     if match and match[2] in _WRITTEN:
         return match[1], _WRITTEN[match[2]]
@@ -57,7 +57,7 @@ def name_and_unit(title: str) -> tuple[str, str]:
 def is_unit(text: str) -> bool:
     """Return whether a text can be nothing but a unit, such as `m/s^2`, `mm` or `1/min`."""
     text = text.strip()
-    if not text or text == '1' or not _UNIT.fullmatch(text):
+    if not text or text == '1' or text.count('(') != text.count(')') or not _UNIT.fullmatch(text):
         return False
     return all(word in _SYMBOLS for word in _WORD.findall(text))
 

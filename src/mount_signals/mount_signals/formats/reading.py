@@ -55,8 +55,6 @@ def headings(uri: str | Path, stated: Stated | None = None) -> tuple[Heading, ..
 
 
 def _opened(path: Path, stated: Stated) -> Content:
-    if not path.exists():
-        raise SignalError(f'{path} does not exist; give an existing file or folder: {READ}')
     try:
         return _opener(path)(path, stated)
     except PermissionError:

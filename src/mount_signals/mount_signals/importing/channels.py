@@ -1,4 +1,4 @@
-"""Signals in SI as they are recorded: a displacement at the rate of the controller, others as sampled."""
+"""Signals in SI as they are recorded: those that drive something at its rate, others as sampled."""
 
 from collections.abc import Mapping
 
@@ -6,16 +6,23 @@ import numpy as np
 
 from mount_bags.signals.even_grid import evenly_spaced
 from mount_bags.signals.plausibility import check_size
+from mount_bags.signals.resampling import has_step, resampled
 from mount_bags.signals.signal import SECOND, FloatArray, Signal, SignalError
 from mount_control.parameters import ControlParameters
-from mount_models.sampling import SAMPLE_RATE
-from mount_signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE, LOWEST_RATE, displacement_on_grid
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
+from mount_signals.importing.one_grid import (
+    CHASSIS,
+    DISPLACEMENT,
+    ENGINE,
+    LOWEST_RATE,
+    displacement_on_grid,
+    rate_text,
+)
 from mount_signals.importing.pieces import LONGEST_GAP
 from mount_signals.importing.topics import recorded_as
 from mount_signals.importing.writing import Channel, Times
 from mount_signals.units.quantities import Quantity, quantity
-
-_LOWEST_ACCELERATION_RATE = 50.0  # Hz, chosen as in `mount_sim.excitation.recorded`
+from mount_sim.excitation.recorded import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
 
 
 def channels_of(
@@ -56,11 +63,16 @@ def _displacement(signals: Mapping[str, Signal], notes: list[str]) -> Channel:
 
 
 def _acceleration(signal: Signal, notes: list[str]) -> tuple[Times, FloatArray]:
-    """Return the samples on an even grid of their own rate: what drives a car must be one."""
-    even = evenly_spaced(signal, LONGEST_GAP, _LOWEST_ACCELERATION_RATE)
+    """Return the acceleration at the rate that its topic has."""
+    even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE_OF_ACCELERATION)
     notes += [note for note in even.notes if note not in notes]
-    number = np.arange(even.values.size)
-    return even.begin + np.rint(SECOND * even.period * number).astype(np.int64), even.values
+    step = 1.0 / SAMPLE_RATE
+    if not has_step(even, step):
+        notes.append(
+            f'{even.name}: resampled from {even.rate:.4g} Hz to {rate_text(SAMPLE_RATE)}, band-limited'
+        )
+    values = resampled(even, step, 0.0, round(even.length / step) + 1)[:]
+    return even.begin + sample_time_ns(SAMPLE_RATE) * np.arange(values.size, dtype=np.int64), values
 
 
 def _as_sampled(signal: Signal) -> tuple[Times, FloatArray]:

@@ -4,20 +4,21 @@ import contextlib
 import mmap
 import os
 import tempfile
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from pathlib import Path, PurePosixPath
 
+from mount_bags.bag.metadata import METADATA_NAME
 from mount_bags.container.summary import Proof, Summary, read_summary
 from mount_signals.sources.fetching import write_whole
 from mount_signals.sources.looking import Found
 from mount_signals.sources.patience import Patience, persistent
 from mount_signals.sources.reading import stretch
 from mount_signals.sources.remote import RemoteStore
-from mount_signals.sources.uris import name_of
+from mount_signals.sources.uris import inside, name_of
 
 _TAIL = 64 << 10  # bytes, chosen: most summaries are shorter
 _NEAR = 16 << 10  # bytes, chosen: what lies no farther apart is read at once
-_SMALL = 1 << 20  # bytes, chosen: what is no MCAP file is left out above
+_BESIDE = (METADATA_NAME, 'summary.json')  # what is listed of a folder beside its MCAP files
 _SESSION = 'session'
 Stretches = list[tuple[int, int]]
 
@@ -37,6 +38,28 @@ def outlined(uri: str, patience: Patience | None = None) -> Iterator[Path | None
         yield root if files and whole else None
 
 
+def recordings_at(uri: str, patience: Patience | None = None) -> list[str]:
+    """Return the URIs of the recordings and runs that a place in a store is or directly holds, sorted.
+
+    Raises `SourceError`.
+    """
+    files = [found.place for found in RemoteStore(patience).found(uri)]
+    if _is_recording(files, PurePosixPath('.')) or files == [PurePosixPath('.')]:
+        return [uri]
+    inner = {place.parts[0] for place in files if len(place.parts) > 1}
+    folders = {name for name in inner if _is_recording(files, PurePosixPath(name))}
+    return [inside(uri, name) for name in sorted(folders)]
+
+
+def _is_recording(files: Sequence[PurePosixPath], folder: PurePosixPath) -> bool:
+    """Return whether a folder, or `recording` in it, directly holds files of a recording."""
+    return any(
+        place.name == METADATA_NAME or place.suffix == '.mcap'
+        for place in files
+        if place.parent in (folder, folder / 'recording')
+    )
+
+
 def _outline(found: Found, target: Path, patience: Patience) -> bool:
     """Write what is needed of one file; False where it has to be read whole."""
     if target.suffix == '.mcap':
@@ -44,7 +67,7 @@ def _outline(found: Found, target: Path, patience: Patience) -> bool:
         return _Outline(found, target, patience).write()
     if '.mcap' in target.suffixes or '.db3' in target.suffixes:
         return False
-    if found.entry.size <= _SMALL:
+    if target.name in _BESIDE:
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(_read(found, 0, found.entry.size, patience))
     return True

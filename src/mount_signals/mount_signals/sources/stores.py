@@ -24,7 +24,7 @@ _kept: dict[Path, tuple[str, 'Held']] = {}
 
 def source_of(uri: str) -> Source:
     """Return the store that `uri`, or a plain path, lies in; raises `SourceError` for an unknown scheme."""
-    if _is_local(uri):
+    if is_local(uri):
         return LocalStore()
     from mount_signals.sources.remote import RemoteStore
 
@@ -43,7 +43,7 @@ def fetched(uri: str, scratch: Path | None = None, tell: 'Tell | None' = None) -
     this user. Who goes through many recordings takes `local_copy`, which gives the place free again.
     Raises `SourceError`.
     """
-    if _is_local(uri):
+    if is_local(uri):
         return LocalStore().fetch(uri, scratch or Path())
     held = _hold(uri, scratch, tell)
     if held.path in _kept:
@@ -60,7 +60,7 @@ def local_copy(uri: str, scratch: Path | None = None, tell: 'Tell | None' = None
     Within the block nothing removes it; afterwards it stays in the cache until the room is needed.
     Raises `SourceError`.
     """
-    if _is_local(uri):
+    if is_local(uri):
         yield LocalStore().fetch(uri, scratch or Path())
         return
     held = _hold(uri, scratch, tell)
@@ -78,7 +78,7 @@ def outline(uri: str, scratch: Path | None = None) -> Iterator[Path]:
     gone when the block ends. A plain path and file:// are given whole, as is what has no sound summary.
     Raises `SourceError`.
     """
-    if _is_local(uri):
+    if is_local(uri):
         yield LocalStore().fetch(uri, scratch or Path())
         return
     from mount_signals.sources.outlines import outlined
@@ -106,7 +106,8 @@ def traffic() -> 'Traffic':
     return reading.traffic()
 
 
-def _is_local(uri: str) -> bool:
+def is_local(uri: str) -> bool:
+    """Return whether `uri` is a path or file://; raises `SourceError` for an unknown scheme."""
     return not is_uri(uri) or scheme_of(uri) == 'file'
 
 

@@ -9,7 +9,7 @@ from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading, Measured, MeasuredColumn, found, listed
 from mount_signals.formats.reading import headings, read
 from mount_signals.units.mapping import Mapping
-from mount_signals.units.unit import unit_of
+from mount_signals.units.unit import UnitError, unit_of
 
 TITLES = (
     't', 'time', 'times', 'timestamp', 'timestamps', 'time_s', 't_s', 'seconds', 'zeit', 'zeitstempel',
@@ -28,7 +28,7 @@ def read_chosen(uri: str | Path, mapping: Mapping, stated: Stated | None = None)
     chosen = {heading_of(there, text, str(uri)).name for text in wanted}
     if mapping.time.column:
         chosen.add(heading_of(there, mapping.time.column, str(uri)).name)
-    elif mapping.time.rate is None:
+    else:  # also beside a stated rate, which they may contradict
         chosen |= {heading.name for heading in there if is_time(heading)}
         chosen |= {heading.name for heading in there[:1] if not heading.timed}
     return read(uri, [heading.name for heading in there if heading.name in chosen], stated)
@@ -48,9 +48,16 @@ def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
     except SignalError:
         if colon:
             with contextlib.suppress(SignalError):
-                found(name, there, uri)
-                unit_of(unit)  # it is no unit, else it would not stand in the name
+                _check_unit(found(name, there, uri), unit, uri)
         raise
+
+
+def _check_unit(heading: Heading, unit: str, uri: str) -> None:
+    """Raise `UnitError` for a unit that is not known, with the column that it was said of."""
+    try:
+        unit_of(unit)
+    except UnitError as error:
+        raise UnitError(f'{uri}, column {heading.name!r}: {error}') from None
 
 
 def is_time(heading: Heading) -> bool:

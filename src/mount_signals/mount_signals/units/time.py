@@ -12,6 +12,7 @@ SLOWEST, FASTEST = 10.0, 2e5
 """Hz, chosen: between these engine mounts are sampled; beyond, the unit of the times is doubted."""
 _GUESSED = ('s', 'ms', 'us', 'ns', 'min')
 _LIKELY = (20.0, 2e4)  # Hz, chosen: a unit is only guessed where the rate that follows is common
+_SHORTEST = 0.5  # s, chosen: what is shorter shows no motion of an engine
 _EPOCH = (5e8, 4e9)  # s, chosen: 1985 .. 2096, what counts from 1970 lies here
 _SAME_RATE = 0.02  # chosen: a stated rate may differ so much from that of times that stand there
 
@@ -115,7 +116,7 @@ def _time_unit(where: str, column: MeasuredColumn, said: str) -> tuple[Unit, tup
     if step <= 0.0:
         return unit, notes  # of times that do not rise the even grid tells
     rate = 1.0 / (step * unit.factor)
-    if SLOWEST <= rate <= FASTEST:
+    if _can_be(rate, column.values.size):
         assumed = f'{column.name}: no unit is said; taken as s: {rate:.4g} samples per second'
         return unit, notes if chosen else (assumed,)
     guess = _guess(step)
@@ -132,6 +133,11 @@ def _time_unit(where: str, column: MeasuredColumn, said: str) -> tuple[Unit, tup
 def _common_step(values: FloatArray) -> float:
     """Return the mean step between times: stamps in bursts have a median of 0."""
     return float((values.max() - values.min()) / (values.size - 1))
+
+
+def _can_be(rate: float, samples: int) -> bool:
+    """Whether samples were taken at `rate` (Hz): fast ones, only if they last."""
+    return SLOWEST <= rate <= FASTEST and (rate <= _LIKELY[1] or samples >= _SHORTEST * rate)
 
 
 def _guess(step: float) -> str:

@@ -27,6 +27,8 @@ docs/reference/fleet_columns.md, and `describe result` lists them. A question is
 nothing, and reads these tables and no other file.
 """
 
+_FOLDED = 24  # characters, chosen: a text column of a table is at least so wide
+
 
 def query(
     folder: Annotated[Path, typer.Argument(metavar='FOLDER', help='catalogue or result')],
@@ -62,9 +64,10 @@ def print_rows(answer: 'pyarrow.Table', console: Console) -> None:
 
     names = answer.column_names
     rows = [[_text(value) for value in row.values()] for row in answer.to_pylist()]
+    to = ''.join('r' if _is_number(answer.schema.field(name).type) else 'l' for name in names)
     widths = [max(map(len, column)) for column in zip(names, *rows, strict=True)]
-    if sum(widths) + len(widths) <= console.width:
-        to = ''.join('r' if _is_number(answer.schema.field(name).type) else 'l' for name in names)
+    least = sum(width if side == 'r' else min(width, _FOLDED) for width, side in zip(widths, to, strict=True))
+    if least + len(widths) <= console.width:
         TerminalScreen(console).table(Table('', to, rows, names))
     else:
         label = max(map(len, names))

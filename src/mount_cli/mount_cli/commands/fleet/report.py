@@ -70,7 +70,7 @@ def _look(one: 'Worst', by: str) -> 'Look':
     from mount_report.fleet.looks import Look
 
     named = ' '.join(filter(None, (one.row['recording'], one.row['mount'])))
-    value = f'{by} {one.value:.4g}'
+    value = f'{one.value:.4g}'
     try:
         signals = before_and_after(one.uri, one.changes, one.row['mount'] or '')
     except (ValueError, OSError) as error:

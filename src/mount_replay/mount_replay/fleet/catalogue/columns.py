@@ -50,7 +50,12 @@ _STATE = (
     Column('contact_gap_m', NUMBER, 'm', 'as measured by the last initialisation'),
     Column('offset_current_a', NUMBER, 'A', 'current of the ready position, of the last initialisation'),
     Column('coil_temperature_degc', NUMBER, 'degC', 'highest temperature of the coil'),
-    Column('switched_on', COUNT, '', 'how often damping was switched on'),
+    Column(
+        'switched_on',
+        COUNT,
+        '',
+        'how often damping was switched on; null in a mount without friction',
+    ),
     Column('damping_s', NUMBER, 's', 'how long damping was on'),
     Column('peak_current_a', NUMBER, 'A', 'highest setpoint while control was active'),
     Column(

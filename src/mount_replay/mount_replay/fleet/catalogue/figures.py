@@ -19,6 +19,8 @@ from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_S
 
 Figures = dict[str, Any]
 
+OF_FRICTION = ('switched_on', 'damping_s', 'peak_current_a', 'pad_energy_j')
+"""What control did to the friction: nothing in a mount without pads or with an open coil driver."""
 _TRACED = ('damping_active', 'velocity', 'friction_coefficient', 'normal_force')
 
 

@@ -1,7 +1,7 @@
 """One recording as rows of a catalogue: whatever is wrong with it is told in its row."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC
 from pathlib import Path
@@ -11,15 +11,18 @@ from mount_bags.bag.recording import ReadingError, Recording
 from mount_bags.events.recorded_events import event_time, recorded_events
 from mount_bags.messages.series import SeriesError
 from mount_bags.run.place import open_run
-from mount_bags.run.session import SessionError, recorded_session, session_content, session_parameters
+from mount_bags.run.session import session_parameters
 from mount_bags.run.told import duration_of, started_of, told_session, versions_told
 from mount_bringup.changed_parameters import changed_parameters
+from mount_bringup.chosen import Parameters
+from mount_bringup.mount_choice import seat_of
 from mount_bringup.recorded_mount import simulated_mounts
 from mount_replay.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
-from mount_replay.fleet.catalogue.figures import lost_figures, state_figures
+from mount_replay.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures
 from mount_replay.fleet.catalogue.places import Place
 from mount_signals.sources.source import SourceError
 from mount_signals.sources.stores import local_copy
+from mount_sim.plant.mounts import without_friction
 
 Row = dict[str, Any]
 
@@ -62,9 +65,12 @@ def rows_of(path: Path, place: Place) -> Rows:
     for part in recording.by_mount():
         reasons: list[str] = []
         row = {**_place_of(place), 'mount': part.mount, 'messages': recording.message_count}
-        row |= _session_figures(part, reasons)
+        content = told_session(part)
+        row |= _session_figures(part, content, reasons)
         for figures in _guarded(part, reasons, rows.events, row):
             row |= figures
+        if _is_without_friction(session_parameters(content)):
+            row |= dict.fromkeys(OF_FRICTION)
         reasons = list(dict.fromkeys([*recording.warnings, *reasons]))
         told = _named('; '.join(reasons), path, place)[:_LONGEST]
         rows.recordings.append(row | {'whole': recording.whole, 'reason': told})
@@ -85,8 +91,7 @@ def _named(text: str, path: Path, place: Place) -> str:
     return text.replace(str(path), place.recording)
 
 
-def _session_figures(part: Recording, reasons: list[str]) -> Row:
-    content = told_session(part)
+def _session_figures(part: Recording, content: Mapping[str, Any], reasons: list[str]) -> Row:
     parameters = session_parameters(content)
     started, duration = started_of(content, part), duration_of(content, part)
     versions = versions_told(content)
@@ -96,11 +101,11 @@ def _session_figures(part: Recording, reasons: list[str]) -> Row:
         'mode': str(content.get('mode', '')),
         'started': started.astimezone(UTC).replace(tzinfo=None) if started else None,
         'duration_s': duration,
-        'version': versions.get('engine_mount', ''),
+        'version': versions.get('mount_bringup', ''),
         'versions': json.dumps(versions, sort_keys=True) if versions else '',
     }
     try:
-        own = changed_parameters(session_parameters(session_content(recorded_session(part))) or parameters)
+        own = changed_parameters(parameters)
         changed = {f'{node}.{name}': value for node, each in own.items() for name, (value, _) in each.items()}
         row |= {
             'simulated_mount': simulated_mounts(parameters),
@@ -108,12 +113,20 @@ def _session_figures(part: Recording, reasons: list[str]) -> Row:
             'parameters': json.dumps(changed, sort_keys=True, default=str) if parameters else '',
             'distance_m': _distance(row['scenario'], parameters, duration),
         }
-    except (SessionError, ReadingError, SeriesError, ValueError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, AttributeError) as error:
         reasons.append(f'the session cannot be used: {error}')
     return row
 
 
-def _distance(scenario: str, parameters: dict[str, dict[str, Any]], duration: float | None) -> float | None:
+def _is_without_friction(parameters: Parameters) -> bool:
+    """Return whether control can make no friction in the mount, so that what it did says nothing of it."""
+    try:
+        return bool(without_friction(seat_of(parameters)))
+    except ValueError:
+        return False
+
+
+def _distance(scenario: str, parameters: Parameters, duration: float | None) -> float | None:
     """Return speed times duration (m): of the simulated car on a motorway, whose session tells its speed."""
     speed = parameters.get('mount_sim', {}).get('motorway.speed')
     if scenario != 'motorway' or duration is None or not isinstance(speed, (int, float)):
@@ -137,6 +150,7 @@ def _guarded(part: Recording, reasons: list[str], events: list[Row], row: Row) -
 def _events_of(part: Recording, row: Row) -> list[Row]:
     axis = part.time_axis
     named = {name: row[name] for name in ('uri', 'recording', 'mount')}
+    found = sorted(recorded_events(part), key=lambda event: (event.stamp, event.log_time, event.kind))
     return [
         {
             **named,
@@ -145,5 +159,5 @@ def _events_of(part: Recording, row: Row) -> list[Row]:
             'kind': event.kind,
             'text': event.text,
         }
-        for event in recorded_events(part)
+        for event in found
     ]

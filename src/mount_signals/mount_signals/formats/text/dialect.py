@@ -72,6 +72,8 @@ def _titles(
         numbered = [cell or 'index' for cell in split.rows[0]]
         return numbered, [], split.first + 1, ['the first line is taken as numbers of the columns']
     names = [str(place) for place in range(split.width)]
+    if split.kinds[-1] == 'missing':
+        names[-1] = ''
     return names, [], split.first, [*_left_out(plain), 'no titles: the columns are numbered from 0 on']
 
 

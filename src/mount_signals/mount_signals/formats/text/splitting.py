@@ -106,8 +106,10 @@ def _split(lines: list[Line], later: list[str], delimiter: str, decimal: Decimal
     body += [row for row in (tuple(cells_of(text, delimiter)) for text in later) if len(row) == width]
     kinds = tuple(_kind([row[place] for row in body], decimal) for place in range(width))
     fitting = [_fits(row, kinds, decimal) for row in rows]
-    if 'number' not in kinds or not any(fitting):
+    if 'number' not in kinds or not any(fitting) or (width == 1) != (delimiter == ALONE):
         return None
+    if delimiter == decimal and not any(decimal in cell for row in body for cell in row):
+        return None  # it separates cells, and stands in none
     first = fitting.index(True)
     if sum(fitting[first:]) < _ENOUGH * (len(fitting) - first):
         return None

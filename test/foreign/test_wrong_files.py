@@ -1,0 +1,172 @@
+"""Files that are wrong in one thing each: the sentence names file, column, value, guess and remedy."""
+
+import numpy as np
+import pytest
+from command import done, refused
+
+TIMES = np.arange(1000) / 200.0
+TRAVEL = 0.8 * np.sin(2.0 * np.pi * 8.0 * TIMES)  # mm
+SHAKING = 0.6 * np.sin(2.0 * np.pi * 7.0 * TIMES + 0.3)  # m/s^2
+GRAVITY = 9.80665
+NAN = np.where((TIMES > 2.0) & (TIMES < 2.5), np.nan, TRAVEL)
+
+
+def write(path, header, *columns, delimiter=','):
+    np.savetxt(path, np.column_stack(columns), '%.9g', delimiter, header=header, comments='')
+    return path
+
+
+def drive(path, *options):
+    order = ['--scenario', 'recorded', '--file', path, *options, '--out', path.parent / 'run']
+    sentence = refused('drive', '--core', '--no-report', *order)
+    assert not (path.parent / 'run').exists()
+    return sentence
+
+
+def replay(path, *options):
+    return refused('replay', path, *options, '--out', path.parent / 'run')
+
+
+def importing(path, *options):
+    sentence = refused('import', path, *options, '--out', path.parent / 'made')
+    assert not (path.parent / 'made').exists()
+    return sentence
+
+
+T, MS = TIMES, 1e3 * TIMES
+BACK = np.concatenate([TIMES[:500], TIMES[500:] - 1.0])
+WRONG = {
+    'g without a unit': (
+        drive, ('t,az', T, SHAKING / GRAVITY + 1.0), ('--column', 'az'),
+        ("column 'az'", 'a mean of 1', 'looks like g', '--column acceleration=az:g'),
+    ),
+    'could be g': (
+        drive, ('t,az', T, SHAKING), ('--column', 'az'),
+        ("column 'az'", 'from -0.59', 'm/s^2, g', '--column acceleration=az:m/s^2'),
+    ),
+    'header says m/s^2, values are g': (
+        drive, ('t [s],az [m/s^2]', T, SHAKING / GRAVITY + 1.0), ('--column', 'az'),
+        ("column 'az'", 'a mean of 1', 'gravity in g', '--column acceleration=az:g'),
+    ),
+    'header says g, values are m/s^2': (
+        drive, ('t [s],az [g]', T, SHAKING + GRAVITY), ('--column', 'az'),
+        ("column 'az'", '9.81 times gravity', 'looks like m/s^2', '--column acceleration=az:m/s^2'),
+    ),
+    'the hand says g, values are m/s^2': (
+        drive, ('t,az', T, SHAKING + GRAVITY), ('--column', 'az:g'),
+        ("column 'az'", 'a mean of 9.8', 'looks like m/s^2', '--column acceleration=az:m/s^2'),
+    ),
+    'mg without a unit': (
+        drive, ('t,az', T, 1e3 * (SHAKING / GRAVITY + 1.0)), ('--column', 'az'),
+        ("column 'az'", 'a mean of 1000', 'gravity in mg', '--column acceleration=az:mg'),
+    ),
+    'scale -1 on g': (
+        drive, ('t,az', T, SHAKING / GRAVITY + 1.0), ('--column', 'az', '--scale', '-1'),
+        ("column 'az'", 'scale of -1', 'gravity in g', '--column acceleration=az:g'),
+    ),
+    'milliseconds': (
+        drive, ('t,az', MS, SHAKING), ('--column', 'az:m/s^2'),
+        ("column 't'", 'steps of 5', 'look like ms', '--time t:ms'),
+    ),
+    'header says ms, times are s': (
+        drive, ('t [ms],az', T, SHAKING), ('--column', 'az:m/s^2'),
+        ("column 't'", 'steps of 0.005', 'look like s', '--time t:s'),
+    ),
+    'the hand says s, times are us': (
+        drive, ('t,az', 1e6 * T, SHAKING), ('--column', 'az:m/s^2', '--time', 't:s'),
+        ("column 't'", 'steps of 5000', 'look like us', '--time t:us'),
+    ),
+    'no times': (
+        drive, ('az', SHAKING), ('--column', 'az:m/s^2'),
+        ("column 'az'", 'no times', '--rate HZ'),
+    ),
+    'a rate that the times contradict': (
+        drive, ('t [s],az', T, SHAKING), ('--column', 'az:m/s^2', '--rate', '1000'),
+        ('tell 200 samples per second', '--rate says 1000', 'leave --rate out'),
+    ),
+    'micrometres': (
+        replay, ('t,x', T, 1e3 * TRAVEL), ('--map', 'displacement=x'),
+        ("column 'x'", 'from -798', 'looks like um', '--map displacement=x:um'),
+    ),
+    'millimetres': (
+        replay, ('t,x', T, TRAVEL), ('--map', 'displacement=x'),
+        ("column 'x'", 'from -0.798', 'mm', '--map displacement=x:mm'),
+    ),
+    'the hand says m, values are mm': (
+        replay, ('t,x', T, TRAVEL), ('--map', 'displacement=x:m'),
+        ("column 'x'", 'a range of 1.597 m', 'mm', '--map displacement=x:mm'),
+    ),
+    'a unit that is none': (
+        replay, ('t,x', T, TRAVEL), ('--map', 'displacement=x:MM'),
+        ("'MM'", 'is it mm'),
+    ),
+    'another column': (
+        replay, ('t,x [N],y', T, TRAVEL, TRAVEL), ('--map', 'displacement=x'),
+        ("column 'x'", 'is in N', 'name another column'),
+    ),
+    'a column that is not there': (
+        replay, ('t,weg', T, TRAVEL), ('--map', 'displacement=x'),
+        ("'x'", 't, weg'),
+    ),
+    'another axis': (
+        importing, ('t,ax,ay', T, SHAKING, SHAKING), ('--column', 'acceleration=az:m/s^2'),
+        ("'az'", 't, ax, ay'),
+    ),
+    'time goes back': (
+        drive, ('t [s],az', BACK, SHAKING), ('--column', 'az:m/s^2'),
+        ("column 'az'", 'does not rise at sample 500', '2.495', 'sort the samples'),
+    ),
+    'times that stand still': (
+        drive, ('t [s],az', 0.0 * T, SHAKING), ('--column', 'az:m/s^2', '--time', 't:s'),
+        ("column 'az'", 'does not rise', 'remove the repeated'),
+    ),
+    'a gap': (
+        drive, ('t [s],az', T + 0.4 * (T >= 2.0), SHAKING), ('--column', 'az:m/s^2'),
+        ("column 'az'", 'a gap of 0.405 s at 1.995 s', 'cut the recording'),
+    ),
+    'no numbers for half a second': (
+        replay, ('t [s],x', T, NAN), ('--map', 'displacement=x:mm'),
+        ("column 'x'", 'a gap of 0.500 s', 'cut the recording'),
+    ),
+    'too slow': (
+        replay, ('t [s],x', 20.0 * T, TRAVEL), ('--map', 'displacement=x:mm'),
+        ("column 'x'", '10 samples per second', 'at least 100 are needed'),
+    ),
+    'a fault of the sensor': (
+        replay, ('t [s],x', T, TRAVEL + 60.0 * (np.arange(1000) == 321)), ('--map', 'displacement=x:mm'),
+        ('sample', 'beyond', 'is its unit another one'),
+    ),
+    'endless': (
+        drive, ('t [s],az', T, np.where(np.arange(1000) == 7, np.inf, SHAKING)), ('--column', 'az:m/s^2'),
+        ("column 'az'", 'value number 7 is inf, at 0.0350 s', 'repair it'),
+    ),
+    'a word among the numbers': (
+        importing, ('t [s],Weg [mm]\n0.1,kaputt', T, TRAVEL), (),
+        ('kaputt',),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('what', WRONG)
+def test_what_is_wrong_is_said_with_the_remedy(what, tmp_path):
+    command, columns, options, words = WRONG[what]
+    path = write(tmp_path / 'drive_17.csv', *columns)
+    sentence = command(path, *options)
+    assert 'drive_17.csv' in sentence
+    for word in words:
+        assert word in sentence, sentence
+
+
+def test_a_mapping_file_with_a_wrong_key_is_refused_with_the_file(tmp_path):
+    path = write(tmp_path / 'drive.csv', 't,x', T, TRAVEL)
+    (tmp_path / 'rack.yaml').write_text('columns: {displacement: {colum: x}}\n', encoding='utf-8')
+    sentence = importing(path, '--map-file', tmp_path / 'rack.yaml')
+    assert 'rack.yaml: displacement: colum is not known; known are column, unit, scale, offset' in sentence
+
+
+def test_a_gap_is_no_reason_to_refuse_an_import(tmp_path):
+    path = write(tmp_path / 'drive.csv', 't [s],Weg [mm]', T + 0.4 * (T >= 2.0), TRAVEL)
+    printed = done('import', path, '--out', tmp_path / 'made')
+    assert 'a gap of 0.405 s at 1.995 s' in printed
+    assert (tmp_path / 'made_1').is_dir()
+    assert (tmp_path / 'made_2').is_dir()
