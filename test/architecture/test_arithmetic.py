@@ -61,6 +61,10 @@ ALLOWED = {
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',
     ('mount_ros.timing', '**'): 'bins of latency, for the eye',
+    ('mount_signals.formats.trees.matlab', 'scipy'): 'reads files',
+    ('mount_signals.sources.patience', '**'): 'how long is waited for a store',
+    ('mount_signals.formats.trees.leaves', 'np.prod'): 'whole numbers',
+    ('mount_signals.formats.trees.layouts', 'np.prod'): 'whole numbers',
 }
 
 
