@@ -200,10 +200,15 @@ def test_each_mount_of_a_car_has_a_row_with_the_work_of_its_pads(tmp_path):
 
 def test_a_copy_elsewhere_has_the_same_row_but_for_its_address(drives, tmp_path):
     """As a store's copy has: no sentence tells where it lay on this machine."""
-    place = next(iter(places([str(drives / 'b' / 'rough')]).values()))
-    here = rows_of(drives / 'b' / 'rough', place)
-    shutil.copytree(drives / 'b' / 'rough', tmp_path / 'cache' / 'xyz')
-    assert rows_of(tmp_path / 'cache' / 'xyz', place) == here
+    for recording in ('b/rough', 'garbage.mcap'):
+        place = next(iter(places([str(drives / recording)]).values()))
+        copy = tmp_path / 'cache' / Path(recording).name
+        copy.parent.mkdir(exist_ok=True)
+        if copy.suffix:
+            shutil.copy(drives / recording, copy)
+        else:
+            shutil.copytree(drives / recording, copy)
+        assert rows_of(copy, place) == rows_of(drives / recording, place)
 
 
 def test_pieces_of_one_recording_are_one_place_and_files_of_their_own_are_several(tmp_path):
