@@ -80,6 +80,7 @@ REFUSED = {
     'cut': (MISSING, '--from', '1s', '--to', '2s', '--out', MISSING),
     'drive': ('--core', '--scenario', 'recorded', '--file', MISSING),
     'identify drift': (MISSING, MISSING),
+    'import': (MISSING, '--out', 'made'),
     'info': (MISSING,),
     'ls': (MISSING,),
     'identify friction': ('--train', MISSING),
@@ -153,7 +154,7 @@ def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(command, drive
 def test_a_column_with_its_unit_in_brackets_stays_in_the_refusal(capsys, tmp_path):
     file = tmp_path / 'a [' / 'g].csv'
     file.parent.mkdir()
-    file.write_text('Zeit [s],Weg [mm]\n0,1\n1,2\n')
+    file.write_text('Zeit [s],Weg [mm]\n0.0,1.5\n1.0,2.5\n')
     code, printed = run(
         capsys, 'drive', '--core', '--scenario', 'recorded', '--file', file, '--column', 'az [/g]'
     )

@@ -61,7 +61,13 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
     """
     _refuse_time_that_goes_back(signal)
     kept = _once(signal)
-    stamps, values = signal.times[kept], signal.values[kept]
+    stamps, values = (
+        (signal.times, signal.values) if kept.all() else (signal.times[kept], signal.values[kept])
+    )
+    if bool(np.all(stamps[1:] > stamps[:-1])):  # as most are: no copies of what can be an hour
+        first, period = _line(stamps)
+        if _latest(stamps, first, period) <= ON_THE_LINE * period:
+            return _checked(signal, first, period, values, lowest_rate, ())
     order = np.argsort(stamps, kind='stable')
     rising = stamps[order]
     first, period = _line(rising)
@@ -113,7 +119,8 @@ def _refuse_time_that_goes_back(signal: Signal) -> None:
 
 def _once(signal: Signal) -> NDArray[np.bool_]:
     """Return which samples to keep: once those that stand twice, if without the copies no stamps crowd."""
-    again = np.concatenate([[False], (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)])
+    times, values = signal.times, signal.values
+    again = np.concatenate([[False], (times[1:] == times[:-1]) & (values[1:] == values[:-1])])
     if again.any() and again.sum() < again.size - 2 and not _crowd(np.sort(signal.times[~again])).any():
         return ~again
     return np.ones(again.size, bool)
@@ -139,6 +146,15 @@ def _line(stamps: FloatArray) -> tuple[float, float]:
         slope += (number - middle) * stamps[number]
         weight += (number - middle) ** 2
     return mean / stamps.size - middle * slope / weight, slope / weight
+
+
+@compiled
+def _latest(rising: FloatArray, first: float, period: float) -> float:
+    """Return by how much stamps are off the line at most."""
+    most = 0.0
+    for number in range(rising.size):
+        most = max(most, abs(rising[number] - (first + period * number)))
+    return most
 
 
 def _is_level(late: FloatArray, period: float) -> bool:

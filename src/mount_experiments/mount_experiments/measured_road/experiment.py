@@ -115,6 +115,7 @@ def _figures(
     road = unevenness(profile)
     return {
         'source': Path(parameters.road).name,
+        'lateral_m': parameters.lateral,
         'sha256': profile.provenance.sha256,
         'length_m': profile.length,
         'spacing_m': profile.spacing,

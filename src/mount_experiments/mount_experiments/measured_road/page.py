@@ -6,12 +6,10 @@ from typing import Any
 
 _HEAD = """# A measured road: policies, hydromount, no current
 
-`engine-mount experiment measured_road` writes this page from its numbers; nobody edits it.
-
-```
-engine-mount experiment measured_road --set measured_road.road=blocks.crg --set measured_road.speeds=30,60,120
-```
+`engine-mount experiment measured_road` writes this page from its numbers; nobody edits it. The blocks are
+those of [drive a measured road](../how-to/drive_a_measured_road.md).
 """
+_CLEAR = 2.0  # %, chosen: two rms count as even within so much of each other
 _LIMITS = """## Limits of this comparison
 
 - **One wheel.** The vehicle model is a quarter of a car: one track, no axle behind, no roll.
@@ -35,8 +33,10 @@ def write_measured_road(figures: dict[str, Any], pictures: Sequence[Path], file:
 
 def _road(figures: dict[str, Any]) -> str:
     told = '. '.join(sentence[0].upper() + sentence[1:] for sentence in figures['road'])
+    command = f'engine-mount experiment measured_road --set measured_road.road={figures["source"]}'
+    lateral = f' --set measured_road.lateral={figures["lateral_m"]:g}' if figures['lateral_m'] else ''
     return (
-        f'Driven: `{figures["source"]}`, {figures["length_m"]:.0f} m, a height every '
+        f'`{command}{lateral}`\n\nDriven: `{figures["source"]}`, {figures["length_m"]:.0f} m, a height every '
         f'{1e3 * figures["spacing_m"]:.3g} mm. {told}.\n'
     )
 
@@ -77,4 +77,6 @@ def _least(runs: dict[str, Any], value: Any) -> str:
     """Return who has the least, and by how much less than the next."""
     first, second = sorted(runs, key=lambda who: value(runs[who]))[:2]
     share = 100.0 * (1.0 - value(runs[first]) / value(runs[second])) if value(runs[second]) else 0.0
+    if share < _CLEAR:
+        return f'nobody clearly (within {_CLEAR:g} %)'
     return f'{first} ({share:.0f} % less than {second})'

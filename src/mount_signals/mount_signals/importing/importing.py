@@ -12,7 +12,7 @@ from mount_signals.formats.content import Stated
 from mount_signals.importing.channels import channels_of
 from mount_signals.importing.joined import joined
 from mount_signals.importing.pieces import Piece, pieces, within
-from mount_signals.importing.provenance import told_columns, told_mapping, told_source
+from mount_signals.importing.provenance import told_mapping
 from mount_signals.importing.reading import Read, read_files
 from mount_signals.importing.writing import Channel, write_channels
 from mount_signals.units.mapping import Mapping
@@ -58,14 +58,13 @@ def import_recording(order: ImportOrder, progress: Progress = lambda share, what
     """
     progress(0.0, 'reading')
     files = read_files(order.files, order.mapping, order.stated)
-    signals, notes = joined(
-        [(one.name, {name: chosen.in_si() for name, chosen in one.chosen.items()}) for one in files]
-    )
-    notes = [note for one in files for note in one.measured.notes] + notes
+    signals, notes = joined([(one.name, one.signals) for one in files])
+    notes = [note for one in files for note in one.notes] + notes
+    imported = Imported(notes=[*notes, *_notes_of(signals)])
     parts, cuts = pieces(within(signals, order.first, order.last))
     parts, shifted = _with_room_before(parts)
-    imported = Imported(notes=[*notes, *_notes_of(signals), *cuts, *shifted])
-    quantities = {name: chosen.quantity for one in files for name, chosen in one.chosen.items()}
+    imported.notes += [*cuts, *shifted]
+    quantities = {name: quantity for one in files for name, quantity in one.quantities.items()}
     written = []
     for part in parts:
         channels, done = channels_of(part.signals, quantities)
@@ -118,13 +117,13 @@ def _with_room_before(parts: Sequence[Piece]) -> tuple[list[Piece], list[str]]:
 def _session(
     order: ImportOrder, files: Sequence[Read], channels: Sequence[Channel], notes: Sequence[str], piece: str
 ) -> dict[str, Any]:
-    columns = {name: told for one in files for name, told in told_columns(one.chosen).items()}
+    columns = {name: told for one in files for name, told in one.columns.items()}
     return new_session(
         {
             'scenario': SCENARIO,
             'mode': 'import',
             'imported': {
-                'files': [told_source(one.measured) for one in files],
+                'files': [one.source for one in files],
                 'piece': piece,
                 'mapping': told_mapping(order.mapping, order.mapping_file),
                 'columns': columns,

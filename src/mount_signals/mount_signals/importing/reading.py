@@ -3,29 +3,32 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from mount_bags.signals.signal import SignalError
+from mount_bags.signals.signal import Signal, SignalError
 from mount_signals.formats.content import Stated
-from mount_signals.formats.measured import Heading, Measured
+from mount_signals.formats.measured import Heading
 from mount_signals.formats.reading import headings
 from mount_signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
+from mount_signals.importing.provenance import Told, told_columns, told_source
 from mount_signals.units.columns import heading_of, is_time, place, read_chosen
 from mount_signals.units.mapping import MEAN, ColumnChoice, Mapping, MappingError
-from mount_signals.units.quantities import names, quantity, titled
-from mount_signals.units.signals import ChosenSignal, chosen_signals
+from mount_signals.units.quantities import Quantity, names, quantity, titled
+from mount_signals.units.signals import chosen_signals
 from mount_signals.units.unit import is_unit, unit_of
 
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """A file with what was chosen of it, by quantity."""
+    """What was chosen of a file: signals in SI by quantity, and what the session tells of file and columns.
 
-    measured: Measured
-    chosen: dict[str, ChosenSignal]
+    The columns themselves are gone: an hour of them would be held twice.
+    """
 
-    @property
-    def name(self) -> str:
-        """The name of the file, for sentences."""
-        return place(self.measured)
+    name: str
+    source: Told
+    columns: Told
+    quantities: dict[str, Quantity]
+    signals: dict[str, Signal]
+    notes: tuple[str, ...]
 
 
 def read_files(files: Sequence[str], mapping: Mapping, stated: Stated | None = None) -> list[Read]:
@@ -48,7 +51,15 @@ def read_files(files: Sequence[str], mapping: Mapping, stated: Stated | None = N
 
 def _read(file: str, mapping: Mapping, stated: Stated | None) -> Read:
     measured = read_chosen(file, mapping, stated)
-    return Read(measured, chosen_signals(measured, mapping))
+    chosen = chosen_signals(measured, mapping)
+    return Read(
+        place(measured),
+        told_source(measured),
+        told_columns(chosen),
+        {name: one.quantity for name, one in chosen.items()},
+        {name: one.in_si() for name, one in chosen.items()},
+        measured.notes,
+    )
 
 
 def _of_file(mapping: Mapping, file: str, there: Sequence[Heading], *, alone: bool) -> Mapping:

@@ -3,7 +3,7 @@
 from mount_signals.formats.measured import Measured, MeasuredColumn
 from mount_signals.units.columns import place
 from mount_signals.units.mapping import ColumnChoice, Mapping
-from mount_signals.units.plausibility import Size, doubt, gravity_unit, guesses, size_of
+from mount_signals.units.plausibility import Size, doubt, gravity_unit, guesses, scaled, size_of
 from mount_signals.units.quantities import Quantity
 from mount_signals.units.unit import Unit, UnitError, is_unit, unit_of
 
@@ -109,7 +109,7 @@ class _Judge:
     def _believe_scale(self, scale: float) -> None:
         """Raise `UnitError` where values times `scale` cannot be the quantity in SI."""
         size = self.size
-        moved = Size(size.mean * scale, *sorted((size.low * scale, size.high * scale)))
+        moved = scaled(size, scale)
         gravity = gravity_unit(moved) if self.wanted.dimension == 'acceleration' else ''
         if gravity not in ('', self.wanted.unit.symbol):
             raise UnitError(

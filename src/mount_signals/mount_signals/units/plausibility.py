@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mount_bags.signals.signal import FloatArray
+from mount_models.arithmetic.averages import mean
 from mount_signals.units.quantities import Quantity
 from mount_signals.units.unit import STANDARD_GRAVITY, Unit, unit_of, units_of
 
@@ -17,6 +18,9 @@ LARGEST_MEAN = 1.6
 """Standard gravities, chosen: no accelerometer at rest shows more, whatever its error."""
 SHAKEN = 50.0
 """m/s^2, chosen as in `mount_sim.excitation.recorded`: no chassis is shaken more but in a crash."""
+_USUAL = (0.5, 99.5)
+"""Percentiles, chosen: what lies beyond may be faults, of which the command that takes the values tells."""
+_LOOKED_AT = 100_000  # values, chosen: enough for percentiles
 _ACCELERATIONS = ('m/s^2', 'g', 'mg', 'mm/s^2', 'cm/s^2', 'ft/s^2', 'in/s^2')
 _LENGTHS = ('mm', 'um', 'm', 'in', 'cm')
 _OTHERS = {
@@ -32,11 +36,12 @@ _OTHERS = {
 
 @dataclass(frozen=True)
 class Size:
-    """Mean, lowest and highest of values, in their own unit."""
+    """Mean, lowest and highest of values, in their own unit; `usual`: without what is rare, as faults."""
 
     mean: float
     low: float
     high: float
+    usual: tuple[float, float]
 
     @property
     def range(self) -> float:
@@ -46,9 +51,19 @@ class Size:
 
 def size_of(values: FloatArray) -> Size:
     """Return the size of values (n,), n >= 1, those that are no number left out."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    missing = np.isnan(values)
+    known = values[~missing] if missing.any() else values
+    low, high = float(known.min()), float(known.max())
     # One that is all the same has that mean, which a sum would miss by its rounding.
-    return Size(float(np.nanmean(values)) if high > low else low, low, high)
+    usual = np.percentile(known[:: max(1, known.size // _LOOKED_AT)], _USUAL)
+    return Size(mean(known) if high > low else low, low, high, (float(usual[0]), float(usual[1])))
+
+
+def scaled(size: Size, scale: float) -> Size:
+    """Return the size of the same values times `scale`."""
+    low, high = sorted((size.low * scale, size.high * scale))
+    usual = sorted(value * scale for value in size.usual)
+    return Size(size.mean * scale, low, high, (usual[0], usual[1]))
 
 
 def gravity_unit(size: Size) -> str:
@@ -72,7 +87,7 @@ def doubt(quantity: Quantity, size: Size, unit: Unit) -> str:
             if cold <= low and high <= hot
             else f"values of {size.low:.4g} to {size.high:.4g} are no coil's"
         )
-    if size.range * factor > quantity.most:
+    if (size.usual[1] - size.usual[0]) * factor > quantity.most:
         return _beyond(quantity, size, unit, 'more', quantity.most)
     if 0.0 < size.range * factor < quantity.least:
         return _beyond(quantity, size, unit, 'less', quantity.least)
@@ -96,12 +111,10 @@ def guesses(quantity: Quantity, size: Size) -> tuple[str, ...]:
 
 
 def _doubt_of_acceleration(size: Size, unit: Unit) -> str:
-    mean, largest = (
-        abs(size.mean) * unit.factor,
-        max(size.high - size.mean, size.mean - size.low) * unit.factor,
-    )
-    if mean > LARGEST_MEAN * STANDARD_GRAVITY:
-        return f'a mean of {size.mean:.4g} {unit.symbol} is {mean / STANDARD_GRAVITY:.3g} times gravity'
+    at_rest = abs(size.mean) * unit.factor
+    largest = max(size.usual[1] - size.mean, size.mean - size.usual[0]) * unit.factor
+    if at_rest > LARGEST_MEAN * STANDARD_GRAVITY:
+        return f'a mean of {size.mean:.4g} {unit.symbol} is {at_rest / STANDARD_GRAVITY:.3g} times gravity'
     if largest > SHAKEN:
         return (
             f'{largest / unit.factor:.4g} {unit.symbol} about the mean are {largest:.4g} m/s^2, and no '

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mount_bags.signals.signal import SECOND, Signal, check_count
+from mount_models.arithmetic.averages import mean
 from mount_signals.formats.measured import FloatArray, Measured, MeasuredColumn
 from mount_signals.units.column_unit import unit_of_column
 from mount_signals.units.columns import column_of, place
 from mount_signals.units.mapping import MEAN, ColumnChoice, Mapping, MappingError
 from mount_signals.units.quantities import Quantity, other, quantity
-from mount_signals.units.time import times_of
+from mount_signals.units.time import Bases, times_of
 from mount_signals.units.unit import Unit, UnitError, unit_of
 
 
@@ -36,7 +37,7 @@ class ChosenSignal:
         """Return the signal in SI."""
         values = self.unit.to_si(self.signal.values)
         values = values * self.scale if self.scale != 1.0 else values
-        offset = float(np.mean(values)) if self.offset == MEAN else float(self.offset or 0.0)
+        offset = mean(values) if self.offset == MEAN else float(self.offset or 0.0)
         if not offset:
             return replace(self.signal, values=values)
         which = 'its mean' if self.offset == MEAN else 'as said'
@@ -57,15 +58,20 @@ def chosen_signals(measured: Measured, mapping: Mapping) -> dict[str, ChosenSign
     """Return what `signals` does before anything is converted, checked all the same."""
     if not mapping.columns and not mapping.others:
         raise MappingError(f'{place(measured)}: no column is named; say one as in --column acceleration=az:g')
+    bases: Bases = {}
     chosen = {name: (quantity(name), choice) for name, choice in mapping.columns.items()}
     for name, choice in mapping.others.items():
         chosen[name] = (other(name, _other_unit(measured, choice)), choice)
-    return {name: _chosen(measured, mapping, wanted, choice) for name, (wanted, choice) in chosen.items()}
+    return {
+        name: _chosen(measured, mapping, wanted, choice, bases) for name, (wanted, choice) in chosen.items()
+    }
 
 
-def _chosen(measured: Measured, mapping: Mapping, wanted: Quantity, choice: ColumnChoice) -> ChosenSignal:
+def _chosen(
+    measured: Measured, mapping: Mapping, wanted: Quantity, choice: ColumnChoice, bases: Bases
+) -> ChosenSignal:
     column = column_of(measured, choice.column)
-    base, notes = times_of(measured, column, mapping.time)
+    base, notes = times_of(measured, column, mapping.time, bases)
     where = f'{place(measured)}, column {column.name!r}'
     _check(where, column, base.times)
     known = np.isfinite(column.values)

@@ -17,10 +17,14 @@ _EPOCH = (5e8, 4e9)  # s, chosen: 1985 .. 2096, what counts from 1970 lies here
 _SAME_RATE = 0.02  # chosen: a stated rate may differ so much from that of times that stand there
 
 
+Bases = dict[str, tuple[TimeBase, tuple[str, ...]]]
+"""Times that were made of columns, by their names: those that were sampled together share them."""
+
+
 def times_of(
-    measured: Measured, column: MeasuredColumn, choice: TimeChoice
+    measured: Measured, column: MeasuredColumn, choice: TimeChoice, bases: Bases
 ) -> tuple[TimeBase, tuple[str, ...]]:
-    """Return the times of a column, and sentences on what was taken for granted.
+    """Return the times of a column, and sentences on what was taken for granted; adds them to `bases`.
 
     What is said by hand goes before what the format tells, that before a column with a usual title, and that
     before a first column that rises. Raises `MappingError` or `UnitError`.
@@ -28,7 +32,7 @@ def times_of(
     if choice.rate is not None:
         return _at_rate(measured, column, choice.rate)
     if choice.column:
-        return _in_column(measured, column_of(measured, choice.column), choice.unit)
+        return _in_column(measured, column_of(measured, choice.column), choice.unit, bases)
     if column.time is not None:
         return column.time, ()
     found = time_column(measured, column)
@@ -37,7 +41,7 @@ def times_of(
             f'{place(measured)} tells no times for column {column.name!r}: name their column with --time '
             f'COLUMN:UNIT (there are {known(measured)}), or the rate with --rate HZ'
         )
-    base, notes = _in_column(measured, found, choice.unit)
+    base, notes = _in_column(measured, found, choice.unit, bases)
     first = () if is_time(found) else (f'{found.name}: the first column rises: taken as the time',)
     return base, (*first, *notes)
 
@@ -80,7 +84,15 @@ def _told_times(measured: Measured, column: MeasuredColumn) -> FloatArray | None
     return unit_of(found.unit).to_si(found.values)
 
 
-def _in_column(measured: Measured, column: MeasuredColumn, said: str) -> tuple[TimeBase, tuple[str, ...]]:
+def _in_column(
+    measured: Measured, column: MeasuredColumn, said: str, bases: Bases
+) -> tuple[TimeBase, tuple[str, ...]]:
+    if column.name not in bases:
+        bases[column.name] = _made_of(measured, column, said)
+    return bases[column.name]
+
+
+def _made_of(measured: Measured, column: MeasuredColumn, said: str) -> tuple[TimeBase, tuple[str, ...]]:
     where = f'{place(measured)}, column {column.name!r}'
     if column.time is not None and column.unit == '' and not np.isfinite(column.values).any():
         return column.time, ()  # dates, which are no numbers
