@@ -58,13 +58,13 @@ ALLOWED = {
     ('mount_bags.messages.stamps', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
     ('mount_ros.messages.scalars', 'math.prod'): 'whole numbers',
+    ('mount_signals.formats.trees.leaves', 'math.prod'): 'whole numbers',
+    ('mount_signals.formats.trees.layouts', 'math.prod'): 'whole numbers',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',
     ('mount_ros.timing', '**'): 'bins of latency, for the eye',
     ('mount_signals.formats.trees.matlab', 'scipy'): 'reads files',
     ('mount_signals.sources.patience', '**'): 'how long is waited for a store',
-    ('mount_signals.formats.trees.leaves', 'np.prod'): 'whole numbers',
-    ('mount_signals.formats.trees.layouts', 'np.prod'): 'whole numbers',
 }
 
 

@@ -135,7 +135,7 @@ def test_a_coil_that_does_not_follow_is_doubted(fault):
     assert 1000 + 20 <= sample <= 1000 + 20 + 63
     assert 'must lie within' in sentence
     assert '0.1 A about its setpoint; it has not for' in sentence
-    assert 'check coil, cable and power stage' in sentence
+    assert 'check supply, coil, cable and power stage' in sentence
 
 
 @pytest.mark.parametrize('enabled', [True, False])

@@ -89,7 +89,7 @@ def test_the_page_tells_what_was_asked_what_failed_and_what_did_not_move():
         'parameters, another version, or losses',
     )
     assert 'No picture: it is away' in sections['look_2'].words
-    assert sections['failures'].tables[0].rows == [('broken', '', 'broken/<b> is no MCAP file')]
+    assert sections['failures'].tables[0].rows == [('.../<b> is no MCAP file', '1', 'broken')]
 
 
 def test_the_picture_shows_the_stretch_around_the_largest_difference():

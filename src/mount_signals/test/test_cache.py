@@ -51,7 +51,7 @@ def present(cache):
 def test_what_was_used_longest_ago_goes_first(cache):
     for key in 'abc':
         hold(cache, key, 30).release()
-    hold(cache, 'a', 30).release()
+    cache.hold('a', 'a.bin', 30, lambda part: None, lambda part: None).release()  # takes the time of today
     hold(cache, 'd', 30).release()
     assert present(cache) == set('acd')
 
@@ -116,6 +116,22 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / 'file').write_text('')
     with pytest.raises(SourceError, match=r'cannot be written: .*ENGINE_MOUNT_CACHE'):
         hold(Cache(tmp_path / 'file' / 'copies', 100), 'a', 1)
+
+
+def test_what_was_half_removed_is_not_taken_for_whole(cache, monkeypatch):
+    hold(cache, 'a', 60).release()
+
+    def remove_half(place, **how):
+        if not how:  # of a copy, not of what a process left that was killed
+            for file in place.rglob('*.bin'):
+                file.unlink()
+            raise OSError('killed')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module.shutil, 'rmtree', remove_half)
+        with pytest.raises(SourceError):
+            hold(cache, 'b', 60)
+    assert hold(cache, 'a', 60).path.read_bytes() == bytes(60)
 
 
 def test_what_fails_leaves_nothing(cache):

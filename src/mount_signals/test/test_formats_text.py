@@ -13,6 +13,8 @@ from mount_signals.formats.content import Stated
 from mount_signals.formats.headers import name_and_unit
 from mount_signals.formats.reading import headings, read
 from mount_signals.formats.text import parsing
+from mount_signals.units.columns import read_chosen
+from mount_signals.units.mapping import mapping_in_file
 
 ROWS = [[0.0, 1.25, -3.5e-3], [0.01, 2.5, 1200.0], [0.02, -0.125, 7.0], [0.03, 0.5, 8.75]]
 
@@ -272,3 +274,12 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, data):
     except SignalError as error:
         refusal = str(error)
         assert str(path) in refusal
+
+
+def test_a_mapping_file_states_what_a_table_leaves_open(tmp_path):
+    (tmp_path / 'drive.csv').write_text('0,1\n2,3\n')
+    (tmp_path / 'system.yaml').write_text(
+        'decimal: ","\ntime: {rate: 100}\ncolumns: {displacement: {column: "0", unit: mm}}\n'
+    )
+    measured = read_chosen(tmp_path / 'drive.csv', mapping_in_file(tmp_path / 'system.yaml'))
+    np.testing.assert_array_equal(measured.column('0').values, [0.1, 2.3])

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _WORD = 8  # bytes of a number that is picked
 _HEADS = 2  # numbers before the columns in a row: log time and stamp
+_KEPT = 16 * 1024 * 1024  # bytes of the file in memory, chosen
 _FLOAT = np.dtype('<f8')
 
 
@@ -69,7 +70,11 @@ class _FileColumns:
         self._picked: dict[str, _Picked] = {}
 
     def parts(self) -> Iterator[ColumnPart]:
+        forgotten = 0
         for chunk in self._file.chunks:
+            if chunk.position - forgotten >= _KEPT:
+                self._file.forget(forgotten, chunk.position)
+                forgotten = chunk.position
             held = [name for name in self._wanted if not self._held_in(chunk).isdisjoint(self._numbers[name])]
             if not held:
                 continue
@@ -138,8 +143,9 @@ class _Picked:
         self._channel, self._names = channel, names
         self._length = LENGTH_BESIDES_PAYLOAD + len(raw)
         self._places = np.array([LOG_TIME_PLACE, *(head + place for place in places)], np.int64)
-        self._shape = shape + head
-        self._expected = np.frombuffer(raw, np.uint8)[shape]
+        self._shape = np.zeros((2, len(raw)), np.uint8)
+        self._shape[0] = np.frombuffer(raw, np.uint8)
+        self._shape[1, shape] = 255
         self._rows = np.empty((size, _WORD * len(self._places)), np.uint8)
 
     def take(self, data: NDArray[np.uint8]) -> int:
@@ -149,16 +155,7 @@ class _Picked:
             rows = np.empty((2 * needed, self._rows.shape[1]), np.uint8)
             rows[: self.filled] = self._rows[: self.filled]
             self._rows = rows
-        return take(
-            data,
-            self._channel,
-            self._length,
-            self._shape,
-            self._expected,
-            self._places,
-            self._rows,
-            self.filled,
-        )
+        return take(data, self._channel, self._shape, self._places, self._rows, self.filled)
 
     def flushed(self, topic: str) -> ColumnPart:
         """Return the rows as columns and begin anew."""

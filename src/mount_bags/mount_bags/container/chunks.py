@@ -5,9 +5,11 @@ byte to the last. The message indexes behind a chunk carry no checksum: they are
 begin, and taken only if the records found there leave no byte unexplained.
 """
 
+import functools
 import mmap
 import re
 import struct
+import sys
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,7 +17,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
-from mcap.records import ChunkIndex
 from numpy.typing import NDArray
 
 from mount_bags.container.stored import HEAD, StoredMessages, rows_at
@@ -39,6 +40,10 @@ RECORD = struct.Struct('<BQ')  # opcode, length of what follows
 LENGTH_BESIDES_PAYLOAD = MESSAGE_HEAD.itemsize - RECORD.size  # of a message record
 _HEAD = struct.Struct('<QQQII')  # start, end, unpacked size, checksum, length of the compression's name
 _SIZE = struct.Struct('<Q')
+_INDEXED = struct.Struct('<QQQQI')  # of a chunk index: start, end, position, length, bytes of the offsets
+_OFFSET = struct.Struct('<HQ')  # channel, position of its message index
+_INDEXED_SIZES = struct.Struct('<QI')  # length of the message indexes, length of the compression's name
+_PACKED_SIZES = struct.Struct('<QQ')
 _INDEX = struct.Struct('<HI')  # channel, length of the entries
 _SHORTEST = RECORD.size + _HEAD.size + _SIZE.size  # bytes of a chunk record without compression and messages
 _TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
@@ -47,7 +52,7 @@ _LARGEST = 1 << 32  # bytes; more is a damaged length
 _MAGICS = {b'\x28\xb5\x2f\xfd': 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
 
 
-@dataclass
+@dataclass(slots=True)
 class Chunk:
     """One chunk of a file; positions in bytes, times in ns."""
 
@@ -59,6 +64,7 @@ class Chunk:
     compression: str
     start_time: int
     end_time: int
+    index_length: int = 0  # bytes of the message indexes behind it, as a sound summary tells them
     channels: frozenset[int] | None = None  # those with messages, None where no reliable source tells
     counts: dict[int, int] = field(default_factory=dict)  # messages by channel, once explored
     declarations: tuple[tuple[int, bytes], ...] = ()  # of schemas and channels, once explored
@@ -106,23 +112,65 @@ def partial_chunk(data: mmap.mmap, position: int) -> Chunk | None:
     return Chunk(position, begin, (len(data),), size, crc, name, start, last)
 
 
-def indexed_chunk(data: mmap.mmap, index: ChunkIndex) -> Chunk | None:
+@dataclass(slots=True, frozen=True)
+class IndexedChunk:
+    """What a summary tells of a chunk; positions and lengths in bytes, times in ns."""
+
+    position: int
+    length: int
+    index_length: int  # of the message indexes behind it
+    packed: int
+    size: int  # when unpacked
+    compression: str
+    start_time: int
+    end_time: int
+    channels: frozenset[int]
+
+
+def indexed_in(content: bytes) -> IndexedChunk | None:
+    """Return what the chunk index record in `content` tells, None if it is not readable."""
+    try:
+        start, end, position, length, offsets = _INDEXED.unpack_from(content)
+        place = _INDEXED.size + offsets
+        index_length, name_length = _INDEXED_SIZES.unpack_from(content, place)
+        name_end = place + _INDEXED_SIZES.size + name_length
+        name = content[place + _INDEXED_SIZES.size : name_end].decode()
+        packed, size = _PACKED_SIZES.unpack_from(content, name_end)
+        if offsets % _OFFSET.size:
+            return None
+        channels = frozenset(each[0] for each in _OFFSET.iter_unpack(content[_INDEXED.size : place]))
+    except (struct.error, UnicodeDecodeError):
+        return None
+    # one object for all equal ones: a long recording has very many chunks
+    return IndexedChunk(
+        position, length, index_length, packed, size, sys.intern(name), start, end, _same(channels)
+    )
+
+
+def indexed_chunk(data: mmap.mmap, index: IndexedChunk) -> Chunk | None:
     """Return the chunk that a summary with a sound checksum describes; its own head is not needed."""
-    position = index.chunk_start_offset
-    end = position + index.chunk_length
-    if end > len(data) or index.chunk_length < _SHORTEST or index.uncompressed_size > _LARGEST:
+    position = index.position
+    end = position + index.length
+    if end > len(data) or index.length < _SHORTEST or index.size > _LARGEST:
         return None
     return Chunk(
         position=position,
-        begin=end - index.compressed_size,
+        begin=end - index.packed,
         ends=(end,),
-        size=index.uncompressed_size,
+        size=index.size,
         crc=_HEAD.unpack_from(data, position + RECORD.size)[3],
         compression=index.compression,
-        start_time=index.message_start_time,
-        end_time=index.message_end_time,
-        channels=frozenset(index.message_index_offsets) if index.message_index_length else None,
+        start_time=index.start_time,
+        end_time=index.end_time,
+        index_length=index.index_length,
+        channels=index.channels if index.index_length else None,
     )
+
+
+@functools.lru_cache(maxsize=256)
+def _same(channels: frozenset[int]) -> frozenset[int]:
+    """Return one object for all equal sets."""
+    return channels
 
 
 def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:

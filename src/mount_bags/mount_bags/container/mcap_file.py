@@ -40,8 +40,9 @@ from mount_bags.container.summary import (
     parsed_metadata,
     read_summary,
 )
-from mount_bags.container.whole_files import FileError, mapped
+from mount_bags.container.whole_files import FileError, forget, mapped
 
+_KEPT = 1 << 24  # bytes of the file in memory while the chunks are looked at, chosen
 _LAST_OPCODE = Opcode.DATA_END
 _LENGTHS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
 _PRIVATE_OPCODE = 0x80  # and above: of other programs, to be skipped
@@ -170,6 +171,10 @@ class McapFile:
         """
         return unpacked(self._data[chunk.begin : chunk.end], chunk, self._decompressor)
 
+    def forget(self, begin: int, end: int) -> None:
+        """Let the system take back the memory of the bytes from `begin` to `end`, which were read."""
+        forget(self._data, begin, end)
+
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
         if self._data_proof is None:
@@ -190,7 +195,7 @@ class McapFile:
     def _take_summary(self) -> bool:
         """Take what the summary tells; False if that is not enough."""
         summary = self._summary
-        chunks = [indexed_chunk(self._data, index) for index in summary.chunks]
+        chunks = self._indexed_chunks()
         statistics = summary.statistics
         if statistics is None or statistics.chunk_count != len(chunks) or None in chunks:
             return False
@@ -208,6 +213,19 @@ class McapFile:
         if self._data[-len(MCAP0_MAGIC) :] != MCAP0_MAGIC:
             self._warn('its last bytes are damaged; all else is read')
         return True
+
+    def _indexed_chunks(self) -> list[Chunk | None]:
+        """Return the chunks of which the summary tells; what it tells of them is not kept twice."""
+        found: list[Chunk | None] = []
+        waiting, self._summary.chunks = self._summary.chunks[::-1], []
+        forgotten = 0
+        while waiting:
+            index = waiting.pop()
+            found.append(indexed_chunk(self._data, index))
+            if index.position - forgotten >= _KEPT:
+                self.forget(forgotten, index.position)
+                forgotten = index.position
+        return found
 
     def _take_times(self, statistics: Statistics) -> None:
         """Take the times of the chunks, which are nearer to the messages than the statistics of the file."""
@@ -230,11 +248,10 @@ class McapFile:
                 self._warn(f'{index.name}, metadata or attachment at byte {index.offset}, is damaged')
 
     def _walk_between_chunks(self) -> None:
-        lengths = {index.chunk_start_offset: index.message_index_length for index in self._summary.chunks}
         position = len(MCAP0_MAGIC)
         for chunk in self.chunks:
             self._walk(position, chunk.position)
-            position = chunk.end + lengths[chunk.position]
+            position = chunk.end + chunk.index_length
         self._walk(position, self._summary.begin)
         # A file with chunks has its messages there; a record that says otherwise needs a proof.
         if self._loose and self.chunks and self.data_proof() is not Proof.SOUND:

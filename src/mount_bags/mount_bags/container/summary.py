@@ -16,7 +16,6 @@ from mcap.records import (
     Attachment,
     AttachmentIndex,
     Channel,
-    ChunkIndex,
     Footer,
     Metadata,
     MetadataIndex,
@@ -25,7 +24,8 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from mount_bags.container.chunks import RECORD
+from mount_bags.container.chunks import RECORD, IndexedChunk, indexed_in
+from mount_bags.container.whole_files import forget
 
 T = TypeVar('T')
 
@@ -53,7 +53,7 @@ class Summary:
     footer: int = 0
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[ChunkIndex] = field(default_factory=list)
+    chunks: list[IndexedChunk] = field(default_factory=list)
     statistics: Statistics | None = None
     beside: list[MetadataIndex | AttachmentIndex] = field(default_factory=list)
 
@@ -93,6 +93,7 @@ def checksum(data: mmap.mmap, begin: int, end: int) -> int:
     crc = 0
     for position in range(begin, end, _STEP):
         crc = zlib.crc32(data[position : min(position + _STEP, end)], crc)
+        forget(data, position, position + _STEP)  # a long recording is larger than a worker may be
     return crc
 
 
@@ -134,7 +135,7 @@ def _take(summary: Summary, opcode: int, content: bytes) -> bool:
         summary.schemas[schema.id] = schema
     elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):
         summary.channels[channel.id] = channel
-    elif opcode == Opcode.CHUNK_INDEX and (chunk := parsed(ChunkIndex.read, content)):
+    elif opcode == Opcode.CHUNK_INDEX and (chunk := indexed_in(content)):
         summary.chunks.append(chunk)
     elif opcode == Opcode.METADATA_INDEX and (metadata := parsed(MetadataIndex.read, content)):
         summary.beside.append(metadata)

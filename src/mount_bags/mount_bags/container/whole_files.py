@@ -31,6 +31,15 @@ def mapped(path: Path) -> mmap.mmap:
         raise FileError(f'{path} is empty') from None
 
 
+def forget(data: mmap.mmap, begin: int, end: int) -> None:
+    """Let the system take back the memory of a part of a file that was read; it is read anew where needed."""
+    begin += -begin % mmap.PAGESIZE
+    end = min(end, len(data))
+    length = end - end % mmap.PAGESIZE - begin
+    if length > 0:
+        data.madvise(mmap.MADV_DONTNEED, begin, length)
+
+
 def unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:
     """Unpack `source`, packed as `suffix` says; what is cut off there is missing in `target`."""
     try:

@@ -1,5 +1,6 @@
 """Which switchings of damping appeared, vanished or moved from one recording to another."""
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,10 +86,10 @@ def paired_switchings(
 
 def _paired(on: bool, a: list[float], b: list[float], least: float, mount: str) -> list[SwitchingChange]:
     near = sorted(
-        (abs(one - other), i, k)
+        (abs(one - b[k]), i, k)
         for i, one in enumerate(a)
-        for k, other in enumerate(b)
-        if abs(one - other) <= _REACH
+        for k in range(bisect_left(b, one - 2.0 * _REACH), bisect_right(b, one + 2.0 * _REACH))
+        if abs(one - b[k]) <= _REACH
     )
     partner: dict[int, int] = {}
     taken: set[int] = set()

@@ -144,5 +144,5 @@ class CoilWatch:
         lasted = 1e3 * self._period * (self._deviating - 1)
         return (
             f'coil current ({measured}) must lie within {low:.3f} .. {high:.3f} A, {self._limit:g} A about '
-            f'its setpoint; it has not for {lasted:.0f} ms in all: check coil, cable and power stage'
+            f'its setpoint; it has not for {lasted:.0f} ms in all: check supply, coil, cable and power stage'
         )

@@ -56,7 +56,7 @@ class ForceLawFit:
     @property
     def continued(self) -> bool:
         """Whether the law holds for currents below the lowest measured one, continued to 0 N at 0 A."""
-        return self.lowest_current > LOWEST_SHARE * self.law.current_high
+        return self.lowest_current > _FROM_ZERO * self.law.current_high
 
     def figures(self) -> dict[str, Any]:
         """Return parameters and errors for JSON, SI units; None where one is not known."""
@@ -122,6 +122,7 @@ def fit_force_law(
     return _judged(law, gaps, currents, forces, _covariance(found, orders, domain))
 
 
+_FROM_ZERO = 0.05  # of the largest current, chosen: measured from below, the law counts as measured from 0 A
 _SHORT_SEARCH = 60  # steps, chosen: tells good starts from bad ones
 _LONG_SEARCH = 2000
 _PRECISION = 1e-15

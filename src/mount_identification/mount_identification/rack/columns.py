@@ -62,8 +62,8 @@ def read_columns(
         elif channel in channels:
             names = ' or '.join(f'{channel.name}_{unit}' for unit in channel.usual)
             raise RackRecordingError(
-                f'{file} has no column {names}; its columns are {", ".join(table.header)}{table.told}: rename '
-                f'one, or choose it with --column {channel.name}=HEADER:UNIT'
+                f'{file} has no column {names}; its columns are {", ".join(table.header)}{table.told}: '
+                f'rename one, or choose it with --column {channel.name}=HEADER:UNIT'
             )
     places = [place for place, _ in found.values()]
     rows = table.columns(*places)

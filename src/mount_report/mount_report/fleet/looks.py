@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mount_report.drawing.chart import DASHED, Array, Chart, Curve, Dots, Panel
-from mount_report.drawing.style import COLOUR_OF, COLOURS, LEVEL_COLOUR
+from mount_report.drawing.style import COLOUR_OF, COLOURS, DIFFERENCE_COLOUR, LEVEL_COLOUR
 from mount_report.sections.section import Section
 
-AROUND = 1.0  # s, chosen: what is shown before and after the largest difference
+AROUND, AT_FIRST = (
+    1.0,
+    0.4,
+)  # s, chosen: what is there before and after the largest difference, and seen at first
 _MM = 1e3
 
 
@@ -63,5 +66,11 @@ def _chart(name: str, title: str, time: Array, displacement: Array, before: Arra
             ],
             [largest] if known and difference[place] > 0.0 else [],
         ),
+        Panel(
+            'setpoint, changed - as recorded (A)',
+            [Curve('difference', time, after - before, DIFFERENCE_COLOUR)],
+            share=0.7,
+        ),
     ]
-    return Chart(name, title, 'seconds from the first sample of this recording', panels)
+    view = (float(time[at]) - AT_FIRST, float(time[at]) + AT_FIRST)
+    return Chart(name, title, 'seconds from the first sample of this recording', panels, view=view)

@@ -1,7 +1,6 @@
 """The page about the result of a fleet: what was asked, how figures are spread, the worst, what failed."""
 
 import json
-from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -25,8 +24,7 @@ _ASKED = {
         'is not in these figures.'
     ),
 }
-_LISTED = 200  # recordings of the table of failures, chosen
-_SAME_REASON = 60  # characters, chosen: reasons that begin alike are counted together
+_LISTED = 20  # recordings that are named beside their reason, chosen
 
 
 def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, title: str) -> Report:
@@ -121,18 +119,20 @@ def _failures(result: 'pyarrow.Table') -> Section:
     failed = [row for row in result.to_pylist() if row['reason']]
     if not failed:
         return Section('failures', 'Failed', ['Nothing failed.'])
-    kinds = Counter(_kind(row) for row in failed)
-    counted = Table(('reason', 'rows'), [(kind, str(count)) for kind, count in kinds.most_common()])
-    listed = Table(
-        ('recording', 'mount', 'reason'),
-        [(row['recording'], row['mount'] or '', row['reason']) for row in failed[:_LISTED]],
-        title='Each of them' if len(failed) <= _LISTED else f'The first {_LISTED} of {len(failed)}',
-        folded=len(failed) > 20,
-    )
-    return Section('failures', 'Failed', tables=[listed] if len(kinds) == len(failed) else [counted, listed])
+    reasons: dict[str, list[str]] = {}
+    for row in failed:
+        reasons.setdefault(row['reason'].replace(row['recording'], '...'), []).append(_named(row))
+    rows = [
+        (reason, str(len(names)), _listed(names))
+        for reason, names in sorted(reasons.items(), key=lambda item: -len(item[1]))
+    ]
+    return Section('failures', 'Failed', tables=[Table(('reason', 'rows', 'recordings'), rows)])
 
 
-def _kind(row: dict) -> str:
-    """Return the reason without the recording, so that equal ones are counted together."""
-    reason = row['reason'].replace(row['recording'], '...')
-    return reason if len(reason) <= _SAME_REASON else f'{reason[:_SAME_REASON]} ...'
+def _named(row: dict) -> str:
+    return ' '.join(filter(None, (row['recording'], row['mount'])))
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = [f'and {len(names) - _LISTED} more'] if len(names) > _LISTED else []
+    return '\n'.join([*names[:_LISTED], *more])

@@ -27,6 +27,7 @@ class Mdf:
         self.format, self.reader = 'MDF', 'asammdf'
         self.notes: list[str] = []
         self._path = path
+        _check_head(path)
         with reading(path, 'MDF file'):
             # by a stream: a path would be mapped whole into memory
             self._file = asammdf.MDF(path.open('rb'), raise_on_multiple_occurrences=False)
@@ -99,6 +100,17 @@ class Mdf:
                     f'{self._path}, channel {channel.name!r}: ends at bit {_end_of(channel)} of a record of '
                     f'{size} bytes; the file is damaged, export it again'
                 )
+
+
+def _check_head(path: Path) -> None:
+    """Raise `SignalError` where the header block does not follow the identification of 64 bytes."""
+    with path.open('rb') as file:
+        head = file.read(68)
+    if head[64:66] != b'HD' and head[64:68] != b'##HD':
+        raise SignalError(
+            f'{path} is no readable MDF file: byte 64 is {head[64:68].hex() or "missing"} where its '
+            'header block begins with HD or ##HD; is it cut off, or another format?'
+        )
 
 
 def _end_of(channel: Any) -> int:

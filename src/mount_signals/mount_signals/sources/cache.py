@@ -66,16 +66,16 @@ class Cache:
         what `fill` raises; then nothing of it is left.
         """
         place = self.folder / f'{key}-{size}'
-        with self._room_needed(place, size):
+        with self._room_needed(name, size):
             while True:
                 handle = _locked(place, fcntl.LOCK_SH)
                 if (place / _COPY).is_dir():
                     os.utime(place / _LOCK)
                     return Held(place / _COPY / name, handle)
                 os.close(handle)
-                self._fill(place, size, reserve, fill)
+                self._fill(place, name, size, reserve, fill)
 
-    def _fill(self, place: Path, size: int, reserve: Fill, fill: Fill) -> None:
+    def _fill(self, place: Path, name: str, size: int, reserve: Fill, fill: Fill) -> None:
         """Make the copy, unless another process did meanwhile."""
         handle = _locked(place, fcntl.LOCK_EX)
         try:
@@ -84,7 +84,7 @@ class Cache:
             part = place / _PART
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed
             with self._alone():
-                self._make_room(place, size)
+                self._make_room(place, name, size)
                 part.mkdir()
                 reserve(part)
             fill(part)
@@ -95,7 +95,7 @@ class Cache:
         finally:
             os.close(handle)
 
-    def _make_room(self, wanted: Path, size: int) -> None:
+    def _make_room(self, wanted: Path, name: str, size: int) -> None:
         """Remove what was used longest ago and is not in use, until `size` bytes have room."""
         others = sorted(self._others(wanted))
         used = sum(bytes_ for _, bytes_, _ in others)
@@ -106,11 +106,11 @@ class Cache:
                 used -= bytes_
         if used + size > self.limit:
             raise SourceError(
-                f'{_amount(size)} are needed in {self.folder}, which may hold {_amount(self.limit)} and has '
-                f'{_amount(used)} in use; {LIMIT_VARIABLE} sets how much it may hold'
+                f'{name}: {_amount(size)} are needed in {self.folder}, which may hold {_amount(self.limit)} '
+                f'and has {_amount(used)} in use; {LIMIT_VARIABLE} sets how much it may hold'
             )
         if self._free() < size + _SPARE:
-            raise SourceError(self._full(size))
+            raise SourceError(self._full(name, size))
 
     def _others(self, wanted: Path) -> Iterator[tuple[float, int, Path]]:
         """Yield when a copy was last used, its bytes and its folder."""
@@ -131,7 +131,7 @@ class Cache:
             os.close(handle)
 
     @contextlib.contextmanager
-    def _room_needed(self, place: Path, size: int) -> Iterator[None]:
+    def _room_needed(self, name: str, size: int) -> Iterator[None]:
         """Tell a disk that is full or cannot be written in a sentence."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -140,16 +140,16 @@ class Cache:
             raise
         except OSError as error:
             if error.errno in (errno.ENOSPC, errno.EDQUOT):
-                raise SourceError(self._full(size)) from error
+                raise SourceError(self._full(name, size)) from error
             raise SourceError(
-                f'{place} cannot be written: {error.strerror or error}; '
+                f'{self.folder} cannot be written: {error.strerror or error}; '
                 f'{FOLDER_VARIABLE} chooses another folder'
             ) from error
 
-    def _full(self, size: int) -> str:
+    def _full(self, name: str, size: int) -> str:
         return (
-            f'{_amount(size)} are needed in {self.folder}, {_amount(self._free())} are free on its disk; '
-            f'make room, or choose another folder by {FOLDER_VARIABLE}'
+            f'{name}: {_amount(size)} are needed in {self.folder}, {_amount(self._free())} are free on its '
+            f'disk; make room, or choose another folder by {FOLDER_VARIABLE}'
         )
 
     def _free(self) -> int:
@@ -178,6 +178,8 @@ def _remove(place: Path) -> bool:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if not _is_at(handle, place / _LOCK):
             return False
+        if (place / _COPY).is_dir():
+            (place / _COPY).rename(place / _PART)  # what is left half removed is no copy
         shutil.rmtree(place)
     except OSError:
         return False

@@ -41,7 +41,7 @@ def remedy(error: BaseException, uri: str) -> str:
         return _KEYS[scheme_of(uri)]
     if is_lasting(error):
         return 'engine-mount ls tells what lies in a folder'
-    return 'is the store reachable from here? The same command goes on where it stopped'
+    return 'is the store reachable from here?'
 
 
 _KEYS = {

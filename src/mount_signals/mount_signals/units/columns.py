@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mount_bags.signals.signal import SignalError
@@ -23,6 +24,12 @@ def read_chosen(uri: str | Path, mapping: Mapping, stated: Stated | None = None)
 
     Raises `SignalError`, `SourceError` or `UnitError`.
     """
+    stated = stated or Stated()
+    stated = replace(
+        stated,
+        decimal=mapping.decimal or stated.decimal,
+        delimiter=mapping.delimiter or stated.delimiter,
+    )
     there = headings(uri, stated)
     wanted = [choice.column for choice in (*mapping.columns.values(), *mapping.others.values())]
     chosen = {heading_of(there, text, str(uri)).name for text in wanted}

@@ -16,7 +16,7 @@ from mount_signals.units.unit import UnitError, is_unit, unit_of
 
 MEAN = 'mean'
 """The offset that is the mean of the signal."""
-_KEYS = ('system', 'time', 'columns', 'others')
+_KEYS = ('system', 'time', 'columns', 'others', 'decimal', 'delimiter')
 _COLUMN_KEYS = ('column', 'unit', 'scale', 'offset')
 _TIME_KEYS = ('column', 'unit', 'rate')
 
@@ -53,7 +53,8 @@ class TimeChoice:
 class Mapping:
     """What is said of a recording: `columns` by quantity, `others` by names of the user's own.
 
-    `system` says in words what measured; `options` is how a command says a column, for remedies.
+    `system` says in words what measured; `options` is how a command says a column, for remedies. `decimal`
+    and `delimiter` are those of text tables, see `Stated`.
     """
 
     columns: Keys[str, ColumnChoice] = field(default_factory=dict)
@@ -61,6 +62,8 @@ class Mapping:
     time: TimeChoice = TimeChoice()
     system: str = ''
     options: str = '--column {quantity}={column}:{unit}'
+    decimal: str = ''
+    delimiter: str = ''
 
 
 def mapping_in_file(path: Path) -> Mapping:
@@ -74,6 +77,7 @@ def mapping_in_file(path: Path) -> Mapping:
       acceleration: {column: az, unit: g, scale: -1}
     others:
       valve_pressure: {column: p2, unit: bar}
+    decimal: ","                           # of text tables that can be read in two ways; also delimiter
     ```
 
     Raises `MappingError`, for a key that is not known too.
@@ -84,14 +88,12 @@ def mapping_in_file(path: Path) -> Mapping:
         columns = {quantity(name).name: _column(value, name) for name, value in _section(found, 'columns')}
         others = {_own_name(name): _column(value, name) for name, value in _section(found, 'others')}
         time = _time(found.get('time', {}))
-        system = found.get('system', '')
-        if not isinstance(system, str):
-            raise MappingError(f'system ({system!r}) must be a text')
+        system, decimal, delimiter = (_text(found, key) for key in ('system', 'decimal', 'delimiter'))
     except YamlError as error:
         raise MappingError(f'{path} {error}') from None
     except (MappingError, UnitError) as error:
         raise MappingError(f'{path}: {error}') from None
-    return Mapping(columns, others, time, system)
+    return Mapping(columns, others, time, system, decimal=decimal, delimiter=delimiter)
 
 
 def with_options(
@@ -187,6 +189,13 @@ def _scaled(mapping: Mapping, scale: float, said: tuple[str, ...]) -> Mapping:
         )
     choice = replace(mapping.columns[names[0]], scale=checked_scale(scale, '--scale'))
     return replace(mapping, columns={**mapping.columns, names[0]: choice})
+
+
+def _text(found: Keys[str, Any], name: str) -> str:
+    text = found.get(name, '')
+    if not isinstance(text, str):
+        raise MappingError(f'{name} ({text!r}) must be a text')
+    return text
 
 
 def _section(found: Keys[str, Any], name: str) -> list[tuple[str, Any]]:

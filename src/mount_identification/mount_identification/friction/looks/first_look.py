@@ -40,7 +40,8 @@ class FirstLook:
 
     `limits` (N) are the forces of sliding to the positive and the negative side, `stiffness` (N/m) and `play`
     (m, half of it) those of `ElasticPlay`. `explained` is the share of the mean square of the force about its
-    zero that the fit explains.
+    zero that the fit explains. `taken` (N) is what was taken away from the recorded force before, `rest` (N)
+    what it read at rest before the motion; None where there was no rest.
     """
 
     zero: float
@@ -52,6 +53,8 @@ class FirstLook:
     sliding: float
     sticking: float
     in_play: float
+    taken: float = 0.0
+    rest: float | None = None
 
     @property
     def known(self) -> bool:

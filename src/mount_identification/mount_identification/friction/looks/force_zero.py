@@ -45,7 +45,7 @@ def zeroed(recording: FrictionRecording, zero_from: str = '') -> tuple[FrictionR
     notes = (*recording.notes, *([note] if note else []))
     return (
         replace(recording, force=recording.force - zero, notes=notes),
-        replace(look, zero=look.zero - zero),
+        replace(look, zero=look.zero - zero, taken=zero, rest=rest),
     )
 
 

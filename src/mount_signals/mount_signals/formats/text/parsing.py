@@ -135,7 +135,7 @@ def _value(path: Path, number: int, dialect: Dialect, place: int, cell: str) -> 
     sign, other = ('point', 'comma') if dialect.decimal == '.' else ('comma', 'point')
     remedy = 'correct or remove the line'
     if not date and kind_of(cell, ',' if dialect.decimal == '.' else '.') == 'number':
-        remedy = f'is the decimal sign a {other}? State it, or correct the line'
+        remedy = f'is the decimal sign a {other}? State decimal in the mapping file, or correct the line'
     elif not date and cell.replace('.', '').replace(',', '').replace(' ', '').lstrip('+-').isdecimal():
         remedy = 'export without signs between thousands'
     expected = 'a date such as 2024-05-01 12:00:00.001' if date else f'a number with decimal {sign}'

@@ -24,11 +24,11 @@ def open_npy(path: Path, stated: Stated) -> Leaves:
     if times is None:
         found = leaves_of('', _loaded(path), notes)
         _refuse_none(path, found, notes)
-        return Leaves('NPY', 'numpy', with_dates(found), notes)
+        return Leaves(path, 'NPY', 'numpy', with_dates(found), notes)
     name = (
         path.parent.name if times.name in {time for _, time in _PAIRS} else path.name.removesuffix(_NAMED[0])
     )
-    return Leaves('NPY with times', 'numpy', _pair(name, path, times, notes), notes)
+    return Leaves(path, 'NPY with times', 'numpy', _pair(name, path, times, notes), notes)
 
 
 def open_npz(path: Path, stated: Stated) -> Leaves:
@@ -45,7 +45,7 @@ def open_npz(path: Path, stated: Stated) -> Leaves:
                 notes.append(f'{name}: objects, left out')
         found = with_dates(list(leaves_in(arrays, notes)))
     _refuse_none(path, found, notes)
-    return Leaves('NPZ', 'numpy', found, notes)
+    return Leaves(path, 'NPZ', 'numpy', found, notes)
 
 
 def is_array_folder(path: Path) -> bool:
@@ -63,7 +63,7 @@ def open_array_folder(path: Path, stated: Stated) -> Leaves:
         except SignalError as error:
             notes.append(f'left out: {error}')
     _refuse_none(path, found, notes)
-    return Leaves('folder of NPY files', 'numpy', found, notes)
+    return Leaves(path, 'folder of NPY files', 'numpy', found, notes)
 
 
 def _pairs_below(path: Path) -> Iterator[tuple[str, Path, Path]]:

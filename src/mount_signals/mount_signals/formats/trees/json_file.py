@@ -35,7 +35,7 @@ def open_json(path: Path, stated: Stated) -> Leaves:
             f'{path} holds no lists of numbers; expected are {{"t": [...], "az": [...]}}, a list of records '
             'or a list of rows'
         )
-    return Leaves('JSON', 'json', found, notes)
+    return Leaves(path, 'JSON', 'json', found, notes)
 
 
 class _NoJsonError(ValueError):

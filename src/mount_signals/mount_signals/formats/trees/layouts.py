@@ -4,6 +4,7 @@ Three such layouts are known, each with times in s by its tool's own definition:
 `Data`), Simulink's structure with time (`time` beside `signals.values`), and dSPACE's `X` beside `Y`.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -111,7 +112,7 @@ def _is_vector(array: Any) -> bool:
 
 
 def _fits(values: Any, time: Any) -> bool:
-    return int(np.prod(time.shape)) in getattr(values, 'shape', ())
+    return math.prod(time.shape) in getattr(values, 'shape', ())
 
 
 def _has_data(part: Any) -> bool:

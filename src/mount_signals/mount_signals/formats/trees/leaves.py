@@ -1,11 +1,14 @@
 """Arrays of a nested file by their paths, as columns: `imu.acc.z`, `accelerometer.2`."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mount_signals.formats.broken import reading
 from mount_signals.formats.measured import FloatArray, Heading, MeasuredColumn, TimeBase, unique
 
 _SECOND = 1_000_000_000  # ns
@@ -72,7 +75,8 @@ class Leaf:
 class Leaves:
     """Chosen columns of nested arrays; a `Content`."""
 
-    def __init__(self, kind: str, reader: str, leaves: Iterable[Leaf], notes: Iterable[str] = ()):
+    def __init__(self, path: Path, kind: str, reader: str, leaves: Iterable[Leaf], notes: Iterable[str] = ()):
+        self._path = path
         self.format = kind
         self.reader = reader
         self.notes = list(notes)
@@ -89,12 +93,13 @@ class Leaves:
         """Return the chosen columns; those with the same times share one time base."""
         times: dict[int, TimeBase] = {}
         found = []
-        for heading in chosen:
-            leaf = self._leaves[heading.number]
-            if leaf.time is not None and id(leaf.time) not in times:
-                times[id(leaf.time)] = _time_base(leaf.time, leaf.told, leaf.begin)
-            time = None if leaf.time is None else times[id(leaf.time)]
-            found.append(heading.measured(leaf.values(), time))
+        with reading(self._path, self.format):
+            for heading in chosen:
+                leaf = self._leaves[heading.number]
+                if leaf.time is not None and id(leaf.time) not in times:
+                    times[id(leaf.time)] = _time_base(leaf.time, leaf.told, leaf.begin)
+                time = None if leaf.time is None else times[id(leaf.time)]
+                found.append(heading.measured(leaf.values(), time))
         return found
 
 
@@ -104,7 +109,7 @@ def leaves_of(name: str, array: Any, notes: list[str], unit: str = '') -> list[L
     if dtype.names:
         whole = [Leaf(f'{name}.{field}'.lstrip('.'), array, field=field) for field in dtype.names]
         return [leaf for leaf in whole if _is_column(leaf.name, dtype[leaf.field], shape, notes)]
-    size = int(np.prod(shape))
+    size = math.prod(shape)
     if size <= 1:
         return []
     if not _is_column(name, dtype, shape, notes):

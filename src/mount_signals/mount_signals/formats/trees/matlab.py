@@ -33,7 +33,7 @@ def open_matlab(path: Path, stated: Stated) -> Leaves:
     plain = {name: _plain(value) for name, value in variables.items() if not _is_opaque(value)}
     found = list(leaves_in(plain, notes))
     _refuse_none(path, found, notes)
-    return Leaves('MATLAB', 'scipy', found, notes)
+    return Leaves(path, 'MATLAB', 'scipy', found, notes)
 
 
 def _is_opaque(value: Any) -> bool:
@@ -62,7 +62,7 @@ def open_hdf5(path: Path, stated: Stated) -> Leaves:
         found = list(leaves_in(tree, notes))
     _refuse_none(path, found, notes)
     matlab = any('MATLAB_class' in one.attrs for one in file.values())
-    return Leaves('MATLAB 7.3' if matlab else 'HDF5', 'h5py', found, notes)
+    return Leaves(path, 'MATLAB 7.3' if matlab else 'HDF5', 'h5py', found, notes)
 
 
 def _group(file: Any, group: Any, notes: list[str], depth: int) -> Any:

@@ -1,0 +1,133 @@
+"""A fleet from the first to the last command: the same result from a disk, from S3 and from SFTP."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from mount_cli.command import app
+from mount_replay import fleet
+from mount_replay.fleet.example.fleet import make_example
+
+# The stores are those that the tests of mount_signals fetch from.
+sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'mount_signals' / 'test'))
+
+from served_stores import Bucket, know_host, name_s3_store, s3_server, sftp_store
+
+SETTINGS = {'continuous_viscous.full_amplitude': 0.0006}
+RECORDINGS = 12
+
+
+@pytest.fixture(scope='module')
+def drives(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('fleet') / 'drives'
+    reasons = [done.reason for done in make_example(folder, RECORDINGS)]
+    assert not any(reasons)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def local(drives):
+    """Return the folder with catalogue and result of the drives on the disk, by two workers."""
+    return asked(str(drives), drives.parent, workers=2)
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    folder = tmp_path / 'home'
+    folder.mkdir()
+    monkeypatch.setenv('HOME', str(folder))
+    monkeypatch.setenv('ENGINE_MOUNT_CACHE', str(folder / 'copies'))
+    for name in ('AWS_PROFILE', 'SSH_AUTH_SOCK'):
+        monkeypatch.delenv(name, raising=False)
+    return folder
+
+
+def asked(place, folder, workers):
+    """Index and replay what lies at `place` into `folder`, which is returned."""
+    recordings = fleet.index([place], folder / 'catalogue', workers=workers)
+    result = fleet.replay([folder / 'catalogue'], SETTINGS, folder / 'result', workers=workers)
+    assert recordings.num_rows == result.num_rows
+    return folder
+
+
+def table_of(folder):
+    return (folder / 'result' / 'result.parquet').read_bytes()
+
+
+def run(*arguments):
+    ended = CliRunner().invoke(app, ['fleet', *map(str, arguments)], catch_exceptions=False)
+    assert ended.exit_code == 0, ended.output
+    return ended.output
+
+
+def test_every_recording_has_a_row_and_the_damaged_ones_a_reason(local):
+    rows = fleet.query(local / 'result', 'select * from result').to_pylist()
+    assert len({row['recording'] for row in rows}) == RECORDINGS
+    reasons = {row['recording'].partition('/')[2]: row['reason'] for row in rows}
+    assert 'is no MCAP file' in reasons['19_garbage']
+    assert 'holds no MCAP file' in reasons['19_no_data']
+    assert 'holds no air_gap' in reasons['19_foreign']
+    assert reasons['19_truncated'] == ''
+    done = [row for row in rows if not row['reason']]
+    assert any(row['setpoints_differing'] for row in done)
+    assert all(row['as_recorded'] for row in done)
+
+
+def test_one_worker_gives_the_bytes_of_two(drives, local, tmp_path):
+    assert table_of(asked(str(drives), tmp_path, workers=1)) == table_of(local)
+
+
+def test_a_store_of_objects_gives_the_bytes_of_the_disk(drives, local, tmp_path, home, monkeypatch):
+    with s3_server() as port:
+        name_s3_store(port, monkeypatch)
+        bucket = Bucket(port)
+        for file in drives.rglob('*'):
+            if file.is_file():
+                bucket.put(f'2026/{file.relative_to(drives)}', file.read_bytes())
+        folder = asked('s3://drives/2026', tmp_path, workers=2)
+        assert table_of(folder) == table_of(local)
+        worst = run('worst', folder / 'result', '--by', 'setpoint_difference_rms_a', '--count', 1)
+        assert 'engine-mount report s3://drives/2026/' in worst
+
+
+def test_an_sftp_server_gives_the_bytes_of_the_disk(drives, local, tmp_path, home):
+    served = tmp_path / 'served'
+    served.mkdir()
+    shutil.copytree(drives, served / 'drives')
+    with sftp_store(served, home) as port:
+        know_host(home, port)
+        folder = asked(f'sftp://127.0.0.1:{port}/drives', tmp_path, workers=2)
+        assert table_of(folder) == table_of(local)
+
+
+def test_the_commands_ask_and_report(local):
+    result = local / 'result'
+    sql = "select recording, setpoint_difference_rms_a as rms from result where reason = '' order by rms desc"
+    rows = json.loads(run('query', result, sql, '--json'))
+    assert run('query', result, sql, '--csv').splitlines()[0] == '"recording","rms"'
+    table = run('query', result, f'{sql} limit 1')
+    assert rows[0]['recording'] in table
+    assert table.endswith('1 row\n')
+    assert all(len(line) <= 80 for line in table.splitlines())
+
+    found = local / 'worst.json'
+    run('worst', result, '--by', 'setpoint_difference_rms_a', '--count', 2, '--json', found)
+    worst = json.loads(found.read_text())['worst']
+    assert [one['recording'] for one in worst] == [row['recording'] for row in rows[:2]]
+    assert all(Path(one['uri']).is_dir() for one in worst)
+
+    page = local / 'page.html'
+    run('report', result, '--out', page, '--count', 1)
+    text = page.read_text(encoding='utf-8')
+    assert 'is no MCAP file' in text
+    assert f'1. {worst[0]["recording"]}'.partition('/')[0] in text
+    assert 'No picture' not in text
+
+
+def test_a_wrong_column_is_refused_in_one_sentence(local):
+    ended = CliRunner().invoke(app, ['fleet', 'query', str(local / 'result'), 'select nothing from result'])
+    assert 'result has recording, mount, reason' in str(ended.exception)
