@@ -224,6 +224,13 @@ def test_pieces_of_one_recording_are_one_place_and_files_of_their_own_are_severa
     assert places([str(tmp_path / 'run')])[str(tmp_path / 'run')].fingerprint != before
 
 
+def test_a_place_is_the_same_from_wherever_it_is_named(drives, monkeypatch):
+    whole = places([str(drives)])
+    assert whole[str(drives / 'a' / 'gap')].recording == 'a/gap'
+    monkeypatch.chdir(drives)
+    assert places(['.']) == places([f'../{drives.name}/']) == places([f'file://{drives}']) == whole
+
+
 def test_a_sine_is_in_its_own_band_alone():
     time = np.arange(40_000) * 1e-3
     values = 1e-3 * np.sin(2 * np.pi * 8.0 * time) + 5e-3

@@ -1,14 +1,17 @@
 """Which of the files in a store belong together as recordings."""
 
 import hashlib
+import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 
 from mount_bags.bag.metadata import METADATA_NAME
+from mount_signals.sources.local import local_path
 from mount_signals.sources.source import Entry
 from mount_signals.sources.stores import entries
+from mount_signals.sources.uris import is_uri, scheme_of
 
 _RECORDED = re.compile(r'(?P<stem>.+?)\.(mcap|db3)(\.(zstd|lz4|zst))?')
 _PIECE = re.compile(r'(?P<name>.+)_\d+')
@@ -27,16 +30,22 @@ class Place:
 def places(uris: Iterable[str]) -> dict[str, Place]:
     """Return the recordings at or below `uris`, by URI in the order of these; raises `SourceError`."""
     found: dict[str, Place] = {}
-    for uri in uris:
-        root = uri if uri.endswith('://') else uri.rstrip('/')
+    for root in map(root_of, uris):
         for place in _places(root):
             found.setdefault(place.uri, place)
     return dict(sorted(found.items()))
 
 
+def root_of(uri: str) -> str:
+    """Return a place as a catalogue names it: on this machine its whole path, wherever it is named from."""
+    if is_uri(uri) and scheme_of(uri) != 'file':
+        return uri.rstrip('/')
+    return os.path.abspath(local_path(uri))
+
+
 def below(uri: str, roots: Iterable[str]) -> bool:
     """Return whether `uri` is one of `roots` or lies below one."""
-    return any(uri == root or uri.startswith(f'{root}/') for root in (root.rstrip('/') for root in roots))
+    return any(uri == root or uri.startswith(f'{root.rstrip("/")}/') for root in map(root_of, roots))
 
 
 def _places(root: str) -> Iterator[Place]:

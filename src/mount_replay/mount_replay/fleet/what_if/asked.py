@@ -1,20 +1,15 @@
 """Which recordings an order means: those of a catalogue, and all that lie below URIs or paths."""
 
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mount_replay.fleet.catalogue.places import places as listed
 from mount_replay.fleet.columns import TABLES
 from mount_signals.extras import required
-from mount_signals.sources.source import Entry
-from mount_signals.sources.stores import entries
 from mount_signals.sources.uris import shown
 
-_FILES = re.compile(r'\.(mcap|mcap\.zstd|db3|db3\.zstd)$')
-_PIECE = re.compile(r'_\d+(\.\w+)+$')
-_METADATA = 'metadata.yaml'
 _CATALOGUE = '.parquet'
 
 
@@ -68,30 +63,4 @@ def _of_catalogue(table: Path) -> Iterator[Asked]:
 
 
 def _below(place: str) -> Iterator[Asked]:
-    root = place.rstrip('/') or place
-    listed = list(entries(place))
-    folders: dict[str, list[Entry]] = {}
-    for entry in listed:
-        folders.setdefault(entry.uri.rpartition('/')[0], []).append(entry)
-    for folder, files in folders.items():
-        recorded = [file for file in files if _FILES.search(file.uri)]
-        if not recorded:
-            continue
-        if _is_one(files, recorded):
-            yield _asked(folder, root, recorded)
-            continue
-        for file in recorded:
-            yield _asked(file.uri, root, [file])
-
-
-def _is_one(files: Iterable[Entry], recorded: Sequence[Entry]) -> bool:
-    """Whether the files of a folder are one recording: described, or numbered pieces of one name."""
-    if any(file.uri.rpartition('/')[2] == _METADATA for file in files):
-        return True
-    names = [file.uri.rpartition('/')[2] for file in recorded]
-    return all(_PIECE.search(name) for name in names) and len({_PIECE.sub('', name) for name in names}) == 1
-
-
-def _asked(uri: str, root: str, files: Sequence[Entry]) -> Asked:
-    path = uri[len(root) :].strip('/') if uri.startswith(root) else uri
-    return Asked(uri, path or uri.rpartition('/')[2], sum(file.size for file in files))
+    return (Asked(found.uri, found.recording, found.size) for found in listed([place]).values())
