@@ -8,6 +8,7 @@ from mount_bags import BagWriter
 from mount_bags.signals.signal import SignalError
 from mount_replay.given.foreign import default_gap, foreign_input, foreign_order
 from mount_ros.messages.cdr import serialised
+from mount_signals.units.unit import UnitError
 
 TIMES = np.arange(1000) / 100.0
 MILLIMETRES = 0.8 * np.sin(2.0 * np.pi * 8.0 * TIMES) + 0.1 * np.random.default_rng(1).standard_normal(1000)
@@ -55,7 +56,7 @@ def test_a_displacement_beyond_the_range_is_refused_with_its_sample(tmp_path):
     values = np.where(np.arange(1000) == 321, 400.0, MILLIMETRES)
     with pytest.raises(SignalError, match=r'displacement at 1 kHz: sample 3210 at 3\.2100 s is .* m, beyond'):
         given(write(tmp_path, TIMES, values))
-    with pytest.raises(SignalError, match=r'is its unit another one \(--scale\)'):
+    with pytest.raises(UnitError, match='write --map displacement=x:mm'):
         given(write(tmp_path), scale=1.0)
 
 

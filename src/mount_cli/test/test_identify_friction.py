@@ -198,6 +198,13 @@ def test_mcap_is_read_as_the_csv_of_the_same_measurement_is(in_mcap, tmp_path):
         assert other.normal_force == pytest.approx(same.normal_force, abs=1e-4)
 
 
+def test_the_folder_of_a_run_is_read_as_the_recording_in_it(in_mcap, tmp_path):
+    (tmp_path / 'run').mkdir()
+    (tmp_path / 'run' / 'recording').symlink_to(in_mcap[1], target_is_directory=True)
+    whole = read_recording(tmp_path / 'run')
+    np.testing.assert_array_equal(whole.force, read_recording(in_mcap[1]).force)
+
+
 def test_channels_of_mcap_are_chosen_with_their_unit(in_mcap):
     recorded, folder = in_mcap
     read = read_recording(folder, parsed_channels(['friction_force=sim/clamp_force.wrench.force.z:lb']))
@@ -236,6 +243,13 @@ def test_the_hash_of_a_recording_is_that_of_its_data_in_order(tmp_path):
         {'file': 'b_1.mcap', 'sha256': hashlib.sha256(b'second').hexdigest()},
         {'file': 'recording', 'sha256': expected},
     ]
+
+
+def test_the_hash_of_a_folder_without_mcap_is_that_of_its_files(tmp_path):
+    for name, content in (('t.npy', b'second'), ('a/value.npy', b'first')):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    assert recording_hash(tmp_path) == hashlib.sha256(b'firstsecond').hexdigest()
 
 
 def test_parameters_need_ramp_and_sawtooth(rack, tmp_path, capsys):

@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 
 from mount_bags.run.place import open_run
+from mount_bags.run.session import session_text
 from mount_replay.fleet.runner import Done
-from mount_replay.fleet.what_if import one, run
+from mount_replay.fleet.what_if import compared, one, run
 from mount_replay.fleet.what_if.asked import AskedError, recordings_asked
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
 from mount_replay.fleet.what_if.result import ResultError
 from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
+from mount_replay.loop.recording import record_core
 from mount_replay.replay import parsed_changes
 from mount_signals.sources.source import SourceError
 
@@ -53,13 +55,25 @@ def order_of(fleet):
     return FleetOrder([str(fleet)], CHANGES)
 
 
-@pytest.mark.parametrize('name', sorted(path.name for path in REFERENCES.iterdir() if path.is_dir()))
-def test_a_recording_read_in_stretches_gives_the_figures_of_the_whole(name):
-    whole = compared_setpoints(recorded_in(open_run(REFERENCES / name)), CHANGES, 0)
-    assert whole['samples'] > 1000
-    for length in (700, 1500):
-        parts = compared_setpoints(recorded_in(open_run(REFERENCES / name)), CHANGES, length)
-        assert same(parts, whole)
+@pytest.fixture(scope='module')
+def driven(tmp_path_factory):
+    """A drive over a gap with all its traces."""
+    folder = tmp_path_factory.mktemp('driven') / 'recording'
+    parameters = {'mount_sim': {'scenario': 'motorway', 'timeline.duration': 5.0}}
+    record_core(folder, parameters, session_text({'parameters': parameters}))
+    return folder
+
+
+@pytest.mark.parametrize('length', [700, 1500])
+def test_a_recording_read_in_stretches_gives_the_figures_of_the_whole(driven, length, monkeypatch):
+    added = []
+    add = compared._add
+    monkeypatch.setattr(compared, '_add', lambda *given: (added.append(given), add(*given)))
+    whole = compared_setpoints(recorded_in(open_run(driven)), CHANGES, 0)
+    assert len(added) == whole['activations'] == 1
+    parts = compared_setpoints(recorded_in(open_run(driven)), CHANGES, length)
+    assert len(added) > 3
+    assert same(parts, whole)
 
 
 def test_the_changed_level_shows_in_the_row_and_the_replay_as_recorded_is_what_was_recorded():
@@ -126,6 +140,7 @@ KILLED = """
 import os, signal, sys
 from mount_replay.fleet.runner import Done
 from mount_replay.fleet.what_if import run
+from mount_replay.loop.recording import record_core
 from mount_replay.replay import parsed_changes
 
 run._WRITTEN_AFTER = 0.0
@@ -160,6 +175,7 @@ WITH_DASK = """
 import os, signal, sys
 from pathlib import Path
 from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
+from mount_replay.loop.recording import record_core
 from mount_replay.replay import parsed_changes
 
 def children(process):

@@ -105,8 +105,18 @@ def test_a_recording_without_its_end_is_given_whole(s3, reference, kept):
 def test_an_outline_reads_the_session_behind_the_beginning_of_a_long_file(s3, reference, monkeypatch):
     monkeypatch.setattr(outlines, '_TAIL', 512)  # the summary is longer
     s3.put_folder(reference, 'gap')
+    before = traffic().bytes
     with outline('s3://drives/gap') as folder:
         assert of_a_list(folder) == of_a_list(reference)
+    assert traffic().bytes - before < 0.6 * (reference / 'gap_0.mcap').stat().st_size
+
+
+def test_a_recording_with_a_damaged_summary_is_given_whole(s3, reference):
+    data = bytearray((reference / 'gap_0.mcap').read_bytes())
+    data[-1000] ^= 1
+    s3.put('bad/bad_0.mcap', bytes(data))
+    with outline('s3://drives/bad') as folder:
+        assert (folder / 'bad_0.mcap').read_bytes() == data
 
 
 def test_a_server_that_knows_no_stretches_serves_all_the_same(tmp_path, reference):

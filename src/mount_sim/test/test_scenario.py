@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mount_bags.signals.signal import SignalError
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.excitation import Seat
 from mount_sim.excitation.scenario import STEP_TIME, build_excitation
@@ -181,3 +182,33 @@ def test_what_a_recording_cannot_give_is_refused(parameters, recording):
     )
     too_long = parameters(scenario='recorded', recorded__file=recording, timeline__duration=10.5)
     assert 'duration (10.5 s) is longer than the recording z.0 (9.995 s)' in _refusal(too_long)
+
+
+def road_file(folder, heights, period=1e-3):
+    np.save(folder / 'road_value.npy', heights)
+    np.save(folder / 'road_t.npy', period * np.arange(heights.size))
+    return str(folder / 'road_value.npy')
+
+
+def test_a_measured_road_goes_under_the_wheel_as_it_is(parameters, tmp_path):
+    times = 1e-3 * np.arange(3001)
+    file = road_file(tmp_path, 0.01 * np.sin(2 * np.pi * 5.0 * times))
+    excitation = build_excitation(parameters(scenario='road', road__file=file))
+    assert excitation.seat is Seat.VEHICLE
+    assert excitation.duration == pytest.approx(3.0, abs=0.001)
+    steps = np.arange(len(excitation.values)) * STEP_TIME
+    middle = slice(2000, -2000)
+    wanted = 0.01 * np.sin(2 * np.pi * 5.0 * steps)
+    np.testing.assert_allclose(excitation.values[:][middle], wanted[middle], atol=5e-6)
+    cut = build_excitation(parameters(scenario='road', road__file=file, timeline__duration=1.0))
+    assert cut.duration == pytest.approx(1.0)
+
+
+def test_a_measured_road_that_is_missing_too_short_or_in_another_unit_is_refused(parameters, tmp_path):
+    assert 'scenario road needs a measured road' in _refusal(parameters(scenario='road'))
+    file = road_file(tmp_path, 0.01 * np.sin(0.1 * np.arange(3001)))
+    long = parameters(scenario='road', road__file=file, timeline__duration=9.0)
+    assert 'is longer than the road road.0 (3.000 s)' in _refusal(long)
+    file = road_file(tmp_path, 10.0 * np.sin(0.1 * np.arange(3001)))
+    with pytest.raises(SignalError, match='is meant in m, without hills'):
+        build_excitation(parameters(scenario='road', road__file=file))

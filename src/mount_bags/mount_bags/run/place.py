@@ -30,9 +30,13 @@ def recording_place(path: Path) -> Path:
 
 
 def recording_hash(path: Path) -> str:
-    """Return the SHA-256 of a file; of a folder that of its MCAP files, in the order of their names."""
+    """Return the SHA-256 of a file; of a folder that of its MCAP files, in the order of their names.
+
+    Of a folder without any it is that of all its files.
+    """
     digest = hashlib.sha256()
-    parts = sorted(part for part in path.rglob('*.mcap*') if part.is_file()) if path.is_dir() else [path]
+    files = [part for part in path.rglob('*') if part.is_file()] if path.is_dir() else [path]
+    parts = sorted(part for part in files if part.match('*.mcap*')) or sorted(files)
     for part in parts:
         with part.open('rb') as stream:
             while block := stream.read(1 << 20):

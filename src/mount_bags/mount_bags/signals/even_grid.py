@@ -119,7 +119,8 @@ def _refuse_time_that_goes_back(signal: Signal) -> None:
 
 def _once(signal: Signal) -> NDArray[np.bool_]:
     """Return which samples to keep: once those that stand twice, if without the copies no stamps crowd."""
-    again = np.concatenate([[False], (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)])
+    times, values = signal.times, signal.values
+    again = np.concatenate([[False], (times[1:] == times[:-1]) & (values[1:] == values[:-1])])
     if again.any() and again.sum() < again.size - 2 and not _crowd(np.sort(signal.times[~again])).any():
         return ~again
     return np.ones(again.size, bool)

@@ -1,11 +1,12 @@
 """`engine-mount ls` and `info`: which recordings there are, and what one of them is."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
-from mount_cli.commands.options import JsonFile, RecordingPlace
+from mount_cli.commands.options import Dbc, JsonFile, RecordingPlace
 from mount_cli.fetching import local, named
 from mount_cli.terminal import note, terminal
 
@@ -35,6 +36,8 @@ Examples:
 `engine-mount info bags/first`
 
 `engine-mount info RECORDING --json info.json`
+
+`engine-mount info MEASURED.mf4` - of a file of others: its columns with units, rates and ranges
 
 Parameters that a run sets by itself (bus, folder, lock-step) are left out. Whether a loss is an error is told
 by the exit code of `engine-mount audit`.
@@ -95,20 +98,51 @@ def _print_listed(found: 'list[Listed]', console: Console) -> None:
 
 def info(
     recording: RecordingPlace,
+    dbc: Dbc = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Tell what a recording is and holds: session, versions, parameters, topics, gap, losses."""
+    """Tell what a recording is and holds: session, versions, parameters, topics, gap, losses.
+
+    Of a file of others, its columns.
+    """
     from mount_bags.run.place import open_run
     from mount_report.json_file import write_json
     from mount_report.recording_facts import recording_facts
+    from mount_signals.formats.reading import is_foreign
 
     console = terminal()
     place = local(recording, console)
+    if is_foreign(place):
+        _info_of_columns(place, dbc, console, json_file)
+        return
     with console.status('reading'):
         facts = recording_facts(open_run(place))
     _print_facts(facts, console)
     if json_file is not None:
         write_json(facts.as_json(), json_file)
+
+
+def _info_of_columns(place: Path, dbc: Path | None, console: Console, json_file: Path | None) -> None:
+    from dataclasses import asdict
+
+    from mount_cli.screen import TerminalScreen
+    from mount_report.json_file import write_json
+    from mount_signals.formats.content import Stated
+    from mount_signals.formats.described import columns_table, described
+    from mount_signals.formats.reading import read
+
+    with console.status('reading'):
+        measured = read(place, None, Stated(dbc=dbc))
+    facts = described(measured)
+    told = measured.provenance
+    console.print(f'{"file":<20}{told.uri}, {told.format}, read by {told.reader}', soft_wrap=True)
+    console.print(f'{"SHA-256":<20}{told.sha256}', soft_wrap=True)
+    TerminalScreen(console).table(columns_table(facts))
+    for sentence in measured.notes:
+        note(console, sentence)
+    if json_file is not None:
+        columns = [one.as_json() for one in facts]
+        write_json({'provenance': asdict(told), 'columns': columns, 'notes': measured.notes}, json_file)
 
 
 def _print_facts(facts: 'RecordingFacts', console: Console) -> None:

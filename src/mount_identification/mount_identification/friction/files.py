@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from mount_bags.run.place import open_run
-from mount_bags.signals.loading import is_recording
 from mount_identification.friction.channels import DESIRED, NEEDED, Channel, columns_in_si
 from mount_identification.friction.damper_file import is_damper, read_damper
 from mount_identification.friction.recording import (
@@ -16,7 +15,7 @@ from mount_identification.friction.recording import (
     IdentificationError,
     checked_recording,
 )
-from mount_identification.rack.measured_table import MeasuredTable
+from mount_identification.rack.measured_table import MeasuredTable, in_topics
 
 TOPICS = {
     'displacement': ('displacement', 'mount'),
@@ -37,7 +36,7 @@ def read_recording(
         raise IdentificationError(
             f'{path} does not exist; give a file of measured columns, or a recording or its folder'
         )
-    if is_recording(path) or path.suffix == '.mcap':
+    if in_topics(path):
         return _mcap(path, chosen)
     if path.suffix.lower() == '.json' and is_damper(path):
         return read_damper(path, chosen, clamp)

@@ -4,11 +4,18 @@ from pathlib import Path
 
 import numpy as np
 
+from mount_bags.run.place import recording_place
+from mount_bags.signals.loading import is_recording
 from mount_bags.signals.signal import SignalError
 from mount_signals.formats.measured import FloatArray, Measured, MeasuredColumn, found
 from mount_signals.formats.reading import read
 
 _TIME_NAMES = ('t', 'time', 'timestamp', 'time_s', 't_s', 'seconds')
+
+
+def in_topics(path: Path) -> bool:
+    """Return whether `path` is a recording in topics, one of its files, or the folder of a run with one."""
+    return is_recording(recording_place(path))
 
 
 class MeasuredTable:

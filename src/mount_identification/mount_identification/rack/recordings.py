@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_hash
-from mount_bags.signals.loading import is_recording
 from mount_identification.actuator.points import gap_groups
 from mount_identification.coil.gap_calibration import RippleRecording
 from mount_identification.rack.columns import (
@@ -26,6 +25,7 @@ from mount_identification.rack.columns import (
     check_alive,
     read_columns,
 )
+from mount_identification.rack.measured_table import in_topics
 from mount_models.coil.gap import measured_inductance
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
 from mount_signals.units.mapping import ColumnChoice
@@ -130,7 +130,7 @@ def _checked_files(files: Sequence[Path]) -> Sequence[Path]:
 
 def _is_table(file: Path) -> bool:
     """Return whether a file holds columns, and is no recording of ours in topics."""
-    return not (is_recording(file) or '.mcap' in file.name)
+    return not in_topics(file)
 
 
 def _gap_of(file: Path, given: Mapping[Path, float]) -> float:

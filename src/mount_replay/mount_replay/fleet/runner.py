@@ -1,6 +1,7 @@
 """Many independent tasks on Dask's `distributed`, whose results come as they are done."""
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -108,12 +109,14 @@ class _Stream(Generic[Item, Result]):
         from distributed import KilledWorker
 
         for future, result in self._arriving.next_batch():
-            if future.status not in ('finished', 'error'):
-                raise ConnectionError(f'the task is {future.status}')
+            is_lost = isinstance(result, CancelledError)
+            if is_lost:
+                self._client.nthreads()  # raises where it was the scheduler that was lost
             place = self._under_way.pop(future)
-            if future.status == 'finished':
+            error = result[1] if future.status == 'error' and not is_lost else None
+            if error is None and not is_lost:
                 yield Done(place, result)
-            elif not isinstance(error := result[1], KilledWorker):
+            elif error is not None and not isinstance(error, KilledWorker):
                 yield Done(place, None, f'{type(error).__name__}: {error}', error)
             else:
                 self._losses[place] = self._losses.get(place, 0) + 1

@@ -99,7 +99,7 @@ class Stretches:
         divided, due = False, length
         names = {self._recording.resolve(name): name for name in waiting}
         wanted = {topic.name: columns for topic, columns in self._columns().items()}
-        for part in column_parts(self._recording, wanted, _READ_AT_ONCE):
+        for part in column_parts(self._recording, wanted, min(length or _READ_AT_ONCE, _READ_AT_ONCE)):
             topic = names[part.topic]
             if topic == DISPLACEMENT.name:
                 self._take_first(part, displacement)

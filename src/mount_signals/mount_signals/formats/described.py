@@ -1,9 +1,11 @@
 """What a file of measured signals holds, column by column, for people who choose one."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
+from mount_bags.run.screen import Table
 from mount_signals.formats.measured import FloatArray, Measured, MeasuredColumn
 
 
@@ -25,10 +27,32 @@ class ColumnFacts:
     rate: float
     span: float
 
+    def as_json(self) -> dict[str, Any]:
+        """Return all of it, null for what is not known."""
+        return {name: None if value != value else value for name, value in asdict(self).items()}
+
 
 def described(measured: Measured) -> list[ColumnFacts]:
     """Return the facts of every column that was read."""
     return [_facts(column) for column in measured.columns.values()]
+
+
+def columns_table(facts: list[ColumnFacts]) -> Table:
+    """Return the facts as a table for people."""
+    rows = [
+        (
+            one.name,
+            one.unit,
+            str(one.samples),
+            '' if np.isnan(one.rate) else f'{one.rate:.6g} Hz',
+            '' if np.isnan(one.span) else f'{one.span:.6g} s',
+            f'{one.least:.4g} .. {one.greatest:.4g}',
+            f'{one.mean:.4g}',
+        )
+        for one in facts
+    ]
+    heads = ('column', 'unit', 'samples', 'rate', 'span', 'range', 'mean')
+    return Table('Columns', 'llrrrrr', rows, heads)
 
 
 def _facts(column: MeasuredColumn) -> ColumnFacts:

@@ -54,6 +54,15 @@ def headings(uri: str | Path, stated: Stated | None = None) -> tuple[Heading, ..
         return tuple(_opened(path, stated or Stated()).headings)
 
 
+def is_foreign(path: Path) -> bool:
+    """Return whether `path` is a file, or a folder of NPY files, rather than a recording of ROS 2."""
+    from mount_signals.formats.trees import arrays
+
+    if path.is_dir():
+        return not is_recording(path) and not (path / 'recording').exists() and arrays.is_array_folder(path)
+    return path.is_file() and not is_recording(path)
+
+
 def _opened(path: Path, stated: Stated) -> Content:
     try:
         return _opener(path)(path, stated)

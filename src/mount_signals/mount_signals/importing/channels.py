@@ -43,7 +43,8 @@ def channels_of(
         if name == DISPLACEMENT:
             continue
         stamps, values = _acceleration(signal, notes) if name == 'acceleration' else _as_sampled(signal)
-        channels.append(Channel(recorded_as(quantities[name]), quantities[name].unit.symbol, stamps, values))
+        shared = next((one.stamps for one in channels if np.array_equal(one.stamps, stamps)), stamps)
+        channels.append(Channel(recorded_as(quantities[name]), quantities[name].unit.symbol, shared, values))
     return channels, notes
 
 

@@ -60,9 +60,10 @@ def import_recording(order: ImportOrder, progress: Progress = lambda share, what
     files = read_files(order.files, order.mapping, order.stated)
     signals, notes = joined([(one.name, one.signals) for one in files])
     notes = [note for one in files for note in one.notes] + notes
+    imported = Imported(notes=[*notes, *_notes_of(signals)])
     parts, cuts = pieces(within(signals, order.first, order.last))
     parts, shifted = _with_room_before(parts)
-    imported = Imported(notes=[*notes, *_notes_of(signals), *cuts, *shifted])
+    imported.notes += [*cuts, *shifted]
     quantities = {name: quantity for one in files for name, quantity in one.quantities.items()}
     written = []
     for part in parts:

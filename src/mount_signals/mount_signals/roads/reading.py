@@ -14,6 +14,7 @@ from mount_signals.roads.iso8608 import unevenness
 from mount_signals.roads.plausibility import check_displacement, check_heights
 from mount_signals.roads.profile import FloatArray, ProfileError, RoadProfile
 from mount_signals.roads.table import heights_of
+from mount_signals.sources.stores import local_copy
 
 _CRG = '.crg'
 
@@ -64,14 +65,13 @@ def checked_profile(
 
 
 def _of_crg(uri: str, lateral: float) -> RoadProfile:
-    path = Path(uri)
-    content = _content(path)
+    folder, slash, name = uri.rpartition('/')
+    content = _content(uri)
 
     def beside(reference: str) -> tuple[str, bytes]:
-        inner = path.parent / reference
-        return inner.name, _content(inner)
+        return reference.rpartition('/')[2], _content(f'{folder}{slash}{reference}')
 
-    first, increment, height, notes = crg.read_track(path.name, content, lateral, beside)
+    first, increment, height, notes = crg.read_track(name, content, lateral, beside)
     provenance = Provenance(
         uri, hashlib.sha256(content).hexdigest(), len(content), 'OpenCRG', 'mount_signals'
     )
@@ -79,8 +79,9 @@ def _of_crg(uri: str, lateral: float) -> RoadProfile:
     return checked_profile(along, height, provenance, notes)
 
 
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise ProfileError(f'{path} cannot be read: {error.strerror}') from None
+def _content(uri: str) -> bytes:
+    with local_copy(uri) as path:
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            raise ProfileError(f'{uri} cannot be read: {error.strerror}') from None

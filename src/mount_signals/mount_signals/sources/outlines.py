@@ -130,11 +130,11 @@ def _needed(summary: Summary) -> Stretches:
         number for number, channel in summary.channels.items() if channel.topic.split('/')[-1] == _SESSION
     }
     needed, position = [], 0
-    for chunk in sorted(summary.chunks, key=lambda chunk: chunk.chunk_start_offset):
-        needed.append((position, chunk.chunk_start_offset))
-        position = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
-        if sessions & set(chunk.message_index_offsets):
-            needed.append((chunk.chunk_start_offset, position))
+    for chunk in sorted(summary.chunks, key=lambda chunk: chunk.position):
+        needed.append((position, chunk.position))
+        position = chunk.position + chunk.length + chunk.index_length
+        if sessions & chunk.channels:
+            needed.append((chunk.position, position))
     return [*needed, (position, summary.begin)]
 
 
