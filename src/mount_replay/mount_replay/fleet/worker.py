@@ -14,7 +14,7 @@ class Process(Nanny):
 
     async def kill(self, timeout: float = _LEAVE, reason: str = 'nanny-kill') -> None:
         """End the process, after `timeout` (s, at most `_LEAVE`) by SIGKILL."""
-        # SIGKILL was sent by then: on a busy machine the process is gone later, which is no failure of the run
+        # SIGKILL was sent by then: on a busy machine the process is gone later, and the run has not failed
         with contextlib.suppress(TimeoutError):
             await super().kill(timeout=min(timeout, _LEAVE), reason=reason)
 
