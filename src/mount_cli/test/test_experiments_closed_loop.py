@@ -323,7 +323,7 @@ def test_a_claim_holds_where_it_came_out_in_all_combinations(share, holds):
 
 def test_closed_loop_experiments_take_the_nodes_parameters_and_the_graph():
     closed = {name for name in NAMES if experiment_named(name).closed_loop}
-    assert closed == {'bench', 'sweep', 'motorway_gap', 'recorded_drive'}
+    assert closed == {'bench', 'sweep', 'motorway_gap', 'measured_road', 'recorded_drive'}
 
 
 def test_an_experiments_own_page_goes_beside_the_page(tmp_path):

@@ -59,7 +59,7 @@ def test_nothing_that_is_printed_is_markup(capsys):
 
 def test_only_one_file_decides_how_text_is_printed():
     """A console or bar made elsewhere would take brackets for markup again."""
-    ways = ('Console(', ' Progress(', 'from_markup', '[yellow]', '[red]', '[bold]', 'rprint')
+    ways = ('Console(', ' Progress(', 'from_markup', '[yellow]', '[red]', '[bold]', ' rprint')
     found = {
         f'{file.relative_to(SOURCES)}: {way}'
         for file in SOURCES.glob('*/mount_*/**/*.py')
@@ -79,6 +79,11 @@ REFUSED = {
     'compare': (MISSING, MISSING),
     'cut': (MISSING, '--from', '1s', '--to', '2s', '--out', MISSING),
     'drive': ('--core', '--scenario', 'recorded', '--file', MISSING),
+    'fleet index': (MISSING, '--out', 'made'),
+    'fleet query': (MISSING, 'select 1'),
+    'fleet replay': (MISSING, '--set', 'continuous_viscous.damping_coefficient=1000', '--out', 'made'),
+    'fleet report': (MISSING,),
+    'fleet worst': (MISSING, '--by', 'duration_s'),
     'identify drift': (MISSING, MISSING),
     'import': (MISSING, '--out', 'made'),
     'info': (MISSING,),
@@ -88,6 +93,8 @@ REFUSED = {
     'recover': (MISSING,),
     'replay': (MISSING,),
     'report': (MISSING,),
+    'road invert': (MISSING, '--column', 'az:m/s^2', '--speed', '20', '--out', 'made.csv'),
+    'road show': (MISSING,),
     'view': (MISSING,),
 }
 WITHOUT_A_FILE = {
@@ -95,6 +102,7 @@ WITHOUT_A_FILE = {
     'prepare': (),
     'calibrate rack': (),
     'experiment': ('[/x]',),
+    'fleet example': (),
     'record': ('--split', '[/x]'),
     'faults': ('--only', '[/x]'),
     'status': (),

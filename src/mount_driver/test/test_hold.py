@@ -110,7 +110,7 @@ def test_a_coil_that_does_not_follow_is_switched_off_in_time_and_stays_so(car):
         Setpoint(0.0, car.on_bus().answered_counter, False)
     }
     assert car.exchange.link.last_refusal is Refusal.SWITCHED_OFF
-    told = r'coil current \(3\.000 A\) must lie within .* it has not for 20 ms in all: check coil'
+    told = r'coil current \(3\.000 A\) must lie within .* it has not for 20 ms in all: check supply'
     assert re.match(told, car.exchange.link.fault)
 
 

@@ -221,7 +221,8 @@ def test_a_disk_that_becomes_full_leaves_no_half_file(web, copies, monkeypatch):
     plain, numbers = fetching.write_whole, count()
 
     def write(handle, data, place):
-        if next(numbers) == 3:
+        if next(numbers) == 0:
+            plain(handle, data[: len(data) // 2], place)
             raise OSError(errno.ENOSPC, 'No space left on device')
         plain(handle, data, place)
 

@@ -61,7 +61,7 @@ def replay(
 ) -> None:
     """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
     from mount_cli.screen import TerminalScreen
-    from mount_replay.fleet.what_if.run import FleetOrder, Progress, replay_fleet
+    from mount_replay.fleet.what_if.run import FleetOrder, Advance, replay_fleet
     from mount_report.json_file import write_json
 
     changes = _changes([*(settings or []), *([f'policy={policy}'] if policy else [])])
@@ -71,7 +71,7 @@ def replay(
     order = FleetOrder(places, changes, closed_loop)
     with TerminalScreen(console).bar('replaying') as show:
 
-        def told(progress: Progress) -> None:
+        def told(progress: Advance) -> None:
             show(progress.done / progress.of, detail=_progress_text(progress))
 
         outcome = replay_fleet(order, out, scheduler=scheduler, workers=workers, told=told)

@@ -48,7 +48,7 @@ class FleetOrder:
 
 
 @dataclass(frozen=True)
-class Progress:
+class Advance:
     """How far an order is: recordings done of how many, their rate (1/s), and the time left (s) by it."""
 
     done: int
@@ -99,7 +99,7 @@ def replay_fleet(
     *,
     scheduler: str = LOCAL,
     workers: int = 0,
-    told: Callable[[Progress], None] = lambda progress: None,
+    told: Callable[[Advance], None] = lambda progress: None,
 ) -> FleetOutcome:
     """Replay all recordings of an order into the folder `out`, or those that an earlier run left.
 
@@ -137,7 +137,7 @@ class _Run:
         order: FleetOrder,
         result: Result,
         left: Sequence[Asked],
-        told: Callable[[Progress], None],
+        told: Callable[[Advance], None],
         *,
         before: int,
         of: int,
@@ -165,7 +165,7 @@ class _Run:
                     self._write()
                     written = now
                 self._told(
-                    Progress(self._before + count, self._of, self._failed, count / max(now - begin, 1e-9))
+                    Advance(self._before + count, self._of, self._failed, count / max(now - begin, 1e-9))
                 )
         finally:
             self._write()
