@@ -61,7 +61,7 @@ def replay(
 ) -> None:
     """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
     from mount_cli.screen import TerminalScreen
-    from mount_replay.fleet.what_if.run import FleetOrder, Advance, replay_fleet
+    from mount_replay.fleet.what_if.run import Advance, FleetOrder, replay_fleet
     from mount_report.json_file import write_json
 
     changes = _changes([*(settings or []), *([f'policy={policy}'] if policy else [])])
