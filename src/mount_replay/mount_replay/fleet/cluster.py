@@ -5,6 +5,7 @@ import logging
 import os
 import signal
 import tempfile
+import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LOCAL = 'local'
+_CLOSE = 10.0  # s, chosen: it takes 0.1 to 2 s
 _CONNECT = 10.0  # s, chosen: for an answer of the scheduler
 _THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS')
 _LOGGERS = ('distributed', 'distributed.client', 'tornado', 'tornado.application', 'asyncio')
@@ -31,14 +33,14 @@ def connected(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator
     with _quiet():
         if scheduler == LOCAL:
             count = min(workers or len(os.sched_getaffinity(0)), tasks)
-            with _processes(count, memory) as cluster, _client(cluster) as client:
+            with _processes(count, memory) as cluster, _ended(_client(cluster)) as client:
                 yield client
             return
         try:
             context = _client(scheduler)
         except (OSError, TimeoutError, ValueError) as error:
             raise SchedulerLostError(f'{scheduler}: no Dask scheduler answers there ({error})') from None
-        with context as client:
+        with _ended(context) as client:
             yield client
 
 
@@ -77,9 +79,28 @@ def _processes(count: int, memory: int) -> Iterator[Any]:
             )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        with cluster:
+        with _ended(cluster):
             cluster.scale(count)
             yield cluster
+
+
+@contextlib.contextmanager
+def _ended(opened: Any) -> Iterator[Any]:
+    """Yield what has a `close`, and close it within `_CLOSE` s; what is left then ends with this process.
+
+    After an interrupt amid Dask's own work it was seen to wait for ever.
+    """
+
+    def close() -> None:
+        with contextlib.suppress(Exception):
+            opened.close()
+
+    try:
+        yield opened
+    finally:
+        closing = threading.Thread(target=close, daemon=True)
+        closing.start()
+        closing.join(_CLOSE)
 
 
 def _configuration(scratch: str) -> dict[str, Any]:
