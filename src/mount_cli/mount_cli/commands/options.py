@@ -70,3 +70,7 @@ Dbc = Annotated[
     Path | None,
     typer.Option('--dbc', metavar='FILE', help='CAN log: the database by which its frames are decoded'),
 ]
+Scheduler = Annotated[
+    str, typer.Option(metavar='local|ADDRESS', help='local, or tcp://HOST:PORT of a Dask cluster')
+]
+Workers = Annotated[int, typer.Option(min=0, metavar='NUMBER', help='local: processes; 0: one on each core')]

@@ -16,7 +16,8 @@ from mount_cli.commands.options import (
     TimeColumn,
     recording_argument,
 )
-from mount_cli.completion.values import listed, named, setting
+from mount_cli.commands.other_than_recorded import OtherThanRecorded, changes_of
+from mount_cli.completion.values import listed, named
 from mount_cli.fetching import local
 from mount_cli.terminal import terminal
 
@@ -53,15 +54,7 @@ def replay(
     live: Annotated[
         bool, typer.Option('--live', help='publish the recorded topics by the wall clock, to look at')
     ] = False,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            '--set',
-            metavar='[NODE.]NAME=VALUE',
-            help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
-            autocompletion=setting('mount_control', 'mount_init'),
-        ),
-    ] = None,
+    settings: OtherThanRecorded = None,
     table: Annotated[
         str, typer.Option(help='current-force table of another RECORDING, or "default": calculated')
     ] = '',
@@ -123,7 +116,7 @@ def replay(
     if core + lockstep + live > 1:
         raise typer.BadParameter('choose one of --core, --lockstep and --live')
     console = terminal()
-    changes = _changes(settings or [])
+    changes = changes_of(settings or [])
     if live:
         from mount_cli.screen import TerminalScreen
         from mount_replay.live.live import LiveOrder, play_live
@@ -184,16 +177,3 @@ def _replay(
     console.print(f'recording  {outcome.folder.recording}', soft_wrap=True)
     if not outcome.held:
         raise typer.Exit(1)
-
-
-def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
-    from mount_bringup.settings import SettingError, settings_of_options
-    from mount_replay.replay import parsed_changes
-
-    try:
-        given = settings_of_options(settings)
-    except SettingError as error:
-        raise typer.BadParameter(str(error)) from None
-    return parsed_changes(
-        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
-    )

@@ -8,13 +8,13 @@ from mount_experiments.harness.closed_loop import settings_of_run
 from mount_experiments.harness.contract import (
     Experiment,
     ExperimentError,
-    Holds,
     Order,
     Outcome,
     Progress,
     Statement,
     parameters_of,
 )
+from mount_experiments.harness.judgement import holds_if_lower
 from mount_experiments.harness.number_list import numbers_of
 from mount_experiments.measured_road import REFERENCE, TITLE
 from mount_experiments.measured_road.runs import BANDS, RoadJob, run_road_job
@@ -29,7 +29,6 @@ from mount_signals.roads.speed import FASTEST, SLOWEST, speed_of
 NAME = 'measured_road'
 HYDRO, OFF = 'hydromount', 'no current'
 COMPARED = (*POLICIES, OFF, HYDRO)
-_EVEN = 0.02  # chosen: two rms count as even within so much of each other
 _ENGINE = 1  # of `BANDS`
 
 
@@ -150,10 +149,13 @@ def _statement(figures: dict[str, Any], paper: str, what: str, value: Any) -> St
         for speed, runs in figures['runs'].items()
         for who in POLICIES
     }
-    lower = [ratio < 1.0 - _EVEN for ratio in ratios.values()]
     told = ', '.join(f'{name} {ratio:.2f}' for name, ratio in ratios.items())
-    holds = Holds.YES if all(lower) else Holds.PARTLY if any(lower) else Holds.NO
-    return Statement(REFERENCE, paper, f'{what}, over that of the hydromount: {told}', holds)
+    return Statement(
+        REFERENCE,
+        paper,
+        f'{what}, over that of the hydromount: {told}',
+        holds_if_lower(list(ratios.values())),
+    )
 
 
 EXPERIMENT = Experiment(

@@ -15,6 +15,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
+from mount_experiments.harness.judgement import holds_if
 from mount_experiments.harness.number_list import numbers_of
 from mount_experiments.motorway_gap import REFERENCE, TITLE
 from mount_experiments.motorway_gap.evaluation import (
@@ -127,7 +128,7 @@ def _on_switching_on(figures: dict[str, Any]) -> Statement:
         f'From the first sample above {1e3 * figures["switch_on_level_m"]:g} mm to damping on, by depth '
         f'of the gap, {told}. One period is {1e3 * figures["period_s"]:.0f} ms; the rest is the band-pass. '
         f'Counted as one period from {1e3 * _DELAY[0]:.0f} to {1e3 * _DELAY[1]:.0f} ms (chosen).',
-        _verdict(inside),
+        holds_if(inside),
     )
 
 
@@ -139,7 +140,7 @@ def _on_effect(figures: dict[str, Any]) -> Statement:
         f'Rms of the displacement from {WINDOW[0]:g} to {WINDOW[1]:g} s behind that moment over that '
         f'of the same mount without current, by depth of the gap, {told}; counted as significant below '
         f'{_CLEAR:g} (chosen). The first peak comes before damping and is the same.',
-        _verdict([share < _CLEAR for share in known]),
+        holds_if([share < _CLEAR for share in known]),
     )
 
 
@@ -162,7 +163,7 @@ def _on_switching_off(figures: dict[str, Any]) -> Statement:
         f'the gap: of the band-passed displacement, which the control compares, {_delays(compared)}; of the '
         f'measured one, which the picture shows, {_delays(shown)}.{lasting} Counted as one period '
         f'({1e3 * period:.0f} ms) within {1e3 * _OFF_TOLERANCE:.0f} ms (chosen).',
-        _verdict(answers),
+        holds_if(answers),
     )
 
 
@@ -173,7 +174,7 @@ def _delays(delays: dict[str, float | None]) -> str:
 def _on_hydro(figures: dict[str, Any]) -> Statement:
     known, told = _shares(figures, HYDRO)
     peaks = {gap: found['peak_m'] for gap, found in figures['gaps'].items() if found['peak_m']}
-    clear, less = _verdict([share < _CLEAR for share in known]), any(share < 1.0 for share in known)
+    clear, less = holds_if([share < _CLEAR for share in known]), any(share < 1.0 for share in known)
     first = ', '.join(f'{gap}: {p[FRICTION] / p[HYDRO]:.2f}' for gap, p in peaks.items())
     return Statement(
         'Sec. 7',
@@ -193,12 +194,6 @@ def _shares(figures: dict[str, Any], other: str) -> tuple[list[float], str]:
     }
     told = ', '.join(f'{gap}: {_number(share)}' for gap, share in shares.items())
     return [share for share in shares.values() if share is not None], told
-
-
-def _verdict(answers: list[bool]) -> Holds:
-    if not answers:
-        return Holds.NOT_COMPARABLE
-    return Holds.YES if all(answers) else Holds.PARTLY if any(answers) else Holds.NO
 
 
 def _milliseconds(seconds: float | None) -> str:

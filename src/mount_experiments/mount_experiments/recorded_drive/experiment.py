@@ -10,13 +10,13 @@ from mount_experiments.harness.closed_loop import PAPER, driven, mode_of
 from mount_experiments.harness.contract import (
     Experiment,
     ExperimentError,
-    Holds,
     Order,
     Outcome,
     Progress,
     Statement,
     parameters_of,
 )
+from mount_experiments.harness.judgement import holds_if_lower
 from mount_experiments.recorded_drive import REFERENCE, TITLE
 from mount_experiments.recorded_drive.evaluation import (
     BANDS,
@@ -40,7 +40,6 @@ from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario, r
 
 NAME = 'recorded_drive'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', ELASTOMER: 'elastomer'}
-_EVEN = 0.02  # chosen: two rms count as even within so much of each other
 
 
 class RecordedDriveParameters(NamedTuple):
@@ -179,7 +178,7 @@ def _on_isolation(figures: dict[str, Any]) -> Statement:
         f'Away from the moments of damping, rms over that of the hydromount: force on the chassis '
         f'{_by_band(figures, force)}; displacement {_by_band(figures, displacement)}. Holds if force and '
         'displacement are lower from 5 Hz on; the chassis moves as recorded whatever the force.',
-        _lower([*force[1:], *displacement[1:]]),
+        holds_if_lower([*force[1:], *displacement[1:]]),
     )
 
 
@@ -192,7 +191,7 @@ def _on_displacement(figures: dict[str, Any]) -> Statement:
         f'Damping was on {figures["times_on"]} times, {100 * figures["damping_active_share"]:.1f} % of the '
         f'drive. At these moments, rms over that of the hydromount: {_by_band(figures, hydro)}; over that of '
         f'the elastomer alone: {_by_band(figures, soft)}. Holds if lower than the hydromount, 5 to 12 Hz.',
-        _lower(hydro[1:2]),
+        holds_if_lower(hydro[1:2]),
     )
 
 
@@ -203,13 +202,6 @@ def _by_band(figures: dict[str, Any], values: list[float]) -> str:
         f'{value:.2f} ({low:g} to {high:g} Hz)'
         for (low, high), value in zip(figures['bands_hz'], values, strict=True)
     )
-
-
-def _lower(values: list[float]) -> Holds:
-    if not values:
-        return Holds.NOT_COMPARABLE
-    lower = [value < 1.0 - _EVEN for value in values]
-    return Holds.YES if all(lower) else Holds.PARTLY if any(lower) else Holds.NO
 
 
 EXPERIMENT = Experiment(

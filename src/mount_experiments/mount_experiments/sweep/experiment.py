@@ -15,6 +15,7 @@ from mount_experiments.harness.contract import (
     Statement,
     parameters_of,
 )
+from mount_experiments.harness.judgement import holds_if
 from mount_experiments.sweep import REFERENCE, TITLE
 from mount_experiments.sweep.evaluation import (
     ALWAYS,
@@ -214,7 +215,7 @@ def _on_noise(figures: dict[str, Any]) -> Statement:
         f'Rms of the friction mount over that of the hydromount, {"; ".join(told)}. The paper does not say '
         'whether the engine ran; both road level and idle force are assumed here '
         '(docs/explanation/results.md).',
-        Holds.YES if all(lower) else Holds.PARTLY if any(lower) else Holds.NO,
+        holds_if(lower),
     )
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.commands.options import JsonFile
+from mount_cli.commands.options import JsonFile, Scheduler, Workers
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when the catalogue is written, also where recordings are damaged, which their rows
@@ -28,12 +28,8 @@ the same command goes on where it stopped.
 def index(
     uris: Annotated[list[str], typer.Argument(metavar='URI...', help='folders or recordings, paths or URIs')],
     out: Annotated[Path, typer.Option(metavar='CATALOGUE', help='folder to make or to bring up to date')],
-    scheduler: Annotated[
-        str, typer.Option(metavar='local|ADDRESS', help='local, or tcp://HOST:PORT of a Dask cluster')
-    ] = 'local',
-    workers: Annotated[
-        int, typer.Option(min=0, metavar='NUMBER', help='local: processes; 0: one on each core')
-    ] = 0,
+    scheduler: Scheduler = 'local',
+    workers: Workers = 0,
     memory: Annotated[
         int,
         typer.Option(min=0, metavar='MB', help='local: most for each process; 0: its share of the machine'),

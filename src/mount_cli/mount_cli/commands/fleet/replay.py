@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
-from mount_cli.commands.options import JsonFile
-from mount_cli.completion.values import named, setting
+from mount_cli.commands.options import JsonFile, Scheduler, Workers
+from mount_cli.commands.other_than_recorded import OtherThanRecorded, changes_of
+from mount_cli.completion.values import named
 from mount_cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when every recording has its row, with figures or with the reason why not; 1 when one
@@ -35,15 +36,7 @@ def replay(
         ),
     ],
     out: Annotated[Path, typer.Option(metavar='RESULT', help='folder of the result, new or interrupted')],
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            '--set',
-            metavar='[NODE.]NAME=VALUE',
-            help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
-            autocompletion=setting('mount_control', 'mount_init'),
-        ),
-    ] = None,
+    settings: OtherThanRecorded = None,
     policy: Annotated[
         str, typer.Option(metavar='NAME', help='another policy', autocompletion=named('policy'))
     ] = '',
@@ -51,12 +44,8 @@ def replay(
         bool,
         typer.Option('--closed-loop', help='simulate engine and mount anew over recorded accelerations'),
     ] = False,
-    scheduler: Annotated[
-        str, typer.Option(metavar='ADDRESS', help='local, or tcp://HOST:PORT of a Dask cluster')
-    ] = 'local',
-    workers: Annotated[
-        int, typer.Option(min=0, metavar='NUMBER', help='local: processes; 0: one on each core')
-    ] = 0,
+    scheduler: Scheduler = 'local',
+    workers: Workers = 0,
     json_file: JsonFile = None,
 ) -> None:
     """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
@@ -64,7 +53,7 @@ def replay(
     from mount_replay.fleet.what_if.run import Advance, FleetOrder, replay_fleet
     from mount_report.json_file import write_json
 
-    changes = _changes([*(settings or []), *([f'policy={policy}'] if policy else [])])
+    changes = changes_of([*(settings or []), *([f'policy={policy}'] if policy else [])])
     if not changes:
         raise typer.BadParameter('say what is to be other than recorded, with --set or --policy')
     console = terminal()
@@ -83,19 +72,6 @@ def replay(
         note(console, f'{row["recording"]}: {row["reason"]}; the same command tries it again')
     if outcome.not_fetched:
         raise typer.Exit(1)
-
-
-def _changes(settings: list[str]) -> dict[str, dict[str, Any]]:
-    from mount_bringup.settings import SettingError, settings_of_options
-    from mount_replay.replay import parsed_changes
-
-    try:
-        given = settings_of_options(settings)
-    except SettingError as error:
-        raise typer.BadParameter(str(error)) from None
-    return parsed_changes(
-        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
-    )
 
 
 def _progress_text(progress: Any) -> str:

@@ -1,0 +1,31 @@
+"""What a replay takes other than recorded: the option, and the changes that it says."""
+
+from typing import Annotated, Any
+
+import typer
+
+from mount_cli.completion.values import setting
+
+OtherThanRecorded = Annotated[
+    list[str] | None,
+    typer.Option(
+        '--set',
+        metavar='[NODE.]NAME=VALUE',
+        help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
+        autocompletion=setting('mount_control', 'mount_init'),
+    ),
+]
+
+
+def changes_of(settings: list[str]) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of NAME=VALUE, or raise `BadParameter` or a `ValueError`."""
+    from mount_bringup.settings import SettingError, settings_of_options
+    from mount_replay.replay import parsed_changes
+
+    try:
+        given = settings_of_options(settings)
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
+    return parsed_changes(
+        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
+    )
