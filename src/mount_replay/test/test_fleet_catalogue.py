@@ -17,7 +17,7 @@ import mount_bags
 from mount_replay.fleet.catalogue import index as indexing
 from mount_replay.fleet.catalogue.columns import BANDS, EVENTS, RECORDINGS, band_name
 from mount_replay.fleet.catalogue.in_bands import in_bands
-from mount_replay.fleet.catalogue.index import index, indexed
+from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.journal import Journal
 from mount_replay.fleet.catalogue.places import places
 from mount_replay.fleet.catalogue.rows import read_place, rows_of
@@ -25,7 +25,12 @@ from mount_replay.fleet.catalogue.stored import CatalogueError, read_catalogue
 from mount_replay.fleet.columns import schema_of
 from mount_replay.fleet.runner import Done
 
+
 REFERENCES = Path(__file__).parents[3] / 'bags' / 'reference'
+
+
+def table_of(places, catalogue, **options):
+    return indexed(places, catalogue, **options).recordings
 
 
 @pytest.fixture
@@ -62,7 +67,7 @@ def row_of(table, recording):
 
 
 def test_a_row_tells_what_a_recording_is_and_what_was_lost_in_it(drives, tmp_path, inside):
-    table = index([drives], tmp_path / 'catalogue')
+    table = table_of([drives], tmp_path / 'catalogue')
     assert table.schema.equals(schema_of(RECORDINGS))
     assert table['recording'].to_pylist() == ['a/gap', 'b/initialisation', 'b/rough', 'garbage.mcap']
     gap = row_of(table, 'a/gap')
@@ -85,7 +90,7 @@ def test_a_row_tells_what_a_recording_is_and_what_was_lost_in_it(drives, tmp_pat
 
 
 def test_events_have_their_recording_and_their_time(drives, tmp_path, inside):
-    index([drives], tmp_path / 'catalogue')
+    table_of([drives], tmp_path / 'catalogue')
     recordings, events = read_catalogue(tmp_path / 'catalogue')
     assert events.schema.equals(schema_of(EVENTS))
     assert set(events['uri'].to_pylist()) <= set(recordings['uri'].to_pylist())
@@ -96,7 +101,7 @@ def test_events_have_their_recording_and_their_time(drives, tmp_path, inside):
 
 def test_only_what_changed_is_read_again_and_what_is_gone_leaves(drives, tmp_path, inside):
     catalogue = tmp_path / 'catalogue'
-    index([drives], catalogue)
+    table_of([drives], catalogue)
     before = (catalogue / 'recordings.parquet').read_bytes()
     inside.clear()
     again = indexed([drives], catalogue)
@@ -114,7 +119,7 @@ def test_only_what_changed_is_read_again_and_what_is_gone_leaves(drives, tmp_pat
 
 
 def test_a_second_place_is_added_to_what_the_catalogue_holds(drives, tmp_path, inside):
-    index([drives / 'a'], tmp_path / 'catalogue')
+    table_of([drives / 'a'], tmp_path / 'catalogue')
     both = indexed([drives / 'b'], tmp_path / 'catalogue')
     assert both.recordings['recording'].to_pylist() == ['gap', 'initialisation', 'rough']
     assert both.vanished == 0
@@ -122,13 +127,13 @@ def test_a_second_place_is_added_to_what_the_catalogue_holds(drives, tmp_path, i
 
 def test_rows_are_the_same_from_any_number_of_workers(drives, tmp_path):
     for workers in (1, 2):
-        index([drives], tmp_path / str(workers), workers=workers)
+        table_of([drives], tmp_path / str(workers), workers=workers)
     for name in ('recordings.parquet', 'events.parquet'):
         assert (tmp_path / '1' / name).read_bytes() == (tmp_path / '2' / name).read_bytes()
 
 
 def test_an_index_that_was_stopped_goes_on_and_ends_with_the_same_tables(drives, tmp_path, inside):
-    whole = index([drives], tmp_path / 'whole')
+    whole = table_of([drives], tmp_path / 'whole')
     inside.clear()
 
     def stop(done, of):
@@ -136,13 +141,13 @@ def test_an_index_that_was_stopped_goes_on_and_ends_with_the_same_tables(drives,
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        index([drives], tmp_path / 'stopped', told=stop)
+        table_of([drives], tmp_path / 'stopped', told=stop)
     journal = tmp_path / 'stopped' / '.unfinished.jsonl'
     with journal.open('a') as file:
         file.write('["cut off in the mid')
     done = list(inside)
     inside.clear()
-    gone_on = index([drives], tmp_path / 'stopped')
+    gone_on = table_of([drives], tmp_path / 'stopped')
     assert (len(done), len(inside), set(done) & set(inside)) == (2, 2, set())
     assert gone_on.equals(whole)
     assert not journal.exists()
@@ -164,18 +169,18 @@ def test_a_killed_index_leaves_what_can_be_gone_on_with(drives, tmp_path):
     """SIGKILL of the command itself: the same tables in the end as of one that was not stopped."""
     program = f"""
 import os, signal
-from mount_replay.fleet.catalogue.index import index
+from mount_replay.fleet.catalogue.index import indexed
 if __name__ == '__main__':
-    index([{str(drives)!r}], {str(tmp_path / 'killed')!r}, workers=1,
+    indexed([{str(drives)!r}], {str(tmp_path / 'killed')!r}, workers=1,
           told=lambda done, of: done == 2 and os.kill(os.getpid(), signal.SIGKILL))
 """
     script = tmp_path / 'script.py'
     script.write_text(program)
     assert subprocess.run([sys.executable, str(script)]).returncode == -signal.SIGKILL
     told = []
-    killed = index([drives], tmp_path / 'killed', workers=1, told=lambda done, of: told.append(of))
+    killed = table_of([drives], tmp_path / 'killed', workers=1, told=lambda done, of: told.append(of))
     assert told[0] == 2
-    assert killed.equals(index([drives], tmp_path / 'whole', workers=1))
+    assert killed.equals(table_of([drives], tmp_path / 'whole', workers=1))
 
 
 def test_each_mount_of_a_car_has_a_row_with_the_work_of_its_pads(tmp_path):
@@ -276,7 +281,7 @@ def test_a_folder_that_is_no_catalogue_is_refused(tmp_path):
 
 
 def test_a_catalogue_with_other_columns_is_made_anew(drives, tmp_path, inside):
-    index([drives], tmp_path / 'catalogue')
+    table_of([drives], tmp_path / 'catalogue')
     file = tmp_path / 'catalogue' / 'recordings.parquet'
     pa.parquet.write_table(pa.parquet.read_table(file).drop(['mode']), file)
     assert indexed([drives], tmp_path / 'catalogue').read == 4

@@ -30,13 +30,7 @@ def lost_figures(part: Recording) -> tuple[Figures, dict[str, TopicAudit]]:
     found = losses(part, audits)
     first = found.faults[0] if found.faults else None
     figures = {
-        'samples': found.samples,
-        'lost_samples': found.lost_samples,
-        'lost_messages': found.lost_messages,
-        'asked_samples': found.asked,
-        'unanswered_samples': found.unanswered,
-        'late_samples': found.late,
-        'misdated_messages': found.misdated,
+        **found.as_json(),
         'faults': len(found.faults),
         'first_fault': str(first) if first else '',
     }

@@ -30,22 +30,6 @@ class Indexed:
     unreadable: int
 
 
-def index(
-    uris: Iterable[str | os.PathLike[str]],
-    out: str | os.PathLike[str],
-    *,
-    scheduler: str = 'local',
-    workers: int = 0,
-    memory: int = 0,
-    told: Told = lambda done, of: None,
-) -> 'pyarrow.Table':
-    """Return the recordings at and below `uris` as the table of the catalogue in the folder `out`.
-
-    As `indexed`, which tells besides what was done.
-    """
-    return indexed(uris, out, scheduler=scheduler, workers=workers, memory=memory, told=told).recordings
-
-
 def indexed(
     uris: Iterable[str | os.PathLike[str]],
     out: str | os.PathLike[str],
