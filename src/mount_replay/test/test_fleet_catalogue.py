@@ -25,7 +25,6 @@ from mount_replay.fleet.catalogue.stored import CatalogueError, read_catalogue
 from mount_replay.fleet.columns import schema_of
 from mount_replay.fleet.runner import Done
 
-
 REFERENCES = Path(__file__).parents[3] / 'bags' / 'reference'
 
 
