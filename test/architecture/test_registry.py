@@ -143,17 +143,6 @@ def test_the_graph_waits_for_registered_topics():
     assert needed <= {topic.name for topic in TOPICS}
 
 
-def test_interface_lists_the_figures_of_a_drive():
-    source = ast.parse((SOURCES / 'mount_report/mount_report/drive/summary.py').read_text())
-    function = next(
-        node for node in source.body if isinstance(node, ast.FunctionDef) and node.name == 'summarise'
-    )
-    figures = next(node for node in ast.walk(function) if isinstance(node, ast.Return)).value
-    assert isinstance(figures, ast.Dict)
-    keys = [key.value for key in figures.keys if isinstance(key, ast.Constant)]
-    assert [row['figure'] for row in table('Figures', 'docs/reference/recordings.md')] == keys
-
-
 def test_models_readme_lists_every_parameter_with_unit_range_and_source():
     listed: dict[str, list[tuple[str, ...]]] = {}
     for row in table('Parameters', 'src/mount_models/README.md'):

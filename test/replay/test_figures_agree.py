@@ -15,6 +15,7 @@ from mount_cli.command import app
 from mount_replay.drive import drive as driving
 from mount_ros.messages.cdr import serialised
 
+REPOSITORY = Path(__file__).resolve().parents[2]
 BENCH = (
     '--core', '--scenario', 'bench', '--duration', '0.8', '--set', 'mount_sim.timeline.start=2.8',
 )  # fmt: skip
@@ -168,6 +169,12 @@ def test_all_tell_the_same(kind, request):
     peak = found.summary['peak_current_a']
     assert f'peak current {peak:.2f} A' in found.terminal
     assert f'peak current {peak:.3g} A' in found.report
+
+
+def test_the_page_lists_every_figure_of_a_drive_in_its_order(good):
+    page = (REPOSITORY / 'docs/reference/recordings.md').read_text()
+    section = page.split('\n## Figures\n')[1].split('\n## ')[0]
+    assert re.findall(r'^\| `(\w+)` \|', section, flags=re.MULTILINE) == list(good.summary)
 
 
 def test_switching_is_told_on_the_same_axis(good):
