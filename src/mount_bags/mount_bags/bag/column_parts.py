@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 _WORD = 8  # bytes of a number that is picked
 _HEADS = 2  # numbers before the columns in a row: log time and stamp
-_KEPT = 16 * 1024 * 1024  # bytes of the file in memory, chosen
 _FLOAT = np.dtype('<f8')
 
 
@@ -37,6 +36,10 @@ class ColumnPart:
 
     def __len__(self) -> int:
         return len(self.stamps)
+
+    def column(self, name: str) -> Column:
+        """Return a column; NaN where its messages have none of that name."""
+        return self.columns[name] if name in self.columns else np.full(len(self), np.nan)
 
 
 def column_parts(
@@ -70,11 +73,7 @@ class _FileColumns:
         self._picked: dict[str, _Picked] = {}
 
     def parts(self) -> Iterator[ColumnPart]:
-        forgotten = 0
-        for chunk in self._file.chunks:
-            if chunk.position - forgotten >= _KEPT:
-                self._file.forget(forgotten, chunk.position)
-                forgotten = chunk.position
+        for chunk in self._file.passing():
             held = [name for name in self._wanted if not self._held_in(chunk).isdisjoint(self._numbers[name])]
             if not held:
                 continue
@@ -112,7 +111,7 @@ class _FileColumns:
             found = contents.messages.of(np.array(numbers, np.int64))
             if not len(found):
                 continue
-            series = self._recording.series_of(name, [found])
+            series = self._recording.series_of(name, found)
             if name not in self._picked and len(numbers) == 1:
                 picked = _picked(series, self._wanted[name], numbers[0], self._size)
                 if picked is not None:
