@@ -17,7 +17,7 @@ from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import Recording
 from mount_bags.bag.statement import read_statement
 from mount_bags.container.stored import RECORDER_RECORD
-from mount_bags.messages.compact_times import BLOCK, CompactTimes, Times, compact, is_in, together
+from mount_bags.messages.compact_times import CompactTimes, Times, compact, is_in, together
 from mount_bags.messages.series import registered_topic
 from mount_bags.messages.stamps import (
     FARTHEST,
@@ -263,7 +263,7 @@ def _lost_steps(recording: Recording, times: AllTimes, namespace: str, answers: 
         return 0
     places = setpoints.places_of(untraced)
     stamps, lost, begin = setpoints.at(places), set(), 0
-    for part in column_parts(recording, {name: (_CURRENT,)}, BLOCK):
+    for part in column_parts(recording, {name: (_CURRENT,)}):
         here = (places >= begin) & (places < begin + len(part))
         above = part.column(_CURRENT)[places[here] - begin] > 0.0
         lost.update(stamps[here][above].tolist())

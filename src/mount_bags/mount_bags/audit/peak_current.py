@@ -8,7 +8,6 @@ import numpy as np
 from mount_bags.audit.audit import TopicAudit
 from mount_bags.bag.column_parts import ColumnPart, column_parts
 from mount_bags.bag.recording import Recording
-from mount_bags.messages.compact_times import BLOCK
 from mount_bags.messages.series import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
@@ -53,7 +52,7 @@ def peak_current(recording: Recording, audits: Mapping[str, TopicAudit]) -> floa
     `audits` is the audit of `recording`. In memory are no more than a part of its setpoints.
     """
     found = PeakCurrent(recording, audits)
-    for part in column_parts(recording, found.columns, BLOCK):
+    for part in column_parts(recording, found.columns):
         found.add(part)
     return found.value
 

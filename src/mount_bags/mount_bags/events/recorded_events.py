@@ -7,7 +7,6 @@ from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import Recording
 from mount_bags.events.event_marks import Mark, read_marks
 from mount_bags.events.switching_trace import SwitchingTrace
-from mount_bags.messages.compact_times import BLOCK
 from mount_bags.messages.series import SeriesError, registered_topic
 from mount_bags.messages.time_axis import TimeAxis
 from mount_ros.topics import CONTROL_TRACE, EVENT
@@ -87,7 +86,7 @@ def _switching(recording: Recording) -> list[RecordedEvent]:
         return []
     trace = SwitchingTrace()
     try:
-        for part in column_parts(recording, {CONTROL_TRACE.name: (trace.COLUMN,)}, BLOCK):
+        for part in column_parts(recording, {CONTROL_TRACE.name: (trace.COLUMN,)}):
             trace.add(part)
     except SeriesError:
         return []  # no control trace of ours

@@ -11,7 +11,6 @@ from mount_bags.audit.losses import losses
 from mount_bags.audit.peak_current import PeakCurrent
 from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import Recording
-from mount_bags.messages.compact_times import BLOCK
 from mount_bags.run.session import recorded_sample_rate
 from mount_replay.fleet.catalogue.motion import Motion
 from mount_replay.fleet.catalogue.trace import Trace
@@ -63,7 +62,7 @@ def state_figures(part: Recording, audits: Mapping[str, TopicAudit]) -> Figures:
         if _count(part, topic.name):
             name = part.resolve(topic.name)
             columns[name], takers[name] = taker.COLUMNS, taker.add
-    for found in column_parts(part, columns, BLOCK):
+    for found in column_parts(part, columns):
         takers[found.topic](found)
     rate = recorded_sample_rate(part)
     figures['peak_current_a'] = peak.value
