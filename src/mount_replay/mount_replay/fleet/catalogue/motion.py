@@ -60,7 +60,7 @@ class Motion:
             told = stamps.whole()
             sound = ~misdated(told)
             stamps, values = compact(told[sound]), values[sound]
-        if all(bool((steps > 0).all()) for steps in stamps.steps()):
+        if stamps.strictly_rising:
             return stamps, values
         found, first = np.unique(stamps.whole(), return_index=True)
         return compact(found), values[first]
