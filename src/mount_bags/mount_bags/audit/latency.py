@@ -48,7 +48,10 @@ def on_one_clock(stamps: CompactTimes, times: CompactTimes) -> bool:
     """Return whether the stamps of setpoints are on the clock of `times`, when they were sent or came."""
     if len(stamps) < 2:
         return False
-    ages = np.concatenate(list(_ages(stamps, times)))
+    ages, end = np.empty(len(stamps), np.int64), 0
+    for found in _ages(stamps, times):
+        begin, end = end, end + len(found)
+        ages[begin:end] = found
     if np.abs(np.median(ages, overwrite_input=True)) > _SAME_CLOCK:
         return False
     stamped, timed = stamps.highest - stamps.least, times.highest - times.least

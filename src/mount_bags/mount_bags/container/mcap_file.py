@@ -46,7 +46,7 @@ from mount_bags.container.summary import (
 )
 from mount_bags.container.whole_files import FileError, forget, mapped
 
-_KEPT = 1 << 24  # bytes of the file in memory while the chunks are looked at, chosen
+_KEPT = 1 << 22  # bytes of the file in memory while the chunks are looked at, chosen
 _LAST_OPCODE = Opcode.DATA_END
 _LENGTHS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
 _PRIVATE_OPCODE = 0x80  # and above: of other programs, to be skipped

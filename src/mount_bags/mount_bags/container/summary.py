@@ -33,7 +33,7 @@ _FOOTER_SIZE = 20  # bytes behind opcode and length
 _FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
 _CRC_SIZE = 4  # bytes
 _DATA_END = struct.Struct('<BQI')
-_STEP = 1 << 24  # bytes read at once for a checksum
+_STEP = 1 << 20  # bytes read at once for a checksum
 
 
 class Proof(Enum):
