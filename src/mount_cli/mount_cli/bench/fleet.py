@@ -72,7 +72,7 @@ def _stages_of_one(path: Path) -> tuple[float, ...]:
     recording_hash(path, recording.files)
     beside = _time(lambda: recorded_in(recording))
     recorded = recorded_in(recording)
-    columns = _time(lambda: sum(len(part) for part in column_parts(recording, _COLUMNS, 8192)))
+    columns = _time(lambda: sum(len(part) for part in column_parts(recording, _COLUMNS)))
     compared = _time(lambda: compared_setpoints(recorded, _CHANGE))
     return _time(opened), beside, columns, compared - columns
 

@@ -66,7 +66,10 @@ class Advance:
 
 @dataclass(frozen=True)
 class FleetOutcome:
-    """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs."""
+    """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs.
+
+    `starting`: until the first recording was done, in which processes start and load libraries and laws.
+    """
 
     table: 'pyarrow.Table'
     result: Path
@@ -74,6 +77,7 @@ class FleetOutcome:
     before: int
     failed: int
     wall: float
+    starting: float
     busy: float
     replayed: float
     workers: int
@@ -86,6 +90,7 @@ class FleetOutcome:
             'failed': self.failed,
             'done_before': self.before,
             'wall_s': self.wall,
+            'starting_s': self.starting,
             'processor_s': self.busy,
             'replayed_s': self.replayed,
             'real_time_factor_per_core': self.replayed / (self.wall * self.workers) if self.workers else None,
@@ -124,6 +129,7 @@ def replay_fleet(
         before=len(asked) - len(left),
         failed=len({row['recording'] for row in table.to_pylist() if row['reason']}),
         wall=time.monotonic() - begin,
+        starting=run.starting,
         busy=run.busy,
         replayed=run.replayed,
         workers=len(run.workers),
@@ -150,7 +156,7 @@ class _Run:
         self._recordings = 0
         self.not_fetched: list[Row] = []
         """Rows of what could not be read this time: the same order tries it again."""
-        self.busy = self.replayed = 0.0
+        self.starting = self.busy = self.replayed = 0.0
         self.workers: set[str] = set()
 
     def through(self, scheduler: str, workers: int) -> None:
@@ -162,9 +168,11 @@ class _Run:
             for count, done in enumerate(
                 run_tasks(work, self._left, scheduler=scheduler, workers=workers), 1
             ):
+                now = time.monotonic()
+                if count == 1:
+                    self.starting = now - begin
                 self._take(self._left[done.place], done)
                 watch.take(done)
-                now = time.monotonic()
                 if now - written >= _WRITTEN_AFTER or self._recordings >= _WRITTEN_TOGETHER:
                     self._write()
                     written = now
