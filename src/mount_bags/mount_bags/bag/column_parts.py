@@ -20,7 +20,8 @@ from mount_bags.messages.taken import LOG_TIME_PLACE, WORD, Wanted, take
 if TYPE_CHECKING:
     from mount_bags.bag.recording import Recording
 
-_KEPT = 16 * 1024 * 1024  # bytes of the file in memory, chosen
+PART = 1 << 13
+"""Messages of a topic in a part, chosen: where nothing asks for more or fewer."""
 _FLOAT = np.dtype('<f8')
 
 
@@ -36,9 +37,13 @@ class ColumnPart:
     def __len__(self) -> int:
         return len(self.stamps)
 
+    def column(self, name: str) -> Column:
+        """Return a column; NaN where its messages have none of that name."""
+        return self.columns[name] if name in self.columns else np.full(len(self), np.nan)
+
 
 def column_parts(
-    recording: 'Recording', columns: Mapping[str, tuple[str, ...]], size: int
+    recording: 'Recording', columns: Mapping[str, tuple[str, ...]], size: int = PART
 ) -> Iterator[ColumnPart]:
     """Yield columns of topics, {topic: names}, in the order of the files, some `size` messages at a time."""
     wanted = {recording.resolve(topic): names for topic, names in columns.items()}
@@ -69,11 +74,7 @@ class _FileColumns:
         self._columns = _Columns(size)
 
     def parts(self) -> Iterator[ColumnPart]:
-        forgotten = 0
-        for chunk in self._file.chunks:
-            if chunk.position - forgotten >= _KEPT:
-                self._file.forget(forgotten, chunk.position)
-                forgotten = chunk.position
+        for chunk in self._file.passing():
             held = self._held_in(chunk)
             if not held:
                 continue
@@ -109,7 +110,7 @@ class _FileColumns:
             found = contents.messages.of(np.array(numbers, np.int64))
             if not len(found):
                 continue
-            series = self._recording.series_of(name, [found])
+            series = self._recording.series_of(name, found)
             if len(numbers) == 1 and not self._columns.know([name]):
                 picked = _picked(series, self._wanted[name], numbers[0])
                 if picked is not None:
