@@ -72,9 +72,7 @@ MapFile = Annotated[
 ]
 Dbc = Annotated[
     Path | None,
-    typer.Option(
-        '--dbc', metavar='FILE', help='CAN log, or MDF with raw frames: the database that decodes them'
-    ),
+    typer.Option('--dbc', metavar='FILE', help='CAN log, or MDF with raw frames: database that decodes them'),
 ]
 Decimal = Annotated[
     str,
