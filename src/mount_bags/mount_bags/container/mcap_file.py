@@ -123,7 +123,7 @@ class McapFile:
         """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
         self.data_proof()
         wanted = np.array(sorted(topics), np.int64)
-        for chunk in self.chunks:
+        for chunk in self.passing():
             if chunk.channels is None or not chunk.channels.isdisjoint(topics):
                 contents = self.contents(chunk)
                 if contents is not None and len(found := contents.messages.of(wanted)):
@@ -171,9 +171,14 @@ class McapFile:
         """
         return unpacked(self._data[chunk.begin : chunk.end], chunk, self._decompressor)
 
-    def forget(self, begin: int, end: int) -> None:
-        """Let the system take back the memory of the bytes from `begin` to `end`, which were read."""
-        forget(self._data, begin, end)
+    def passing(self) -> Iterator[Chunk]:
+        """Yield the chunks; the system may take back the memory of those before, which were read."""
+        forgotten = 0
+        for chunk in self.chunks:
+            if chunk.position - forgotten >= _KEPT:
+                forget(self._data, forgotten, chunk.position)
+                forgotten = chunk.position
+            yield chunk
 
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
@@ -223,7 +228,7 @@ class McapFile:
             index = waiting.pop()
             found.append(indexed_chunk(self._data, index))
             if index.position - forgotten >= _KEPT:
-                self.forget(forgotten, index.position)
+                forget(self._data, forgotten, index.position)
                 forgotten = index.position
         return found
 
@@ -263,7 +268,7 @@ class McapFile:
         self.chunks, self._loose, self._counts, self._times = [], [], {}, None
         loose_channels, loose_schemas = self._walk_all()
         self._channels, self._schemas = {}, {}
-        for chunk in self.chunks:
+        for chunk in self.passing():
             self._take_explored(chunk)
         if not self.chunks or (self.whole and self._summary.proof is not Proof.WRONG):
             # Nothing better is known, or there is no reason to doubt.

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from mount_replay.fleet.questions import QueryError, query, tables_of
-from mount_replay.fleet.what_if.asked import recordings_asked
+from mount_replay.fleet.what_if.asked import AskedError, recordings_asked
 from mount_replay.fleet.what_if.result import ORDER
+from mount_signals.sources.source import SourceError
 
 COUNT = 10
 """Rows, chosen."""
@@ -60,7 +61,7 @@ def worst(
 
     Of a result, or where there is none of a catalogue. `lowest`: those with the smallest values instead.
     Rows without a number are left out; equal ones stand by the names of their recordings. Raises
-    `QueryError`, and `SourceError` where the place of a recording cannot be listed.
+    `QueryError`.
     """
     tables = tables_of(folder)
     name = 'result' if 'result' in tables else 'recordings'
@@ -79,9 +80,18 @@ def worst(
 
 
 def places_of(folder: str | os.PathLike[str]) -> dict[str, str]:
-    """Return {recording: URI} of the recordings of a result, looked up where its order found them."""
+    """Return {recording: URI} of the recordings of a result, looked up where its order found them.
+
+    Raises `QueryError` where nothing of it is there any more.
+    """
     order = json.loads((Path(folder) / ORDER).read_text(encoding='utf-8'))
-    return {asked.path: asked.uri for asked in recordings_asked(order['asked_for'])}
+    try:
+        return {asked.recording: asked.uri for asked in recordings_asked(order['asked_for'])}
+    except (AskedError, SourceError) as error:
+        raise QueryError(
+            f'where the recordings of {folder} lie is not known: {error}; what was moved is found by a '
+            'link where it was'
+        ) from None
 
 
 def _check_column(schema: Any, table: str, by: str) -> None:

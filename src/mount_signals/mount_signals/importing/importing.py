@@ -12,13 +12,11 @@ from mount_signals.formats.content import Stated
 from mount_signals.importing.channels import channels_of
 from mount_signals.importing.joined import joined
 from mount_signals.importing.pieces import Piece, pieces, within
-from mount_signals.importing.provenance import told_mapping
+from mount_signals.importing.provenance import SCENARIO, told_mapping
 from mount_signals.importing.reading import Read, read_files
 from mount_signals.importing.writing import Channel, write_channels
 from mount_signals.units.mapping import Mapping
 
-SCENARIO = 'imported'
-"""What the session of a recording says that was made of files of others."""
 Progress = Callable[[float, str], None]
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.columns import UNREADABLE
 from mount_replay.fleet.catalogue.journal import Journal
 from mount_replay.fleet.catalogue.places import Place, below, places
@@ -44,8 +45,8 @@ def indexed(
     Recordings whose files have the same sizes, times and etags are not read again; those that are no more
     below `uris` leave the catalogue, those that lie elsewhere stay. Stopped by whatever, the same order goes
     on where it stopped. `told` takes how many are done, of how many; `scheduler`, `workers` and `memory` are
-    those of `run_tasks`. Rows depend on the recordings alone. Raises `SourceError`, `SchedulerLostError`, and
-    `OSError` where `out` cannot be written.
+    those of `run_tasks`. Rows depend on the recordings alone. Raises `SourceError`, `SchedulerLostError`,
+    and `OSError` where `out` cannot be written.
     """
     roots = [os.fspath(uri) for uri in uris]
     found = places(roots)
@@ -58,11 +59,13 @@ def indexed(
         }
         waiting = [place for uri, place in found.items() if uri not in known]
         told(0, len(waiting))
+        watch = StoreWatch()
         tasks = run_tasks(read_place, waiting, scheduler=scheduler, workers=workers, memory=memory)
         for count, done in enumerate(tasks, 1):
             place = waiting[done.place]
-            rows = done.result or unreadable(place, done.reason, fingerprint='')
+            rows = done.result or unreadable(place, reason_of(done), fingerprint='')
             journal.add(place.uri, rows)
+            watch.take(done)
             known[place.uri] = rows
             told(count, len(waiting))
         elsewhere = {uri: rows for uri, rows in kept.items() if not below(uri, roots)}

@@ -20,7 +20,7 @@ from mount_bringup.recorded_mount import simulated_mounts
 from mount_replay.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
 from mount_replay.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures
 from mount_replay.fleet.catalogue.places import Place
-from mount_signals.sources.source import SourceError
+from mount_signals.sources.source import StoreAwayError
 from mount_signals.sources.stores import local_copy
 from mount_sim.plant.mounts import without_friction
 
@@ -40,12 +40,15 @@ class Rows:
 def read_place(place: Place) -> Rows:
     """Return the rows of the recording at `place`; never raises for what is wrong with a recording.
 
-    What could not be fetched has no fingerprint, so that it is tried again next time.
+    What could not be fetched has no fingerprint, so that it is tried again next time. Raises
+    `StoreAwayError` where the store does not answer.
     """
     try:
         with local_copy(place.uri) as path:
             return rows_of(path, place)
-    except (SourceError, OSError) as error:
+    except StoreAwayError:
+        raise
+    except OSError as error:
         return unreadable(place, str(error), fingerprint='')
 
 

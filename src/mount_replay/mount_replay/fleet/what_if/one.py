@@ -12,10 +12,10 @@ from typing import Any
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_hash, recording_place
 from mount_bags.run.versions import versions
-from mount_replay.fleet.what_if.asked import Asked
-from mount_replay.fleet.what_if.closed_loop import compared_motion
+from mount_replay.fleet.catalogue.places import Place
 from mount_replay.fleet.what_if.columns import DISPLACEMENT, SETPOINTS
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
+from mount_signals.sources.source import StoreAwayError
 from mount_signals.sources.stores import local_copy
 
 Changes = Mapping[str, Mapping[str, Any]]
@@ -38,17 +38,20 @@ class Replayed:
     worker: str
 
 
-def replay_one(asked: Asked, changes: Changes, closed_loop: bool = False) -> Replayed:
+def replay_one(asked: Place, changes: Changes, closed_loop: bool = False) -> Replayed:
     """Return the rows of one recording with `changes` {node: {parameter: value}}; nothing is remembered.
 
-    What cannot be replayed, and what cannot be fetched, is a row with its reason.
+    What cannot be replayed, and what cannot be fetched, is a row with its reason. Raises `StoreAwayError`
+    where the store does not answer.
     """
     begin, worker = time.process_time(), f'{platform.node()}/{os.getpid()}'
-    common = {'recording': asked.path, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
+    common = {'recording': asked.recording, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
     try:
         with local_copy(asked.uri) as path:
             rows = tuple({**common, **row} for row in _rows(asked, path, changes, closed_loop))
         fetched = True
+    except StoreAwayError:
+        raise
     except OSError as error:
         rows, fetched = ({**common, 'mount': '', 'reason': str(error)},), False
     return Replayed(rows, fetched, time.process_time() - begin, worker)
@@ -64,7 +67,7 @@ def told_of(changes: Changes, closed_loop: bool) -> Row:
     }
 
 
-def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
+def _rows(asked: Place, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
     whole = {'sha256': recording_hash(recording_place(path))}
     try:
         mounts = open_run(path).by_mount()
@@ -83,13 +86,18 @@ def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool) -> list
 
 def _figures(recording: Recording, changes: Changes, closed_loop: bool) -> Row:
     recorded = recorded_in(recording)
-    figures = compared_motion(recorded, changes) if closed_loop else compared_setpoints(recorded, changes)
+    if closed_loop:
+        from mount_replay.fleet.what_if.closed_loop import compared_motion  # loads the simulator
+
+        figures = compared_motion(recorded, changes)
+    else:
+        figures = compared_setpoints(recorded, changes)
     return {'reason': '', 'recorded_with': recorded.version, **figures}
 
 
-def _told(error: ValueError, asked: Asked, path: Path) -> str:
+def _told(error: ValueError, asked: Place, path: Path) -> str:
     """Return the reason with the path below what was asked for: the same from whatever store it comes."""
-    return str(error).replace(str(path), asked.path)
+    return str(error).replace(str(path), asked.recording)
 
 
 def _json(content: Mapping[str, Any]) -> str:

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mount_bags.run.versions import versions
+from mount_replay.fleet.away import StoreWatch, reason_of
+from mount_replay.fleet.catalogue.places import Place, root_of
 from mount_replay.fleet.cluster import LOCAL
 from mount_replay.fleet.runner import Done, run_tasks
-from mount_replay.fleet.what_if.asked import Asked, recordings_asked
+from mount_replay.fleet.what_if.asked import recordings_asked
 from mount_replay.fleet.what_if.one import Replayed, Row, replay_one, told_of
 from mount_replay.fleet.what_if.result import Result
 from mount_signals.sources.uris import shown
@@ -39,7 +41,7 @@ class FleetOrder:
         """Return what makes two orders the same: all but where they run."""
         here = versions()
         told = {
-            'asked_for': [shown(place) for place in self.places],
+            'asked_for': [shown(root_of(place)) for place in self.places],
             'changes': self.changes,
             'closed_loop': self.closed_loop,
             'versions': {name: here[name] for name in _OF_A_WORKER},
@@ -64,7 +66,10 @@ class Advance:
 
 @dataclass(frozen=True)
 class FleetOutcome:
-    """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs."""
+    """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs.
+
+    `starting`: until the first recording was done, in which processes start and load libraries and laws.
+    """
 
     table: 'pyarrow.Table'
     result: Path
@@ -72,6 +77,7 @@ class FleetOutcome:
     before: int
     failed: int
     wall: float
+    starting: float
     busy: float
     replayed: float
     workers: int
@@ -84,6 +90,7 @@ class FleetOutcome:
             'failed': self.failed,
             'done_before': self.before,
             'wall_s': self.wall,
+            'starting_s': self.starting,
             'processor_s': self.busy,
             'replayed_s': self.replayed,
             'real_time_factor_per_core': self.replayed / (self.wall * self.workers) if self.workers else None,
@@ -111,10 +118,10 @@ def replay_fleet(
     result = Result(out)
     with result.taken(order.told()):
         finished = result.finished()
-        left = [each for each in asked if (each.path, each.size) not in finished]
+        left = [each for each in asked if (each.recording, each.fingerprint) not in finished]
         run = _Run(order, result, left, told, before=len(asked) - len(left), of=len(asked))
         run.through(scheduler, workers)
-        table = result.finish([each.path for each in asked], run.not_fetched)
+        table = result.finish({each.recording: each.fingerprint for each in asked}, run.not_fetched)
     return FleetOutcome(
         table=table,
         result=result.table,
@@ -122,6 +129,7 @@ def replay_fleet(
         before=len(asked) - len(left),
         failed=len({row['recording'] for row in table.to_pylist() if row['reason']}),
         wall=time.monotonic() - begin,
+        starting=run.starting,
         busy=run.busy,
         replayed=run.replayed,
         workers=len(run.workers),
@@ -136,7 +144,7 @@ class _Run:
         self,
         order: FleetOrder,
         result: Result,
-        left: Sequence[Asked],
+        left: Sequence[Place],
         told: Callable[[Advance], None],
         *,
         before: int,
@@ -148,19 +156,23 @@ class _Run:
         self._recordings = 0
         self.not_fetched: list[Row] = []
         """Rows of what could not be read this time: the same order tries it again."""
-        self.busy = self.replayed = 0.0
+        self.starting = self.busy = self.replayed = 0.0
         self.workers: set[str] = set()
 
     def through(self, scheduler: str, workers: int) -> None:
         """Replay all that is left; what is done is written, whatever ends this."""
         work = partial(replay_one, changes=self._order.changes, closed_loop=self._order.closed_loop)
+        watch = StoreWatch()
         begin = written = time.monotonic()
         try:
             for count, done in enumerate(
                 run_tasks(work, self._left, scheduler=scheduler, workers=workers), 1
             ):
-                self._take(self._left[done.place], done)
                 now = time.monotonic()
+                if count == 1:
+                    self.starting = now - begin
+                self._take(self._left[done.place], done)
+                watch.take(done)
                 if now - written >= _WRITTEN_AFTER or self._recordings >= _WRITTEN_TOGETHER:
                     self._write()
                     written = now
@@ -170,10 +182,15 @@ class _Run:
         finally:
             self._write()
 
-    def _take(self, asked: Asked, done: Done[Replayed]) -> None:
+    def _take(self, asked: Place, done: Done[Replayed]) -> None:
         replayed = done.result
-        if replayed is None:  # a fault of this program, or the workers were lost with it
-            row = {'recording': asked.path, 'mount': '', 'size_bytes': asked.size, 'reason': done.reason}
+        if replayed is None:  # the store is away, the workers were lost, or a fault of this program
+            row = {
+                'recording': asked.recording,
+                'mount': '',
+                'size_bytes': asked.size,
+                'reason': reason_of(done),
+            }
             row |= told_of(self._order.changes, self._order.closed_loop)
             replayed = Replayed((row,), False, 0.0, '')
         self.busy += replayed.busy
@@ -183,7 +200,7 @@ class _Run:
         if not replayed.fetched:
             self.not_fetched += replayed.rows
             return
-        self._waiting += replayed.rows
+        self._waiting += [{**row, 'fingerprint': asked.fingerprint} for row in replayed.rows]
         self._recordings += 1
 
     def _write(self) -> None:
