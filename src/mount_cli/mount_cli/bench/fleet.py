@@ -5,6 +5,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -59,7 +60,7 @@ _STAGES = {
 
 def _stages(found: Sequence[Place]) -> tuple[float, ...]:
     """Return the processor time (s) of all replays, and of each of `_STAGES`."""
-    whole = sum(_time(lambda place=place: replay_one(place, _CHANGE)) for place in found)
+    whole = sum(_time(partial(replay_one, place, _CHANGE)) for place in found)
     stages = [_stages_of_one(Path(place.uri)) for place in found]
     return whole, *(sum(each) for each in zip(*stages, strict=True))
 
