@@ -10,7 +10,7 @@ from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
 from mount_bags.bag.writer import BagWriter
 from mount_bags.events.recorded_events import recorded_events
-from mount_bags.messages import compact_times
+from mount_bags.messages import compact_times, stamps
 from mount_ros.topics import COIL_TEMPERATURE, DISPLACEMENT, JOINT_STATE
 
 TOPICS = 3
@@ -33,6 +33,7 @@ def all_figures(recording):
 
 def test_an_audit_needs_few_bytes_for_each_message(tmp_path, monkeypatch):
     monkeypatch.setattr(compact_times, 'BLOCK', 512)
+    monkeypatch.setattr(stamps, '_AT_ONCE', 512)
     short, long = 4_000, 16_000
     folders = [
         write_drive(tmp_path / f'bag_{count}', count, chunk_size=50_000) for count in (short, short + 1, long)

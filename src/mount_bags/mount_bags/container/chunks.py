@@ -5,7 +5,6 @@ byte to the last. The message indexes behind a chunk carry no checksum: they are
 begin, and taken only if the records found there leave no byte unexplained.
 """
 
-import functools
 import mmap
 import re
 import struct
@@ -146,9 +145,12 @@ def add_indexed(content: bytes, found: IndexedChunks) -> bool:
         if offsets % _OFFSET.size:
             return False
         low, high = (content[_INDEXED.size + byte : place : _OFFSET.size] for byte in range(2))
+        channels = frozenset(low)
+        if any(high):
+            channels = frozenset(each[0] for each in _OFFSET.iter_unpack(content[_INDEXED.size : place]))
     except (struct.error, UnicodeDecodeError):
         return False
-    found.add((position, length, index_length, packed, size, start, end), name, _channels(low, high))
+    found.add((position, length, index_length, packed, size, start, end), name, channels)
     return True
 
 
@@ -173,12 +175,6 @@ def add_chunk(data: mmap.mmap, index: IndexedChunk, found: PackedRows[Chunk]) ->
 def _from_summary(*told: Any) -> Chunk:
     position, begin, end, size, crc, start, last, index_length, compression, channels = told
     return Chunk(position, begin, (end,), size, crc, compression, start, last, index_length, channels)
-
-
-@functools.lru_cache(maxsize=256)
-def _channels(low: bytes, high: bytes) -> frozenset[int]:
-    """Return the channels of these low and high bytes."""
-    return frozenset(first | second << 8 for first, second in zip(low, high, strict=True))
 
 
 def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
