@@ -5,7 +5,7 @@ only if everything that fixes its layout is as in the first one of its topic; a 
 general way of `Recording.parts`, which gives the same numbers.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -70,7 +70,7 @@ class _FileColumns:
     ):
         self._recording, self._file, self._wanted, self._size = recording, file, wanted, size
         self._numbers = {name: recording.numbers_in(file, name) for name in wanted}
-        self._held: dict[frozenset[int], list[str]] = {}
+        self._held: dict[frozenset[int], frozenset[str]] = {}
         self._columns = _Columns(size)
 
     def parts(self) -> Iterator[ColumnPart]:
@@ -86,14 +86,14 @@ class _FileColumns:
                 yield from self._columns.flushed(self._size)
         yield from self._columns.flushed()
 
-    def _held_in(self, chunk: Chunk) -> list[str]:
+    def _held_in(self, chunk: Chunk) -> frozenset[str]:
         """Return which of the topics have messages in a chunk."""
         channels = chunk.channels
         assert channels is not None  # of a plain file
         if channels not in self._held:
-            self._held[channels] = [
+            self._held[channels] = frozenset(
                 name for name, numbers in self._numbers.items() if not channels.isdisjoint(numbers)
-            ]
+            )
         return self._held[channels]
 
     def _take(self, chunk: Chunk) -> int:
@@ -111,7 +111,7 @@ class _FileColumns:
             if not len(found):
                 continue
             series = self._recording.series_of(name, found)
-            if len(numbers) == 1 and not self._columns.know([name]):
+            if len(numbers) == 1 and not self._columns.know({name}):
                 picked = _picked(series, self._wanted[name], numbers[0])
                 if picked is not None:
                     self._columns.learn(name, picked)
@@ -143,9 +143,9 @@ class _Columns:
         self._size = size
         self._topics: dict[str, _Picked] = {}
 
-    def know(self, names: list[str]) -> bool:
+    def know(self, names: Set[str]) -> bool:
         """Return whether messages of all these topics can be taken."""
-        return self._topics.keys() >= set(names)
+        return self._topics.keys() >= names
 
     def learn(self, name: str, picked: _Picked) -> None:
         """Take messages of one more topic; nothing must be filled."""

@@ -33,14 +33,17 @@ from mount_bags.container.chunks import (
 from mount_bags.container.message_compression import plain
 from mount_bags.container.stored import ACCOUNTS, StorageError, StoredMessages, StoredTopic
 from mount_bags.container.summary import (
+    Hash,
     Proof,
+    covered,
     data_proof,
+    hashed,
     parsed,
     parsed_attachment,
     parsed_metadata,
     read_summary,
 )
-from mount_bags.container.whole_files import FileError, forget, mapped
+from mount_bags.container.whole_files import COMPRESSED_SUFFIXES, FileError, forget, mapped
 
 _KEPT = 1 << 24  # bytes of the file in memory while the chunks are looked at, chosen
 _LAST_OPCODE = Opcode.DATA_END
@@ -83,6 +86,7 @@ class McapFile:
         self._data = _opened(path)
         self._summary = read_summary(self._data)
         self._data_proof: Proof | None = None
+        self._crc: int | None = None  # of the data section, once it was taken
         if self._summary.proof is not Proof.SOUND or not self._take_summary():
             self._search()
         self.topics = {number: self._topic(channel) for number, channel in self._channels.items()}
@@ -183,12 +187,22 @@ class McapFile:
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
         if self._data_proof is None:
-            end = self._summary.begin if self.proven else self._data_end
-            self._data_proof = data_proof(self._data, end)
+            self._data_proof = data_proof(self._data, self._section_end, self._crc)
             if self._data_proof is Proof.WRONG:
                 values = ', and numbers in it may be wrong' if self._unprotected else ''
                 self._warn(f'the checksum of its data section is wrong: some byte is damaged{values}')
         return self._data_proof
+
+    def hashed(self, digest: Hash) -> None:
+        """Let `digest` take all bytes of the file; `data_proof` then needs no pass of its own."""
+        packed = self.path.suffix in COMPRESSED_SUFFIXES  # as a whole: its bytes are others than those read
+        end = 0 if packed else covered(self._section_end)
+        crc = hashed(self.path, digest, end)
+        self._crc = crc if end > 0 else None
+
+    @property
+    def _section_end(self) -> int:
+        return self._summary.begin if self.proven else self._data_end
 
     @property
     def _unprotected(self) -> bool:
