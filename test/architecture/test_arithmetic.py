@@ -52,6 +52,7 @@ ALLOWED = {
     ('mount_bags.container.writer', 'np.cumsum'): 'whole numbers',
     ('mount_bags.container.stored', 'np.cumsum'): 'whole numbers',
     ('mount_bags.signals.even_grid', 'np.mean'): 'shares of whole numbers',
+    ('mount_bags.messages.compact_times', 'np.cumsum'): 'whole numbers',
     ('mount_bags.messages.stamps', 'np.cumsum'): 'whole numbers',
     ('mount_bags.messages.time_axis', 'np.interp'): 'times told to people',
     ('mount_bags.messages.stamps', '**'): 'rates of topics, for the eye',

@@ -26,8 +26,9 @@ from mount_bags.bag.piece_topics import (
 )
 from mount_bags.container.stored import HEAD, StorageError, StoredFile, StoredMessages
 from mount_bags.messages.columns import ColumnCollector
+from mount_bags.messages.compact_times import Times
 from mount_bags.messages.definitions import Definition
-from mount_bags.messages.series import Column, Payloads, Series, Times, registered_topic
+from mount_bags.messages.series import Column, Heads, Payloads, Series, heads_of, registered_topic
 from mount_bags.messages.time_axis import Arrivals, TimeAxis, anchors, axis_of
 from mount_bags.messages.topic_times import TimesCollector, TopicTimes
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
@@ -163,19 +164,24 @@ class Recording:
         for name, block in self._blocks(list(collectors)) if collectors else ():
             collectors[name].add(block)
         for name in list(collectors):
-            head, found, stamps = collectors.pop(name).finish()
-            self._note_damage(name, len(head))
+            heads, found, stamps = collectors.pop(name).finish()
+            self._note_damage(name, len(heads.received))
             known = self._series[name].columns if name in self._series else {}
             self._series[name] = self._made(
-                name, partial(self._payloads, name), head, columns={**known, **found}, stamps=stamps
+                name, partial(self._payloads, name), heads, columns={**known, **found}, stamps=stamps
             )
+
+    def release(self) -> None:
+        """Forget what was read of the topics: it is read again where it is asked for."""
+        self._series = {}
 
     def beginning(self, name: str) -> Series:
         """Return the first block of messages of a topic, which tells its columns; raises `ReadingError`."""
         full_name = self.resolve(name)
         first = next(self._blocks([full_name]), None)
         payloads = Payloads([] if first is None else [first[1].payloads()])
-        return self._made(full_name, payloads, np.empty(0, HEAD) if first is None else first[1].heads)
+        heads = np.empty(0, HEAD) if first is None else first[1].heads
+        return self._made(full_name, payloads, heads_of(heads))
 
     def parts(self, names: Iterable[str], size: int) -> Iterator[Series]:
         """Yield the messages of topics in the order of the files; at most their ends have fewer than `size`.
@@ -362,8 +368,8 @@ class Recording:
         return self._series_of(name, gathered)
 
     def _series_of(self, name: str, gathered: '_Gathered') -> Series:
-        head = np.concatenate([np.empty(0, HEAD), *gathered.heads])
-        return self._made(name, Payloads(gathered.payloads), head)
+        heads = heads_of(np.concatenate([np.empty(0, HEAD), *gathered.heads]))
+        return self._made(name, Payloads(gathered.payloads), heads)
 
     def _is_loaded(self, name: str) -> bool:
         return name in self._series and self._series[name].loaded
@@ -382,7 +388,7 @@ class Recording:
         self,
         name: str,
         payloads: Payloads | Callable[[], Payloads],
-        head: np.ndarray,
+        heads: Heads,
         *,
         columns: Mapping[str, Column] | None = None,
         stamps: Times | None = None,
@@ -392,9 +398,7 @@ class Recording:
             name,
             self.topics[name].type,
             payloads,
-            np.ascontiguousarray(head['log_time']),
-            np.ascontiguousarray(head['publish_time']),
-            sequences=np.ascontiguousarray(head['sequence']),
+            heads,
             columns=columns,
             stamps=stamps,
             definition=definition,

@@ -5,21 +5,20 @@ byte to the last. The message indexes behind a chunk carry no checksum: they are
 begin, and taken only if the records found there leave no byte unexplained.
 """
 
-import functools
 import mmap
 import re
 import struct
-import sys
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
+from mount_bags.container.packed_rows import PackedRows
 from mount_bags.container.stored import HEAD, StoredMessages, rows_at
 
 Bytes = NDArray[np.uint8]
@@ -70,7 +69,6 @@ class Chunk:
     counts: dict[int, int] = field(default_factory=dict)  # messages by channel, once explored
     declarations: tuple[tuple[int, bytes], ...] = ()  # of schemas and channels, once explored
     explored: bool = False
-    damaged: bool = False
 
     @property
     def end(self) -> int:
@@ -121,14 +119,22 @@ class IndexedChunk(NamedTuple):
     index_length: int  # of the message indexes behind it
     packed: int
     size: int  # when unpacked
-    compression: str
     start_time: int
     end_time: int
+    compression: str
     channels: frozenset[int]
 
 
-def indexed_in(content: bytes) -> IndexedChunk | None:
-    """Return what the chunk index record in `content` tells, None if it is not readable."""
+IndexedChunks: TypeAlias = PackedRows[IndexedChunk]
+
+
+def indexed_chunks() -> IndexedChunks:
+    """Return a place for what a summary tells of its chunks."""
+    return PackedRows(IndexedChunk, 7)
+
+
+def add_indexed(content: bytes, found: IndexedChunks) -> bool:
+    """Add to `found` what the chunk index record in `content` tells; False if it is not readable."""
     try:
         start, end, position, length, offsets = _INDEXED.unpack_from(content)
         place = _INDEXED.size + offsets
@@ -137,43 +143,38 @@ def indexed_in(content: bytes) -> IndexedChunk | None:
         name = content[place + _INDEXED_SIZES.size : name_end].decode()
         packed, size = _PACKED_SIZES.unpack_from(content, name_end)
         if offsets % _OFFSET.size:
-            return None
+            return False
         low, high = (content[_INDEXED.size + byte : place : _OFFSET.size] for byte in range(2))
         channels = frozenset(low)
         if any(high):
             channels = frozenset(each[0] for each in _OFFSET.iter_unpack(content[_INDEXED.size : place]))
     except (struct.error, UnicodeDecodeError):
-        return None
-    # one object for all equal ones: a long recording has very many chunks
-    return IndexedChunk(
-        position, length, index_length, packed, size, sys.intern(name), start, end, _same(channels)
-    )
+        return False
+    found.add((position, length, index_length, packed, size, start, end), name, channels)
+    return True
 
 
-def indexed_chunk(data: mmap.mmap, index: IndexedChunk) -> Chunk | None:
-    """Return the chunk that a summary with a sound checksum describes; its own head is not needed."""
+def summary_chunks() -> PackedRows[Chunk]:
+    """Return a place for the chunks that a summary with a sound checksum describes."""
+    return PackedRows(_from_summary, 8)
+
+
+def add_chunk(data: mmap.mmap, index: IndexedChunk, found: PackedRows[Chunk]) -> bool:
+    """Add the chunk of which a summary tells, False if there is none; its own head tells its checksum."""
     position = index.position
     end = position + index.length
-    if end > len(data) or index.length < _SHORTEST or index.size > _LARGEST:
-        return None
-    return Chunk(
-        position=position,
-        begin=end - index.packed,
-        ends=(end,),
-        size=index.size,
-        crc=_HEAD.unpack_from(data, position + RECORD.size)[3],
-        compression=index.compression,
-        start_time=index.start_time,
-        end_time=index.end_time,
-        index_length=index.index_length,
-        channels=index.channels if index.index_length else None,
-    )
+    if end > len(data) or not _SHORTEST + index.packed <= index.length or index.size > _LARGEST:
+        return False
+    crc = _HEAD.unpack_from(data, position + RECORD.size)[3]
+    numbers = (position, end - index.packed, end, index.size, crc, index.start_time, index.end_time)
+    channels = index.channels if index.index_length else None
+    found.add((*numbers, index.index_length), index.compression, channels)
+    return True
 
 
-@functools.lru_cache(maxsize=256)
-def _same(channels: frozenset[int]) -> frozenset[int]:
-    """Return one object for all equal sets."""
-    return channels
+def _from_summary(*told: Any) -> Chunk:
+    position, begin, end, size, crc, start, last, index_length, compression, channels = told
+    return Chunk(position, begin, (end,), size, crc, compression, start, last, index_length, channels)
 
 
 def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:

@@ -5,8 +5,9 @@ is asked for. Where it is not, the file is walked record by record and searched 
 their checksums prove is taken. Declarations of topics count more where a checksum covers them.
 """
 
+import functools
 import mmap
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,16 +22,19 @@ from mount_bags.container.chunks import (
     RECORD,
     Chunk,
     Contents,
+    add_chunk,
     chunk_at,
     contents_of,
     explore,
-    indexed_chunk,
+    indexed_chunks,
     messages_at,
     partial_chunk,
     scattered_chunks,
+    summary_chunks,
     unpacked,
 )
 from mount_bags.container.message_compression import plain
+from mount_bags.container.packed_rows import PackedRows
 from mount_bags.container.stored import ACCOUNTS, StorageError, StoredMessages, StoredTopic
 from mount_bags.container.summary import (
     Hash,
@@ -45,7 +49,7 @@ from mount_bags.container.summary import (
 )
 from mount_bags.container.whole_files import COMPRESSED_SUFFIXES, FileError, forget, mapped
 
-_KEPT = 1 << 24  # bytes of the file in memory while the chunks are looked at, chosen
+_KEPT = 1 << 22  # bytes of the file in memory while the chunks are looked at, chosen
 _LAST_OPCODE = Opcode.DATA_END
 _LENGTHS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
 _PRIVATE_OPCODE = 0x80  # and above: of other programs, to be skipped
@@ -70,7 +74,8 @@ class McapFile:
         self.records: list[tuple[str, dict[str, str]]] = []
         self.warnings: list[str] = []
         self.lost_beside: list[str] = []  # names of metadata and attachments
-        self.chunks: list[Chunk] = []
+        self.chunks: Sequence[Chunk] = []
+        self._damaged: set[int] = set()  # positions of chunks
         self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
         self._decompressor = ZstdDecompressor()
         self.closed = False  # whether the writer came to the end of its messages
@@ -113,7 +118,7 @@ class McapFile:
         # What damaged a part that is not understood may have changed a number that nothing protects.
         touched = self._data_proof is Proof.WRONG or bool(self.unexplained)
         doubtful = touched and self._unprotected
-        return doubtful or bool(self.undeclared) or any(chunk.damaged for chunk in self.chunks)
+        return doubtful or bool(self.undeclared) or bool(self._damaged)
 
     def message_counts(self) -> dict[int, int]:
         """Return the number of messages by topic: as written where that is proven, else as readable."""
@@ -149,7 +154,7 @@ class McapFile:
 
     def contents(self, chunk: Chunk) -> Contents | None:
         """Return what is in a chunk; None, with a warning, if it is damaged."""
-        if chunk.damaged:
+        if self.is_damaged(chunk):
             return None
         contents = contents_of(self._data, chunk)
         if contents is None:
@@ -163,10 +168,15 @@ class McapFile:
         """Whether a checksum vouches for all of it, and its messages are in chunks that tell their topics."""
         if not self.proven or self._loose or self.data_proof() is not Proof.SOUND:
             return False
-        return all(
-            chunk.channels is not None and chunk.compression in ('', 'zstd') and not chunk.damaged
-            for chunk in self.chunks
-        )
+        return not self._damaged and self._chunks_are_plain
+
+    @functools.cached_property
+    def _chunks_are_plain(self) -> bool:
+        return all(chunk.channels is not None and chunk.compression in ('', 'zstd') for chunk in self.chunks)
+
+    def is_damaged(self, chunk: Chunk) -> bool:
+        """Return whether a chunk is known to be damaged; others are taken for sound until they are read."""
+        return chunk.position in self._damaged
 
     def unpacked(self, chunk: Chunk) -> bytes | None:
         """Return the bytes in a chunk of a `plain` file, which need no checksum of their own.
@@ -214,16 +224,15 @@ class McapFile:
     def _take_summary(self) -> bool:
         """Take what the summary tells; False if that is not enough."""
         summary = self._summary
-        chunks = self._indexed_chunks()
-        statistics = summary.statistics
-        if statistics is None or statistics.chunk_count != len(chunks) or None in chunks:
+        chunks, statistics = self._indexed_chunks(), summary.statistics
+        if statistics is None or chunks is None or statistics.chunk_count != len(chunks):
             return False
         if statistics.channel_count > len(summary.channels) or statistics.schema_count > len(summary.schemas):
             return False  # not repeated in the summary
         self._channels, self._schemas = dict(summary.channels), dict(summary.schemas)
         if any(channel not in self._channels for channel in statistics.channel_message_counts):
             return False
-        self.chunks = sorted((chunk for chunk in chunks if chunk), key=lambda chunk: chunk.position)
+        self.chunks = chunks
         self._counts = dict(statistics.channel_message_counts)
         self._walk_between_chunks()
         self._take_times(statistics)
@@ -233,17 +242,18 @@ class McapFile:
             self._warn('its last bytes are damaged; all else is read')
         return True
 
-    def _indexed_chunks(self) -> list[Chunk | None]:
-        """Return the chunks of which the summary tells; what it tells of them is not kept twice."""
-        found: list[Chunk | None] = []
-        waiting, self._summary.chunks = self._summary.chunks[::-1], []
+    def _indexed_chunks(self) -> PackedRows[Chunk] | None:
+        """Return the chunks of which the summary tells in their order, None if one cannot be there."""
+        found, told = summary_chunks(), self._summary.chunks
+        self._summary.chunks = indexed_chunks()  # what it tells of them is not kept twice
+        positions = [index.position for index in told]
         forgotten = 0
-        while waiting:
-            index = waiting.pop()
-            found.append(indexed_chunk(self._data, index))
-            if index.position - forgotten >= _KEPT:
-                forget(self._data, forgotten, index.position)
-                forgotten = index.position
+        for place in sorted(range(len(told)), key=positions.__getitem__):
+            if not add_chunk(self._data, told[place], found):
+                return None
+            if positions[place] - forgotten >= _KEPT:
+                forget(self._data, forgotten, positions[place])
+                forgotten = positions[place]
         return found
 
     def _take_times(self, statistics: Statistics) -> None:
@@ -297,7 +307,9 @@ class McapFile:
     def _walk_all(self) -> tuple[dict[int, Channel], dict[int, Schema]]:
         """Find the chunks; return the channels and schemas that are declared outside of them."""
         self._channels, self._schemas = {}, {}
-        end = self._walk(len(MCAP0_MAGIC), len(self._data), into_chunks=True)
+        found: list[Chunk] = []
+        end = self._walk(len(MCAP0_MAGIC), len(self._data), found)
+        self.chunks = found
         if not (self._footer_found and self._data[end:] == MCAP0_MAGIC):
             self.tail = self._tail(end)
             self._add_scattered_chunks()
@@ -394,16 +406,19 @@ class McapFile:
 
     # Records outside of chunks.
 
-    def _walk(self, position: int, limit: int, into_chunks: bool = False) -> int:
-        """Take the records from `position` on; return where the last whole one before `limit` ends."""
+    def _walk(self, position: int, limit: int, chunks: list[Chunk] | None = None) -> int:
+        """Take the records from `position` on; return where the last whole one before `limit` ends.
+
+        Chunks are added to `chunks`.
+        """
         while position < limit:
             end = self._record_end(position, limit)
             if end is None:
                 break
             opcode = self._data[position]
-            chunk = chunk_at(self._data, position) if into_chunks and opcode == Opcode.CHUNK else None
-            if chunk is not None:
-                self.chunks.append(chunk)
+            chunk = chunk_at(self._data, position) if opcode == Opcode.CHUNK else None
+            if chunk is not None and chunks is not None:
+                chunks.append(chunk)
             else:
                 self._take_record(opcode, position, end)
             position = end
@@ -472,7 +487,7 @@ class McapFile:
                 self._channels.setdefault(channel.id, channel)
 
     def _leave_out(self, chunk: Chunk) -> None:
-        chunk.damaged = True
+        self._damaged.add(chunk.position)
         self._warn(f'the chunk at byte {chunk.position} is damaged and left out')
 
     def _drop_loose(self) -> None:

@@ -25,7 +25,7 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from mount_bags.container.chunks import RECORD, IndexedChunk, indexed_in
+from mount_bags.container.chunks import RECORD, IndexedChunks, add_indexed, indexed_chunks
 from mount_bags.container.whole_files import forget
 
 T = TypeVar('T')
@@ -34,7 +34,7 @@ _FOOTER_SIZE = 20  # bytes behind opcode and length
 _FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
 _CRC_SIZE = 4  # bytes
 _DATA_END = struct.Struct('<BQI')
-_STEP = 1 << 24  # bytes read at once for a checksum
+_STEP = 1 << 20  # bytes of the file in memory while its checksum is made
 _AT_ONCE = 1 << 18  # bytes, chosen: they stay in the processor's cache from one checksum to the other
 
 
@@ -62,7 +62,7 @@ class Summary:
     footer: int = 0
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[IndexedChunk] = field(default_factory=list)
+    chunks: IndexedChunks = field(default_factory=indexed_chunks)
     statistics: Statistics | None = None
     beside: list[MetadataIndex | AttachmentIndex] = field(default_factory=list)
 
@@ -161,9 +161,9 @@ def _fill(summary: Summary, data: mmap.mmap) -> bool:
 
 
 def _take(summary: Summary, opcode: int, content: bytes) -> bool:
-    if opcode == Opcode.CHUNK_INDEX and (chunk := indexed_in(content)):
-        summary.chunks.append(chunk)
-    elif opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
+    if opcode == Opcode.CHUNK_INDEX:
+        return add_indexed(content, summary.chunks)
+    if opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
         summary.schemas[schema.id] = schema
     elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):
         summary.channels[channel.id] = channel
@@ -174,5 +174,5 @@ def _take(summary: Summary, opcode: int, content: bytes) -> bool:
     elif opcode == Opcode.STATISTICS and (statistics := parsed(Statistics.read, content)):
         summary.statistics = statistics
     else:
-        return opcode not in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.STATISTICS)
+        return opcode not in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
     return True

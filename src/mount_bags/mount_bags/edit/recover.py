@@ -165,10 +165,12 @@ def _balance(recording: Recording, bag: VerbatimBag, stored: int) -> Recovery:
 
 def _estimate(files: Sequence[McapFile], kept: int) -> int | None:
     """Return about how many messages the damaged and cut-off chunks had, None if there is none such."""
-    whole = [chunk for file in files for chunk in file.chunks if not chunk.damaged]
+    whole = [chunk for file in files for chunk in file.chunks if not file.is_damaged(chunk)]
     unpacked = sum(chunk.size for chunk in whole)
     packed = sum(chunk.end - chunk.position for chunk in whole)
-    lost = sum(chunk.size for file in files for chunk in file.chunks if chunk.damaged) / max(1, unpacked)
+    lost = sum(chunk.size for file in files for chunk in file.chunks if file.is_damaged(chunk)) / max(
+        1, unpacked
+    )
     for file in files:
         lost += (file.tail.size if file.tail else 0) / max(1, unpacked)
         lost += sum(part.end - part.begin for part in file.unexplained if part.end < file.size) / max(
@@ -191,15 +193,15 @@ def _lost_before(recording: Recording) -> int:
 
 
 def _lost_bytes(file: McapFile) -> int:
-    damaged = sum(chunk.end - chunk.position for chunk in file.chunks if chunk.damaged)
+    damaged = sum(chunk.end - chunk.position for chunk in file.chunks if file.is_damaged(chunk))
     return damaged + sum(stretch.end - stretch.begin for stretch in file.unexplained)
 
 
 def _lost_inside(file: McapFile) -> int:
     """Return the ns between whole chunks with something lost between them."""
-    losses = [chunk.position for chunk in file.chunks if chunk.damaged]
+    losses = [chunk.position for chunk in file.chunks if file.is_damaged(chunk)]
     losses += [stretch.begin for stretch in file.unexplained]
-    whole = [chunk for chunk in file.chunks if not chunk.damaged]
+    whole = [chunk for chunk in file.chunks if not file.is_damaged(chunk)]
     lost = 0
     for before, after in itertools.pairwise(whole):
         if any(before.position < position < after.position for position in losses):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import Recording
 from mount_bags.events.event_marks import Mark, read_marks
-from mount_bags.events.switching_trace import SwitchingTrace
+from mount_bags.events.switching_trace import ArrivedSwitching
 from mount_bags.messages.series import SeriesError, registered_topic
 from mount_bags.messages.time_axis import TimeAxis
 from mount_ros.topics import CONTROL_TRACE, EVENT
@@ -84,7 +84,7 @@ def _plain(kind: str) -> str:
 def _switching(recording: Recording) -> list[RecordedEvent]:
     if CONTROL_TRACE.name not in recording:
         return []
-    trace = SwitchingTrace()
+    trace = ArrivedSwitching()
     try:
         for part in column_parts(recording, {CONTROL_TRACE.name: (trace.COLUMN,)}):
             trace.add(part)

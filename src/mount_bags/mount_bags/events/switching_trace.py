@@ -16,13 +16,12 @@ class SwitchingTrace:
     COLUMN = 'damping_active'
 
     def __init__(self) -> None:
-        self._stamps, self._arrivals = CompactTimes(), CompactTimes()
+        self._stamps = CompactTimes()
         self._active: list[NDArray[np.bool_]] = [np.empty(0, bool)]
 
     def add(self, part: ColumnPart) -> None:
         """Take a part of the trace with the column `COLUMN`."""
         self._stamps.add(part.stamps)
-        self._arrivals.add(part.receive_times)
         self._active.append(part.column(self.COLUMN) > 0.0)
 
     @property
@@ -30,28 +29,39 @@ class SwitchingTrace:
         """At how many samples damping was active."""
         return sum(int(np.count_nonzero(each)) for each in self._active)
 
-    def by_stamps(self) -> list['Switched']:
-        """Return where damping went on and where off, in the order of the stamps."""
-        stamps = self._stamps.finished()
-        order = None if stamps.rising else np.argsort(stamps.whole(), kind='stable')
-        return self._switched(order)
+    def switched(self, order: CompactTimes | None = None) -> tuple[Places, Places]:
+        """Return at which samples, counted as they came, damping went on and off.
 
-    def by_arrival(self) -> list['Switched']:
+        They follow one another by their stamps, or by what is told for each of them in `order`.
+        """
+        active, stamps = np.concatenate(self._active), self._stamps.finished()
+        if not len(active):
+            return np.empty(0, np.intp), np.empty(0, np.intp)
+        by = stamps if order is None else order
+        if by.rising:
+            return switching_places(_Seconds(stamps), active)
+        places = np.argsort(by.whole(), kind='stable')
+        on, off = switching_places(_Seconds(stamps, places), active[places])
+        return places[on], places[off]
+
+
+class ArrivedSwitching(SwitchingTrace):
+    """The same with the times at which the samples came in."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._arrivals = CompactTimes()
+
+    def add(self, part: ColumnPart) -> None:
+        """Take a part of the trace with the column `COLUMN`."""
+        super().add(part)
+        self._arrivals.add(part.receive_times)
+
+    def by_arrival(self) -> tuple['Switched', 'Switched']:
         """Return where damping went on and where off, in the order in which the samples came in."""
         arrivals = self._arrivals.finished()
-        order = None if arrivals.rising else np.argsort(arrivals.whole(), kind='stable')
-        return self._switched(order)
-
-    def _switched(self, order: Places | None) -> list['Switched']:
-        active = np.concatenate(self._active)
-        stamps, arrivals = self._stamps.finished(), self._arrivals.finished()
-        if order is not None:
-            active = active[order]
-        if not len(active):
-            return [Switched(stamps.whole(), arrivals.whole())] * 2
-        found = switching_places(_Seconds(stamps, order), active)
-        in_file = (places if order is None else order[places] for places in found)
-        return [Switched(stamps.at(places), arrivals.at(places)) for places in in_file]
+        on, off = (Switched(self._stamps.at(each), arrivals.at(each)) for each in self.switched(arrivals))
+        return on, off
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,7 @@ class Switched:
 class _Seconds:
     """Times (s) of samples from the first on."""
 
-    def __init__(self, stamps: CompactTimes, order: Places | None):
+    def __init__(self, stamps: CompactTimes, order: Places | None = None):
         self._stamps, self._order = stamps, order
         self._first = self._at(np.zeros(1, np.intp))
 

@@ -4,12 +4,13 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from mount_bags.container.stored import HEAD, StoredMessages
-from mount_bags.messages.series import Column, Payloads, Series, SeriesError, Times
+from mount_bags.container.stored import StoredMessages
+from mount_bags.messages.compact_times import CompactTimes
+from mount_bags.messages.series import Column, Heads, Payloads, Series, SeriesError, Times, heads_of
 
 _BLOCK = 4096  # messages, chosen: 3 MB of the longest ones of this project
 
-MakeSeries = Callable[[Payloads, np.ndarray], Series]
+MakeSeries = Callable[[Payloads, Heads], Series]
 """Makes a series of messages and their heads."""
 
 
@@ -20,7 +21,7 @@ class ColumnCollector:
         self._make_series = make_series
         self._columns: dict[str, list[Column]] = {name: [] for name in names}
         self._stamps: list[Times] | None = []
-        self._heads: list[np.ndarray] = []
+        self._heads = Heads(CompactTimes(), CompactTimes(), CompactTimes())
         self._waiting: list[np.ndarray | list[bytes]] = []
         self._waiting_heads: list[np.ndarray] = []
         self._count = 0
@@ -33,20 +34,23 @@ class ColumnCollector:
         if self._count >= _BLOCK:
             self._take()
 
-    def finish(self) -> tuple[np.ndarray, dict[str, Column], Times | None]:
+    def finish(self) -> tuple[Heads, dict[str, Column], Times | None]:
         """Return the heads of all messages, the columns, and the stamps in ns, None where there are none."""
         if self._count:
             self._take()
-        if not self._heads:
-            return np.empty(0, HEAD), {}, None
-        columns = {name: np.concatenate(parts) for name, parts in self._columns.items()}
+        if not len(self._heads.received):
+            return self._heads, {}, None
+        columns = {name: np.concatenate(self._columns.pop(name)) for name in list(self._columns)}
         stamps = None if self._stamps is None else np.concatenate(self._stamps)
-        return np.concatenate(self._heads), columns, stamps
+        for times in self._heads:
+            times.finished()
+        return self._heads, columns, stamps
 
     def _take(self) -> None:
-        heads = np.concatenate(self._waiting_heads)
+        heads = heads_of(np.concatenate(self._waiting_heads))
         series = self._make_series(Payloads(self._waiting), heads)
-        self._heads.append(heads)
+        for kept, times in zip(self._heads, heads, strict=True):
+            kept.add(times.whole())
         self._waiting, self._waiting_heads, self._count = [], [], 0
         for name in list(self._columns):
             try:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 Times = NDArray[np.int64]
 
-BLOCK = 1 << 16  # times, chosen: 0.5 MB while they are looked at
-_NARROW = (np.uint8, np.uint16, np.uint32)
+BLOCK = 1 << 13  # times, chosen: so that one long step makes few others take more bytes
+_WORD = 8  # bytes of a time
 
 
 class _Block(NamedTuple):
@@ -24,14 +24,14 @@ class _Block(NamedTuple):
     least: int
     highest: int
     least_step: int
-    above: NDArray[np.generic] | None
+    above: NDArray[np.uint8]  # (steps, bytes of each), little end first
 
     def times(self) -> Times:
         found = np.empty(self.size, np.int64)
         found[0] = self.first
-        found[1:] = self.least_step
-        if self.above is not None:
-            found[1:] += self.above.astype(np.int64)
+        found[1:] = 0
+        found[1:].view(np.uint8).reshape(-1, _WORD)[:, : self.above.shape[1]] = self.above
+        found[1:] += self.least_step
         return np.cumsum(found, out=found)
 
 
@@ -43,6 +43,8 @@ class CompactTimes:
         """Whether none is below the one before it."""
         self.longest_step = 0
         """The largest distance of two that follow one another, ns."""
+        self.strictly_rising = True
+        """Whether each is above the one before it."""
         self._blocks: list[_Block] = []
         self._last = 0
         self._waiting: list[Times] = []
@@ -136,14 +138,16 @@ class CompactTimes:
         least = int(steps.min()) if steps.size else 0
         highest = int(steps.max()) if steps.size else 0
         self.longest_step = max(self.longest_step, abs(border), abs(least), abs(highest))
-        self.rising = self.rising and min(border, least) >= 0
+        self.rising = self.rising and least >= 0 and border >= 0
+        above = (least > 0 or not steps.size) and (border > 0 or not self._blocks)
+        self.strictly_rising = self.strictly_rising and above
         found = _Block(
             len(times),
             int(times[0]),
             int(times.min()),
             int(times.max()),
             least,
-            None if least == highest else _narrow(steps - least, highest - least),
+            _narrow(steps - least, highest - least),
         )
         self._blocks.append(found)
         self._last = int(times[-1])
@@ -193,7 +197,7 @@ def is_in(times: Times, known: Times) -> NDArray[np.bool_]:
     return known[np.minimum(np.searchsorted(known, times), len(known) - 1)] == times
 
 
-def _narrow(above: Times, highest: int) -> NDArray[np.generic]:
-    """Return numbers from 0 to `highest` in the fewest bytes; those beyond four bytes as they are."""
-    kind = next((kind for kind in _NARROW if highest <= np.iinfo(kind).max), np.int64)
-    return above.astype(kind)
+def _narrow(above: Times, highest: int) -> NDArray[np.uint8]:
+    """Return numbers from 0 to `highest` (n,) as the fewest bytes that hold each of them (n, bytes)."""
+    width = -(-highest.bit_length() // 8)
+    return above.view(np.uint8).reshape(-1, _WORD)[:, :width].copy()

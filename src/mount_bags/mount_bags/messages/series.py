@@ -4,18 +4,18 @@ import functools
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.messages.compact_times import CompactTimes, Times, compact
 from mount_bags.messages.decoding import decode
 from mount_bags.messages.definitions import Definition, installed_definition
 from mount_bags.messages.layout import HEAD, OPTIONS, Layout, LayoutError, layout_of
 from mount_ros.topics import JOINT_STATE, RACK_TOPICS, TOPICS, Scalar, Topic
 
 Column = NDArray[np.float64]
-Times = NDArray[np.int64]
 
 _SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
 STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
@@ -49,6 +49,20 @@ class Payloads:
         return self._parts[index] if self.rows is None else self.rows[index].tobytes()
 
 
+class Heads(NamedTuple):
+    """What is told of messages beside their bytes: when they came and were sent (ns), and their numbers."""
+
+    received: CompactTimes
+    sent: CompactTimes
+    sequences: CompactTimes
+
+
+def heads_of(heads: np.ndarray) -> Heads:
+    """Return heads of dtype `HEAD` (n,) in little memory."""
+    columns = (heads[name].astype(np.int64) for name in ('log_time', 'publish_time', 'sequence'))
+    return Heads(*map(compact, columns))
+
+
 class Series:
     """The messages of one topic in the order in which they were recorded.
 
@@ -64,11 +78,9 @@ class Series:
         topic: str,
         type_name: str,
         payloads: Payloads | Callable[[], Payloads],
-        receive_times: Times,
-        publish_times: Times,
+        heads: 'Heads',
         *,
         definition: Definition | None = None,
-        sequences: NDArray[np.uint32] | None = None,
         columns: Mapping[str, Column] | None = None,
         stamps: Times | None = None,
         obstacle: str = '',
@@ -83,10 +95,8 @@ class Series:
         """
         self.topic = topic
         self.type = type_name
-        self.receive_times = receive_times
-        self.publish_times = publish_times
+        self._heads = heads
         self._payloads = payloads
-        self.sequences = np.zeros(len(receive_times), np.uint32) if sequences is None else sequences
         self.columns = dict(columns or {})
         if stamps is not None:
             self.stamps = stamps
@@ -97,7 +107,22 @@ class Series:
         self._told_units = dict(units or {})
 
     def __len__(self) -> int:
-        return len(self.receive_times)
+        return len(self._heads.received)
+
+    @functools.cached_property
+    def receive_times(self) -> Times:
+        """When the messages came in, ns."""
+        return self._heads.received.whole()
+
+    @functools.cached_property
+    def publish_times(self) -> Times:
+        """When the messages were sent, ns."""
+        return self._heads.sent.whole()
+
+    @functools.cached_property
+    def sequences(self) -> NDArray[np.uint32]:
+        """The numbers that the publisher gave the messages."""
+        return self._heads.sequences.whole().astype(np.uint32)
 
     @property
     def payloads(self) -> Payloads:

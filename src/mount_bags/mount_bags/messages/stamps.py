@@ -12,7 +12,7 @@ A stamp far from those of the samples around it is no time of a sample: misdated
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ _LEAST_SAMPLES = 10
 _MOSTLY = 0.9  # share, chosen
 _JITTER = 0.25  # periods, chosen: steps so far from whole ones are no clock's drift
 _FOLLOWS = 0.05  # chosen: share of a stamp's distance by which the grid follows it
+_AT_ONCE = 1 << 16  # steps that are sorted at once, chosen
 _NEAR = 3  # periods, chosen: a stamp farther off than that is no late one
 _MOST = 0.7  # share, chosen: a topic that lost more than that has no rate to speak of
 FARTHEST = 10 * _NANOSECONDS
@@ -192,21 +193,37 @@ class StampJitter:
 
 def stamp_jitter(stamps: CompactTimes, rate: float) -> StampJitter:
     """Return the jitter of `stamps` (ns) at `rate` in Hz; gaps are no jitter."""
-    ordered = stamps.ordered()
-    fits = 2.0 * _NANOSECONDS / rate < np.iinfo(np.int32).max
-    single = np.concatenate(
-        [
-            steps[np.rint(steps * (rate / _NANOSECONDS)) == 1].astype(np.int32 if fits else np.int64)
-            for steps in ordered.steps()
-        ]
-        or [np.empty(0, np.int64)]
+    steps, counts = _counted(
+        steps[np.rint(steps * (rate / _NANOSECONDS)) == 1] for steps in stamps.ordered().steps()
     )
-    if not single.size:
+    if not steps.size:
         return StampJitter(math.nan, math.nan)
-    deviation = single - np.median(single)
-    deviation /= _NANOSECONDS
-    worst = max(float(deviation.max()), -float(deviation.min()))
-    return StampJitter(float(np.sqrt(np.mean(np.square(deviation, out=deviation)))), worst)
+    total, below = int(counts.sum()), np.cumsum(counts)
+    middle = steps[np.searchsorted(below, [(total - 1) // 2, total // 2], side='right')]
+    deviation = (steps - np.mean(middle)) / _NANOSECONDS
+    square = math.fsum((counts * deviation**2).tolist()) / total
+    return StampJitter(math.sqrt(square), float(np.abs(deviation).max()))
+
+
+def _counted(blocks: Iterable[Times]) -> tuple[Times, NDArray[np.int64]]:
+    """Return which numbers there are in the blocks, rising, and how often each is there."""
+    known, counts = np.empty(0, np.int64), np.empty(0, np.int64)
+    waiting: list[Times] = []
+    for block in blocks:
+        waiting.append(block)
+        if sum(map(len, waiting)) > max(_AT_ONCE, len(known)):
+            known, counts = _with_more(known, counts, waiting)
+            waiting = []
+    return _with_more(known, counts, waiting)
+
+
+def _with_more(
+    known: Times, counts: NDArray[np.int64], more: Sequence[Times]
+) -> tuple[Times, NDArray[np.int64]]:
+    each = np.concatenate([known, *more])
+    found, places = np.unique(each, return_inverse=True)
+    weights = np.concatenate([counts, np.ones(len(each) - len(known), np.int64)])
+    return found, np.bincount(places, weights, len(found)).astype(np.int64)
 
 
 def regular_rate(stamps: CompactTimes) -> float | None:

@@ -28,17 +28,9 @@ class TimeAxis:
     ):
         """Take the samples, at least one, as they came in (ns), and zeros that origins tell of."""
         sound, came = _in_order(compact(stamps), compact(received))
-        kept, kept_arrivals = CompactTimes(), CompactTimes()
-        highest = sound.block(0)[0] - 1
-        for block, arrivals in zip(sound.blocks(), came.blocks(), strict=True):
-            # A late sample moves nothing: its stamp is not above those before it.
-            so_far = np.maximum.accumulate(np.append(highest, block))
-            risen = so_far[1:] > so_far[:-1]
-            kept.add(block[risen])
-            kept_arrivals.add(arrivals[risen])
-            highest = so_far[-1]
-        self._stamp_of = _Relation(kept_arrivals.finished(), kept.finished())
-        self._arrival_of = _Relation(kept, kept_arrivals)
+        stamps, received = _in_time(sound, came)
+        self._stamp_of = _Relation(received, stamps)
+        self._arrival_of = _Relation(stamps, received)
         self.zero = min([sound.least, *told])
 
     def of_stamps(self, stamps: Times) -> NDArray[np.float64]:
@@ -116,6 +108,21 @@ def _in_order(stamps: CompactTimes, received: CompactTimes) -> tuple[CompactTime
     all_stamps, all_received = all_stamps[sound], all_received[sound]
     order = np.argsort(all_received, kind='stable')
     return compact(all_stamps[order]), compact(all_received[order])
+
+
+def _in_time(stamps: CompactTimes, received: CompactTimes) -> tuple[CompactTimes, CompactTimes]:
+    """Return the samples without late ones, whose stamps are not above those before them."""
+    if stamps.strictly_rising:
+        return stamps, received
+    kept, kept_arrivals = CompactTimes(), CompactTimes()
+    highest = stamps.block(0)[0] - 1
+    for block, arrivals in zip(stamps.blocks(), received.blocks(), strict=True):
+        so_far = np.maximum.accumulate(np.append(highest, block))
+        risen = so_far[1:] > so_far[:-1]
+        kept.add(block[risen])
+        kept_arrivals.add(arrivals[risen])
+        highest = so_far[-1]
+    return kept.finished(), kept_arrivals.finished()
 
 
 class _Relation:

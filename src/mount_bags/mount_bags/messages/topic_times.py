@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.container.stored import StoredMessages
-from mount_bags.messages.compact_times import CompactTimes
+from mount_bags.container.stored import HEAD, StoredMessages
+from mount_bags.messages.compact_times import CompactTimes, Times
 from mount_bags.messages.definitions import Definition
-from mount_bags.messages.series import Payloads, Series, Times
+from mount_bags.messages.series import Payloads, Series, heads_of
 
 _HEADER = 'std_msgs/Header'
 _STAMP_AT, _STAMP_END = 4, 12  # bytes in the message: behind the kind of encoding
@@ -86,9 +86,9 @@ class TimesCollector:
     def _names(self) -> tuple[str, ...]:
         if self._first is None or self._obstacle:
             return ()
-        time = np.zeros(1, np.int64)
         row = np.frombuffer(self._first, np.uint8)[None]
-        first = Series(self._topic, self._type, Payloads([row]), time, time, definition=self._definition)
+        heads = heads_of(np.zeros(1, HEAD))
+        first = Series(self._topic, self._type, Payloads([row]), heads, definition=self._definition)
         try:
             return first.names
         except ValueError:

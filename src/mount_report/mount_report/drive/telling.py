@@ -81,9 +81,9 @@ def _tell_mount(
 ) -> dict[str, Any]:
     """Print the figures of one mount and draw its picture; return them, add to `told` what is wrong."""
     with screen.line('evaluating the recording'):
-        drive = load_drive(recording)
         audits = audit(recording)
         found = losses(recording, audits)
+        drive = load_drive(recording)
     mount = f'{recording.mount}: ' if recording.mount else ''
     complaints = [*found.complaints(), *samples_at_the_ends(recording, audits, run['samples'])]
     told.complaints += [f'{mount}{words}' for words in complaints]
@@ -99,6 +99,7 @@ def _tell_mount(
                 figure, lambda: _draw(figure, parameters, drive, figures, _undamped(recording, parameters))
             )
         told.pictures += [figure] if figure.exists() else []
+    recording.release()  # of several mounts one is in memory at a time
     return figures
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.messages.series import Payloads, Series, SeriesError
+from mount_bags.container.stored import HEAD
+from mount_bags.messages.series import Payloads, Series, SeriesError, heads_of
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 from mount_view.feed.feed import Message
 
@@ -66,9 +67,10 @@ def _series(topic: Topic, messages: list[Message]) -> Series:
     piece: NDArray[np.uint8] | list[bytes] = raw
     if len(sizes) == 1:
         piece = np.frombuffer(b''.join(raw), np.uint8).reshape(len(raw), -1)
-    received = np.array([message.received for message in messages], np.int64)
-    sent = np.array([message.sent for message in messages], np.int64)
-    return Series(topic.name, topic.type, Payloads([piece]), received, sent)
+    heads = np.zeros(len(messages), HEAD)
+    heads['log_time'] = [message.received for message in messages]
+    heads['publish_time'] = [message.sent for message in messages]
+    return Series(topic.name, topic.type, Payloads([piece]), heads_of(heads))
 
 
 def _column(columns: Mapping[Topic, Series], trace: Trace) -> NDArray[np.float64]:

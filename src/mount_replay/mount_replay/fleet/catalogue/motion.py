@@ -1,6 +1,7 @@
 """What the displacement of a recording was, collected part by part."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -35,15 +36,13 @@ class Motion:
     def figures(self, rate: float) -> dict[str, Any]:
         """Return peak and rms, of the whole displacement and in bands, {} where none is known."""
         stamps, values = self._by_stamps()
-        pieces = [values[begin : begin + BLOCK] for begin in range(0, len(values), BLOCK)]
-        known = [piece[np.isfinite(piece)] for piece in pieces]
-        count = sum(map(len, known))
+        count = sum(map(len, _known(values)))
         if not count:
             return {}
-        mean = math.fsum(float(piece.sum()) for piece in known) / count
-        square = math.fsum(float(np.square(piece - mean).sum()) for piece in known)
+        mean = math.fsum(float(piece.sum()) for piece in _known(values)) / count
+        square = math.fsum(float(np.square(piece - mean).sum()) for piece in _known(values))
         figures: dict[str, Any] = {
-            'peak_displacement_m': max(float(np.abs(piece).max()) for piece in known if piece.size),
+            'peak_displacement_m': max(float(np.abs(piece).max(initial=0.0)) for piece in _known(values)),
             'rms_displacement_m': math.sqrt(square / count),
         }
         for band, found in zip(BANDS, in_bands(stamps, values, rate, BANDS), strict=True):
@@ -60,7 +59,13 @@ class Motion:
             told = stamps.whole()
             sound = ~misdated(told)
             stamps, values = compact(told[sound]), values[sound]
-        if all(bool((steps > 0).all()) for steps in stamps.steps()):
+        if stamps.strictly_rising:
             return stamps, values
         found, first = np.unique(stamps.whole(), return_index=True)
         return compact(found), values[first]
+
+
+def _known(values: FloatArray) -> Iterator[FloatArray]:
+    """Yield the numbers among the values, piece by piece."""
+    pieces = (values[begin : begin + BLOCK] for begin in range(0, len(values), BLOCK))
+    return (piece[np.isfinite(piece)] for piece in pieces)

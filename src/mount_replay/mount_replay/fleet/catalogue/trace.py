@@ -36,9 +36,9 @@ class Trace:
         """Return the figures, {} where the trace does not tell them; `sample_time` in s."""
         if not self._told.issuperset(self.COLUMNS):
             return {}
-        on, _ = self._switching.by_stamps()
+        on, _ = self._switching.switched()
         return {
-            'switched_on': len(on.stamps),
+            'switched_on': len(on),
             'damping_s': sample_time * self._switching.active,
             'pad_energy_j': sample_time * math.fsum([*self._sums, float(self._rest.sum())]),
         }

@@ -1,0 +1,79 @@
+"""Times in little memory: the same numbers to the nanosecond, whatever they are."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_bags.container.packed_rows import PackedRows
+from mount_bags.messages import compact_times
+from mount_bags.messages.compact_times import CompactTimes, compact, together
+
+ANY_TIME = st.integers(-(2**63), 2**63 - 1) | st.integers(0, 300)
+
+
+@pytest.fixture(autouse=True)
+def _short_blocks(monkeypatch):
+    monkeypatch.setattr(compact_times, 'BLOCK', 8)
+
+
+def test_any_times_come_back_as_they_were():
+    @settings(deadline=None, derandomize=True)
+    @given(st.lists(st.lists(ANY_TIME, max_size=20), max_size=5))
+    def check(pieces):
+        times = CompactTimes()
+        for piece in pieces:
+            times.add(np.array(piece, np.int64))
+        whole = np.array([time for piece in pieces for time in piece], np.int64)
+        assert len(times) == len(whole)
+        np.testing.assert_array_equal(times.finished().whole(), whole)
+        places = np.arange(len(whole))[::-2]
+        np.testing.assert_array_equal(times.at(places), whole[places])
+        np.testing.assert_array_equal(times.ordered().whole(), np.sort(whole))
+        assert times.rising == bool((whole[1:] >= whole[:-1]).all())
+        assert times.strictly_rising == bool((whole[1:] > whole[:-1]).all())
+
+    check()
+
+
+def test_columns_are_looked_at_together_stretch_by_stretch():
+    @settings(deadline=None, derandomize=True)
+    @given(st.lists(st.lists(st.integers(0, 60), max_size=60), min_size=1, max_size=3))
+    def check(columns):
+        last = -1
+        found = [[] for _ in columns]
+        for pieces in together([compact(np.sort(np.array(times, np.int64))) for times in columns]):
+            present = [piece for piece in pieces if len(piece)]
+            assert min(piece[0] for piece in present) > last
+            last = max(piece[-1] for piece in present)
+            for place, piece in enumerate(pieces):
+                found[place] += piece.tolist()
+        assert found == [sorted(set(times)) for times in columns]
+
+    check()
+
+
+def test_times_of_a_clock_take_two_bytes_each(monkeypatch):
+    monkeypatch.undo()
+    count = 400_000
+    stamps = np.arange(count) * 1_000_000 + np.random.default_rng(3).integers(-50, 50, count)
+    tracemalloc.start()
+    times = compact(stamps)
+    kept = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert len(times) == count
+    assert kept / count < 2.0
+
+
+def test_packed_records_are_those_that_were_added():
+    rows = PackedRows(lambda first, second, text: (first, second, text), 2)
+    for number in range(100):
+        rows.add((number, 2**64 - 1 - number), 'even' if number % 2 == 0 else 'odd')
+    expected = [(number, 2**64 - 1 - number, 'odd' if number % 2 else 'even') for number in range(100)]
+    assert list(rows) == expected
+    assert rows[3:7] == expected[3:7]
+    assert rows[-1] == expected[-1]
+    with pytest.raises(IndexError):
+        rows[100]
