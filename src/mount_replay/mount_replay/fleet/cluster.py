@@ -32,8 +32,10 @@ def connected(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator
     """
     with _quiet():
         if scheduler == LOCAL:
-            count = min(workers or len(os.sched_getaffinity(0)), tasks)
-            with _processes(count, memory) as cluster, _ended(_client(cluster)) as client:
+            with (
+                _processes(processes_for(workers, tasks), memory) as cluster,
+                _ended(_client(cluster)) as client,
+            ):
                 yield client
             return
         try:
@@ -42,6 +44,11 @@ def connected(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator
             raise SchedulerLostError(f'{scheduler}: no Dask scheduler answers there ({error})') from None
         with _ended(context) as client:
             yield client
+
+
+def processes_for(workers: int, tasks: int) -> int:
+    """Return how many processes of this machine work at a time; `workers` 0 is one for each core."""
+    return min(workers or len(os.sched_getaffinity(0)), tasks)
 
 
 def _client(where: Any) -> 'Client':
@@ -141,6 +148,8 @@ def _quiet() -> Iterator[None]:
     """Keep Dask's log to itself: what a user needs to know comes with the results."""
     import distributed  # noqa: F401  # it sets its levels when it is loaded
 
+    # It is never heard: at exit it tells of processes that were killed a moment ago.
+    logging.getLogger('distributed.process').setLevel(logging.CRITICAL)
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

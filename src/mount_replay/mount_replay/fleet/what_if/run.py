@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mount_bags.run.versions import versions
 from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.places import Place, root_of
-from mount_replay.fleet.cluster import LOCAL
+from mount_replay.fleet.cluster import LOCAL, processes_for
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.fleet.what_if.asked import recordings_asked
 from mount_replay.fleet.what_if.one import Replayed, Row, replay_one, told_of
@@ -132,7 +132,7 @@ def replay_fleet(
         starting=run.starting,
         busy=run.busy,
         replayed=run.replayed,
-        workers=len(run.workers),
+        workers=run.at_a_time,
         not_fetched=run.not_fetched,
     )
 
@@ -157,7 +157,9 @@ class _Run:
         self.not_fetched: list[Row] = []
         """Rows of what could not be read this time: the same order tries it again."""
         self.starting = self.busy = self.replayed = 0.0
-        self.workers: set[str] = set()
+        self._processes: set[str] = set()
+        self.at_a_time = 0
+        """How many workers there were."""
 
     def through(self, scheduler: str, workers: int) -> None:
         """Replay all that is left; what is done is written, whatever ends this."""
@@ -181,6 +183,9 @@ class _Run:
                 )
         finally:
             self._write()
+        self.at_a_time = len(self._processes)
+        if scheduler == LOCAL:  # where one was lost, another one took its place
+            self.at_a_time = min(self.at_a_time, processes_for(workers, len(self._left)))
 
     def _take(self, asked: Place, done: Done[Replayed]) -> None:
         replayed = done.result
@@ -194,7 +199,7 @@ class _Run:
             row |= told_of(self._order.changes, self._order.closed_loop)
             replayed = Replayed((row,), False, 0.0, '')
         self.busy += replayed.busy
-        self.workers |= {replayed.worker} - {''}
+        self._processes |= {replayed.worker} - {''}
         self.replayed += max((row.get('duration_s') or 0.0 for row in replayed.rows), default=0.0)
         self._failed += any(row['reason'] for row in replayed.rows)
         if not replayed.fetched:
