@@ -118,6 +118,7 @@ def _configuration(scratch: str) -> dict[str, Any]:
         'distributed.worker.http.routes': [],
         'distributed.scheduler.allowed-failures': 0,  # the runner counts them
         'distributed.scheduler.worker-saturation': 1.0,
+        'distributed.worker.profile.enabled': False,  # its samples cost some per cent, and nothing reads them
         'distributed.worker.multiprocessing-method': 'spawn',  # this process may hold threads of middleware
         # Nothing is kept at a worker, so there is nothing to spill; a worker that is too large is replaced.
         'distributed.worker.memory.target': False,
