@@ -32,6 +32,8 @@ def draw_road(profile: RoadProfile, found: Unevenness, file: Path) -> None:
             (ends[0], 0.5 * limit * (ends[0] / REFERENCE_FREQUENCY) ** -2.0),
             color=SPAN_COLOUR,
             fontsize=8,
+            ha='right',
+            va='center',
         )
     below.loglog(found.frequency, found.density, color=COLOURS[0], label='measured, smoothed')
     fitted = np.array([found.lowest, found.highest])
