@@ -20,7 +20,8 @@ from mount_replay.fleet.catalogue.in_bands import in_bands
 from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.journal import Journal
 from mount_replay.fleet.catalogue.places import places
-from mount_replay.fleet.catalogue.rows import read_place, rows_of
+from mount_replay.fleet.catalogue.reading import read_place
+from mount_replay.fleet.catalogue.rows import rows_of
 from mount_replay.fleet.catalogue.stored import CatalogueError, read_catalogue
 from mount_replay.fleet.columns import schema_of
 from mount_replay.fleet.runner import Done

@@ -1,13 +1,16 @@
 """One recording of a fleet as signals: as recorded and with the change."""
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.run.place import open_mount
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
 from mount_replay.fleet.what_if.closed_loop import both_motions
 from mount_replay.fleet.what_if.compared import recorded_in
 from mount_replay.given.taken import ReplayError
@@ -34,15 +37,15 @@ class BeforeAndAfter:
 
 
 def before_and_after(
-    uri: str, changes: Changes, mount: str = '', *, closed_loop: bool = False
+    uri: str, changes: Changes, mount: str = '', *, closed_loop: bool = False, said: Said = NOTHING_SAID
 ) -> BeforeAndAfter:
     """Return the signals of the recording at `uri` without and with {node: {parameter: value}}.
 
     Time counts from its first displacement sample, in a closed loop from the beginning of its acceleration.
-    `mount` is which of several mounts. Raises a `ValueError` or `OSError` with the
-    reason where there are none.
+    `mount` is which of several mounts, `said` what is said of files of others. Raises a `ValueError`
+    or `OSError` with the reason where there are none.
     """
-    with local_copy(uri) as path:
+    with local_copy(uri) as copy, _as_recording(copy, said, closed_loop) as path:
         if closed_loop:
             first, other = both_motions(recorded_in(open_mount(path, mount)), changes)
             return BeforeAndAfter(
@@ -62,6 +65,15 @@ def before_and_after(
         np.concatenate([run.displacement for run in runs]),
         (_setpoints(before), _setpoints(after)),
     )
+
+
+@contextlib.contextmanager
+def _as_recording(path: Path, said: Said, closed_loop: bool) -> Iterator[Path]:
+    if is_of_others(path, said):
+        with as_recording(mapped_in(path, said), closed_loop=closed_loop) as made:
+            yield made
+    else:
+        yield path
 
 
 def _setpoints(outcome: ReplayOutcome) -> Column:

@@ -24,12 +24,7 @@ def read_chosen(uri: str | Path, mapping: Mapping, stated: Stated | None = None)
 
     Raises `SignalError`, `SourceError` or `UnitError`.
     """
-    stated = stated or Stated()
-    stated = replace(
-        stated,
-        decimal=mapping.decimal or stated.decimal,
-        delimiter=mapping.delimiter or stated.delimiter,
-    )
+    stated = stated_with(mapping, stated)
     there = headings(uri, stated)
     wanted = [choice.column for choice in (*mapping.columns.values(), *mapping.others.values())]
     chosen = {heading_of(there, text, str(uri)).name for text in wanted}
@@ -39,6 +34,16 @@ def read_chosen(uri: str | Path, mapping: Mapping, stated: Stated | None = None)
         chosen |= {heading.name for heading in there if is_time(heading)}
         chosen |= {heading.name for heading in there[:1] if not heading.timed}
     return read(uri, [heading.name for heading in there if heading.name in chosen], stated)
+
+
+def stated_with(mapping: Mapping, stated: Stated | None = None) -> Stated:
+    """Return what is stated of a text table, that of the mapping first."""
+    stated = stated or Stated()
+    return replace(
+        stated,
+        decimal=mapping.decimal or stated.decimal,
+        delimiter=mapping.delimiter or stated.delimiter,
+    )
 
 
 def column_of(measured: Measured, wanted: str) -> MeasuredColumn:

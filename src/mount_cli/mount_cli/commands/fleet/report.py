@@ -55,7 +55,7 @@ def report(
     with TerminalScreen(console).bar('replaying the worst', transient=True) as show:
         for place, one in enumerate(found):
             show(place / len(found), detail=one.row['recording'])
-            looks.append(_look(one))
+            looks.append(_look(one, result))
     for look in looks:
         if look.reason:
             note(console, f'{look.name}: no picture: {look.reason}')
@@ -65,13 +65,18 @@ def report(
     console.print(f'report     {file}', soft_wrap=True)
 
 
-def _look(one: 'Worst') -> 'Look':
+def _look(one: 'Worst', result: Path) -> 'Look':
     from mount_replay.fleet.before_and_after import before_and_after
+    from mount_replay.fleet.worst import said_of
     from mount_report.fleet.looks import Look, Signals
 
     try:
         found = before_and_after(
-            one.uri, one.changes, one.row['mount'] or '', closed_loop=one.row['asked'] == 'displacement'
+            one.uri,
+            one.changes,
+            one.row['mount'] or '',
+            closed_loop=one.row['asked'] == 'displacement',
+            said=said_of(result),
         )
     except (ValueError, OSError) as error:
         return Look(one.row, one.commands, reason=str(error))

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mount_bags.audit.audit import TopicAudit, audit
 from mount_bags.audit.losses import losses
@@ -64,7 +65,9 @@ def state_figures(part: Recording, audits: Mapping[str, TopicAudit]) -> Figures:
         figures |= _of_trace(part[CONTROL_TRACE.name], 1.0 / recorded_sample_rate(part))
     if _has(part, DISPLACEMENT.name):
         part.load_columns({DISPLACEMENT.name: DISPLACEMENT.names})
-        figures |= _of_displacement(part[DISPLACEMENT.name], recorded_sample_rate(part))
+        series = part[DISPLACEMENT.name]
+        stamps, first = np.unique(series.stamps, return_index=True)
+        figures |= displacement_figures(stamps, series['mount'][first], recorded_sample_rate(part))
     return figures
 
 
@@ -82,9 +85,8 @@ def _of_trace(trace: Series, sample_time: float) -> Figures:
     }
 
 
-def _of_displacement(series: Series, rate: float) -> Figures:
-    stamps, first = np.unique(series.stamps, return_index=True)
-    values = series['mount'][first]
+def displacement_figures(stamps: NDArray[np.int64], values: NDArray[np.float64], rate: float) -> Figures:
+    """Return the size of a displacement (m) with rising `stamps` (ns), also in bands; `rate` in Hz."""
     known = values[np.isfinite(values)]
     if not known.size:
         return {}

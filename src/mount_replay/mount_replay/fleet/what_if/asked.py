@@ -26,16 +26,17 @@ class Asked:
     size: int
 
 
-def recordings_asked(places: Sequence[str]) -> list[Asked]:
+def recordings_asked(places: Sequence[str], *, others: bool = False) -> list[Asked]:
     """Return the recordings of catalogues and below URIs or paths, by their paths; raises a `ValueError`.
 
-    A catalogue is a table with the columns `uri`, `recording` and `size_bytes`, a Parquet file or the
-    folder of `engine-mount fleet index`. Raises `SourceError` where a place cannot be listed.
+    With `others` files of others below URIs or paths are meant too, of a catalogue always. A catalogue is a
+    table with the columns `uri`, `recording` and `size_bytes`, a Parquet file or the folder of
+    `engine-mount fleet index`. Raises `SourceError` where a place cannot be listed.
     """
     found: dict[str, Asked] = {}
     for place in places:
         table = _catalogue(place)
-        for asked in _of_catalogue(table) if table is not None else _below(place):
+        for asked in _of_catalogue(table) if table is not None else _below(place, others):
             other = found.setdefault(asked.path, asked)
             if other.uri != asked.uri:
                 raise AskedError(
@@ -62,5 +63,6 @@ def _of_catalogue(table: Path) -> Iterator[Asked]:
         yield Asked(row['uri'], row['recording'], row['size_bytes'] or 0)
 
 
-def _below(place: str) -> Iterator[Asked]:
-    return (Asked(found.uri, found.recording, found.size) for found in listed([place]).values())
+def _below(place: str, others: bool) -> Iterator[Asked]:
+    found = listed([place], others=others).values()
+    return (Asked(one.uri, one.recording, one.size) for one in found)

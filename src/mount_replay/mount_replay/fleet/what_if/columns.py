@@ -16,6 +16,8 @@ _RECORDING = (
     Column('sha256', TEXT, '', 'SHA-256 of its MCAP files'),
     Column('recorded_with', TEXT, '', 'version of this project that made the recording, where it tells'),
     Column('replayed_with', TEXT, '', 'versions of the project and of the libraries that replayed it, JSON'),
+    Column('mapping_file', TEXT, '', 'mapping file of a file of others; empty: read by titles and units'),
+    Column('mapped', TEXT, '', 'columns of a file of others that were taken, JSON {quantity: column}'),
     Column('changes', TEXT, '', 'what was other than recorded, {node: {parameter: value}}, JSON'),
 )
 

@@ -12,6 +12,7 @@ from typing import Any
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_hash, recording_place
 from mount_bags.run.versions import versions
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
 from mount_replay.fleet.what_if.asked import Asked
 from mount_replay.fleet.what_if.closed_loop import compared_motion
 from mount_replay.fleet.what_if.columns import DISPLACEMENT, SETPOINTS
@@ -38,16 +39,20 @@ class Replayed:
     worker: str
 
 
-def replay_one(asked: Asked, changes: Changes, closed_loop: bool = False) -> Replayed:
+def replay_one(
+    asked: Asked, changes: Changes, closed_loop: bool = False, said: Said = NOTHING_SAID
+) -> Replayed:
     """Return the rows of one recording with `changes` {node: {parameter: value}}; nothing is remembered.
 
-    What cannot be replayed, and what cannot be fetched, is a row with its reason.
+    `said` is what is said of files of others. What cannot be replayed, and what cannot be fetched, is a row
+    with its reason.
     """
     begin, worker = time.process_time(), f'{platform.node()}/{os.getpid()}'
     common = {'recording': asked.path, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
     try:
         with local_copy(asked.uri) as path:
-            rows = tuple({**common, **row} for row in _rows(asked, path, changes, closed_loop))
+            make = _foreign_rows if is_of_others(path, said) else _rows
+            rows = tuple({**common, **row} for row in make(asked, path, changes, closed_loop, said))
         fetched = True
     except OSError as error:
         rows, fetched = ({**common, 'mount': '', 'reason': str(error)},), False
@@ -64,7 +69,20 @@ def told_of(changes: Changes, closed_loop: bool) -> Row:
     }
 
 
-def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
+def _foreign_rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool, said: Said) -> list[Row]:
+    """Return the row of a file of others, which is made a recording for as long as it is replayed."""
+    row: Row = {'sha256': recording_hash(path), 'mount': ''}
+    try:
+        mapped = mapped_in(path, said)
+        row |= mapped.told
+        with as_recording(mapped, closed_loop=closed_loop) as place:
+            row |= _figures(open_run(place), changes, closed_loop) | {'recorded_with': ''}
+    except ValueError as error:
+        row['reason'] = _told(error, asked, path)
+    return [row]
+
+
+def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool, said: Said) -> list[Row]:
     whole = {'sha256': recording_hash(recording_place(path))}
     try:
         mounts = open_run(path).by_mount()
