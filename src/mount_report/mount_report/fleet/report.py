@@ -71,15 +71,16 @@ def _overview(rows: Sequence[dict], asked: set[str]) -> Section:
         ],
     )
     checked = _motion(rows) if asked == {DISPLACEMENT} else _trusted(rows)
-    findings = [_recordings(rows), _differing(rows), checked]
+    done = 'simulated' if asked == {DISPLACEMENT} else 'replayed'
+    findings = [_recordings(rows, done), _differing(rows), checked]
     return Section('overview', 'Overview', words, findings=findings, tables=[table] if table.rows else [])
 
 
-def _recordings(rows: Sequence[dict]) -> Finding:
+def _recordings(rows: Sequence[dict], done: str) -> Finding:
     names = {row['recording'] for row in rows}
     failed = {row['recording'] for row in rows if row['reason']}
     length = length_of_time(sum(row['duration_s'] or 0.0 for row in rows))
-    text = [f'{len(names)} recordings, {length} of them replayed;']
+    text = [f'{len(names)} recordings, {length} of them {done};']
     if not failed:
         return Finding('Recordings', GOOD, [*text, 'none failed'])
     return Finding('Recordings', LOOK, [*text, Link(f'{len(failed)} failed', 'failures')])

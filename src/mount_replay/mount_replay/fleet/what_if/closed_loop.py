@@ -17,6 +17,8 @@ from mount_bags.bag.recording import Recording
 from mount_bags.run.session import session_parameters
 from mount_bags.signals.even_grid import evenly_spaced
 from mount_bags.signals.signal import signal_of
+from mount_bringup.chosen import control_parameters
+from mount_bringup.sample_rate import with_sample_rate
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.policy.contract import Policy, trace_dtype
 from mount_control.sample_watch import SampleCounts
@@ -119,7 +121,8 @@ def _with_plant(recorded: Recorded, parameters: Parameters) -> dict[str, Mapping
     known = defaults_of_nodes()['mount_sim']
     told = session_parameters(recorded.session).get('mount_sim', {})
     plant = {name: value for name, value in told.items() if name in known and name not in _OWN}
-    return {**parameters, **checked_settings({'mount_sim': plant})}
+    settings = {**parameters, **checked_settings({'mount_sim': plant})}
+    return with_sample_rate(settings, control_parameters(parameters).sample_rate)
 
 
 def _shaken(recording: Recording, start: float) -> Excitation:

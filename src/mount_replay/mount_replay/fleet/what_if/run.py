@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mount_bags.run.versions import versions
+from mount_replay.fleet.catalogue.places import root_of
 from mount_replay.fleet.cluster import LOCAL
 from mount_replay.fleet.foreign import NOTHING_SAID, Said
 from mount_replay.fleet.runner import Done, run_tasks
@@ -41,7 +42,7 @@ class FleetOrder:
         """Return what makes two orders the same: all but where they run."""
         here = versions()
         told = {
-            'asked_for': [shown(place) for place in self.places],
+            'asked_for': [shown(root_of(place)) for place in self.places],
             'changes': self.changes,
             'closed_loop': self.closed_loop,
             'versions': {name: here[name] for name in _OF_A_WORKER},

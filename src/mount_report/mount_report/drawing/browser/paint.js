@@ -96,8 +96,10 @@ function paintFrame(paint, chart, panel, area, [low, high], last, width, ink) {
     const x = Math.round(area.x(tick)) + 0.5;
     if (x < left || x > right + 1) continue;
     line(paint, x, top, x, bottom);
-    if (last) paint.fillText(Number(tick.toPrecision(8)), x, bottom + 4);
+    paint.textAlign = x > right - 8 ? 'right' : 'center'; // whole at the edge of the page too
+    if (last) paint.fillText(Number(tick.toPrecision(8)), x > right - 8 ? right + RIGHT : x, bottom + 4);
   }
+  paint.textAlign = 'center';
   if (last) paint.fillText(chart.told.x_label, (left + right) / 2, bottom + 20);
 }
 
