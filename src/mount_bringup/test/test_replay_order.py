@@ -1,7 +1,12 @@
 """What is played to which control, as the arguments of replay.launch.py order it."""
 
+import os
+import select
 import shutil
+import signal
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -16,7 +21,7 @@ from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.player import PLAYED, Player, offers_text, play_command
 from mount_bringup.graph.replay_order import replay_order
 from mount_models.quantity import ParameterError
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import SESSION
 
 RECORDED = {'quality': 0.7, 'friction.scale': 0.8, 'parameters_file': 'gone.yaml', 'of_yesterday': 1}
@@ -103,7 +108,7 @@ def test_what_cannot_be_played_is_refused_before_a_process_starts(record, mounts
 
 
 def test_the_player_gets_what_the_control_hears_and_the_latched_topics_stay_latched(tmp_path):
-    command = play_command(tmp_path, '/car/left', 0.5, tmp_path / 'offers.yaml')
+    command = play_command(tmp_path, '/car/left', 0.5)
     assert command[:4] == ['ros2', 'bag', 'play', str(tmp_path)]
     assert command[command.index('--topics') + 1 :] == [
         '/car/left/displacement', '/car/left/air_gap', '/car/left/current_force_table',
@@ -141,6 +146,36 @@ def test_a_player_is_finished_at_its_end_and_a_failure_names_its_command(player)
     ):
         wait_until(lambda: failed.finished, 'the end')
     failed.end()
+
+
+def test_a_player_reads_the_offers_of_its_topics_and_leaves_no_file(player, tmp_path, monkeypatch):
+    scratch = tmp_path / 'scratch'
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, 'tempdir', str(scratch))
+    played = player(
+        'import sys; path = sys.argv[sys.argv.index("--qos-profile-overrides-path") + 1]\n'
+        f'open({str(tmp_path / "read.yaml")!r}, "w").write(open(path).read())'
+    )
+    played.begin()
+    wait_until(lambda: played.finished, 'the end')
+    assert (tmp_path / 'read.yaml').read_text() == offers_text('')
+    assert not list(scratch.iterdir())
+
+
+@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
+def test_a_player_ends_with_the_process_that_has_started_it(player, tmp_path, number):
+    player('import os, time; print(os.getpid(), flush=True); time.sleep(100)')  # its program
+    program = (
+        'from pathlib import Path; from mount_bringup.graph.player import Player; import time\n'
+        f'Player(Path({str(tmp_path)!r}), "", 1.0).begin(); time.sleep(100)'
+    )
+    starter = subprocess.Popen([sys.executable, '-c', program], stdout=subprocess.PIPE, text=True)
+    playing = os.pidfd_open(int(starter.stdout.readline()))
+    starter.send_signal(number)
+    assert starter.wait(LIMIT) == -number
+    assert select.select([playing], [], [], LIMIT)[0]
+    os.close(playing)
+    starter.stdout.close()
 
 
 def test_a_player_that_goes_on_is_ended_and_one_that_is_not_there_is_told(player, tmp_path):

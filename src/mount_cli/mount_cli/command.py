@@ -122,8 +122,8 @@ def main(arguments: list[str] | None = None) -> None:
         if not isinstance(end.code, int):
             raise
         end_process(end.code)
-    except (KeyboardInterrupt, Interrupted):
-        terminal(stderr=True).print('interrupted; the coil is at 0 A')
+    except (KeyboardInterrupt, Interrupted) as end:
+        terminal(stderr=True).print(f'interrupted; {str(end) or "the coil is at 0 A"}', soft_wrap=True)
         end_process(INTERRUPTED)
     except (ValueError, GraphError, OSError) as error:
         refuse(error)

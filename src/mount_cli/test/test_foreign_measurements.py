@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mount_cli.calibration.given import columns_of
-from mount_identification.friction.channels import mapped_channels, parsed_channels
+from mount_identification.friction.channels import said
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.recording import IdentificationError
 from mount_identification.rack.columns import RackRecordingError
 from mount_identification.rack.recordings import GivenValues, read_force, read_ripple
-from mount_signals.units.mapping import mapping_in_file
+from mount_signals.units.mapping import Mapping, mapping_in_file
 
 POUND, INCH = 4.4482216152605, 0.0254
 NOTHING = GivenValues({}, {}, 20.0)
@@ -101,7 +101,7 @@ FORMATS = [
 def test_identify_reads_friction_in_imperial_units_of_every_format(tmp_path, suffix, write):
     file = tmp_path / f'rig.{suffix}'
     write(file, MOTION)
-    found = read_recording(file, parsed_channels(SAID))
+    found = read_recording(file, said(SAID))
     assert found.dt == pytest.approx(1e-3)
     assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
     assert found.force == pytest.approx(FRICTION, rel=1e-9, abs=1e-9)
@@ -112,7 +112,7 @@ def test_identify_reads_friction_in_imperial_units_of_every_format(tmp_path, suf
 def test_calibrate_reads_forces_in_imperial_units_of_every_format(tmp_path, suffix, write):
     file = tmp_path / f'force.{suffix}'
     write(file, FORCES)
-    points = read_force([file], columns_of(FORCES_SAID), NOTHING)
+    points = read_force([file], columns_of(FORCES_SAID, Mapping()), NOTHING)
     assert points.gap == pytest.approx(1e-6 * GAP, rel=1e-9)
     assert points.current == pytest.approx(CURRENT, rel=1e-9)
     assert points.force == pytest.approx(PULL, rel=1e-9)
@@ -155,16 +155,16 @@ columns:
 def test_a_mapping_file_says_columns_units_axes_and_offsets(tmp_path):
     (tmp_path / 'rig.yaml').write_text(MAPPING)
     as_mat(tmp_path / 'rig.mat', {**MOTION, 'way': MOTION['way'] + 3.0, 'cell': -MOTION['cell']})
-    found = read_recording(tmp_path / 'rig.mat', mapped_channels(mapping_in_file(tmp_path / 'rig.yaml')))
+    found = read_recording(tmp_path / 'rig.mat', said([], mapping_in_file(tmp_path / 'rig.yaml')))
     assert found.displacement == pytest.approx(WAY - WAY.mean(), abs=1e-9)
     assert found.force == pytest.approx(FRICTION, rel=1e-9, abs=1e-9)
     (tmp_path / 'forces.yaml').write_text(
         MAPPING.replace('cell, unit: lbf, scale: -1', 'Kraft, unit: lbf, offset: 2.0')
     )
     as_parquet(tmp_path / 'force.parquet', FORCES)
-    chosen = columns_of([], tmp_path / 'forces.yaml')
+    chosen = columns_of([], mapping_in_file(tmp_path / 'forces.yaml'))
     assert read_force([tmp_path / 'force.parquet'], chosen, NOTHING).force == pytest.approx(PULL - 2.0)
-    other = columns_of(['force=Strom:N'], tmp_path / 'forces.yaml')
+    other = columns_of(['force=Strom:N'], mapping_in_file(tmp_path / 'forces.yaml'))
     assert other['force'].column == 'Strom:N'
 
 
@@ -181,23 +181,23 @@ def test_ripple_tables_are_read_of_other_formats_too(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('said', 'words'),
+    ('texts', 'words'),
     [
         (['displacement=way:lbf'], "unit 'lbf' is none of length; known are m, mm"),
         (['friction_force=cell:g'], "unit 'g' is none of force"),
         (['load=cell:N'], 'write NAME=COLUMN or NAME=COLUMN:UNIT with NAME one of'),
     ],
 )
-def test_a_unit_of_another_quantity_is_refused(said, words):
+def test_a_unit_of_another_quantity_is_refused(texts, words):
     with pytest.raises(IdentificationError, match=words):
-        parsed_channels(said)
+        said(texts)
 
 
 def test_a_column_that_is_not_there_and_a_unit_of_another_quantity_are_refused(tmp_path):
     as_npz(tmp_path / 'force.npz', FORCES)
-    with pytest.raises(RackRecordingError, match=r"column 'Luft' is not in .*Spalt, Strom, Kraft"):
-        read_force([tmp_path / 'force.npz'], columns_of(['gap=Luft:mm']), NOTHING)
+    with pytest.raises(RackRecordingError, match=r"no column 'Luft'; its columns are .*Spalt, Strom, Kraft"):
+        read_force([tmp_path / 'force.npz'], columns_of(['gap=Luft:mm'], Mapping()), NOTHING)
     with pytest.raises(
         RackRecordingError, match="'lbf' is no unit of gap; known are um, mm, m and others of length"
     ):
-        read_force([tmp_path / 'force.npz'], columns_of(['gap=Spalt:lbf']), NOTHING)
+        read_force([tmp_path / 'force.npz'], columns_of(['gap=Spalt:lbf'], Mapping()), NOTHING)

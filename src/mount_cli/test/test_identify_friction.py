@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from mount_bags.run.place import recording_hash
+from mount_bags.signals.signal import SignalError
 from mount_bringup.chosen import chosen_control
 from mount_cli.command import main
 from mount_cli.commands.identify_arguments import with_repeated_options
 from mount_experiments.harness.rack_recording import record_friction_rack
 from mount_identification.friction import ladder
-from mount_identification.friction.channels import parsed_channels
+from mount_identification.friction.channels import said
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.looks.force_zero import zeroed
 from mount_identification.friction.recording import IdentificationError
@@ -109,7 +110,7 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
     ('make', 'words'),
     [
         (lambda f: f.with_suffix('.csv').write_text('time_s,displacement_mm,friction_force_n,normal_force_n\n'
-                                                    '0,0,1,9\n1,1,1,9\n'), '2 samples'),
+                                                    '0,0,1,9\n0.001,1,1,9\n'), '2 samples'),
         (lambda f: f.with_suffix('.csv').write_text('t,f\n0.0,1.5\n'), 'no column for displacement'),
         (lambda f: f.with_suffix('.mcap').write_bytes(b'no recording at all' * 9), 'MCAP'),
         (lambda f: f.with_suffix('.json').write_text('{"data": [[1, 2]]}'), 'shape'),
@@ -207,13 +208,13 @@ def test_the_folder_of_a_run_is_read_as_the_recording_in_it(in_mcap, tmp_path):
 
 def test_channels_of_mcap_are_chosen_with_their_unit(in_mcap):
     recorded, folder = in_mcap
-    read = read_recording(folder, parsed_channels(['friction_force=sim/clamp_force.wrench.force.z:lb']))
+    read = read_recording(folder, said(['friction_force=sim/clamp_force.wrench.force.z:lb']))
     assert read.force == pytest.approx(4.4482216152605 * recorded.normal_force, rel=1e-9)
     assert read.normal_force[:, 0] == pytest.approx(recorded.normal_force, rel=1e-9)
-    with pytest.raises(
-        IdentificationError, match=r'no topic force \(for friction_force\); it has .*clamp_force'
-    ):
-        read_recording(folder, parsed_channels(['friction_force=force.z']))
+    with pytest.raises(SignalError, match=r"column 'force.z' is ambiguous: .*clamp_force"):
+        read_recording(folder, said(['friction_force=force.z']))
+    with pytest.raises(SignalError, match=r"has no column '/cell.z'; its columns are .*clamp_force"):
+        read_recording(folder, said(['friction_force=/cell.z']))
 
 
 def test_a_held_out_recording_must_be_unseen(rack, capsys):
@@ -266,7 +267,7 @@ def test_channels_name_column_and_unit(tmp_path):
     np.savetxt(file, table, delimiter=',', header='time,way,cell,load', comments='')
     with pytest.raises(IdentificationError, match='name it as in --channel'):
         read_recording(file)
-    chosen = parsed_channels(['displacement=way:mm', 'friction_force=cell:kN', 'normal_force=load:kN'])
+    chosen = said(['displacement=way:mm', 'friction_force=cell:kN', 'normal_force=load:kN'])
     read = read_recording(file, chosen)
     assert read.displacement.max() == pytest.approx(1e-3, rel=1e-3)
     assert read.force.max() == pytest.approx(50.0, rel=1e-3)
@@ -336,12 +337,12 @@ def test_channels_are_heard_for_json_too(tmp_path):
         ['displacement=2:inch', 'friction_force=1:kip'],
         ['displacement=friction_force_kip:inch', 'friction_force=displacement_in:kip'],
     ):
-        found = read_recording(swapped, parsed_channels(texts), clamp='none')
+        found = read_recording(swapped, said(texts), clamp='none')
         np.testing.assert_array_equal(found.displacement, as_made.displacement)
         np.testing.assert_array_equal(found.force, as_made.force)
-    in_mm = read_recording(_rig_file(tmp_path), parsed_channels(['displacement=1:mm']), clamp='none')
+    in_mm = read_recording(_rig_file(tmp_path), said(['displacement=1:mm']), clamp='none')
     np.testing.assert_allclose(in_mm.displacement, as_made.displacement / 25.4)
-    clamped = read_recording(_rig_file(tmp_path), parsed_channels(['normal_force=4']))
+    clamped = read_recording(_rig_file(tmp_path), said(['normal_force=4']))
     np.testing.assert_allclose(clamped.normal_force, 600.0 * 4.4482216152605)
 
 
@@ -356,11 +357,11 @@ def test_channels_are_heard_for_json_too(tmp_path):
 )
 def test_a_channel_that_json_does_not_have_is_refused(text, words, tmp_path):
     with pytest.raises(ValueError, match=words):
-        read_recording(_rig_file(tmp_path), parsed_channels([text]))
+        read_recording(_rig_file(tmp_path), said([text]))
 
 
 def test_a_channel_that_cannot_be_heard_is_refused(in_mcap):
     with pytest.raises(IdentificationError, match="unit 'mm' is none of time; known are s, ms"):
-        parsed_channels(['time=t:mm'])
-    with pytest.raises(IdentificationError, match='the times of a recording are its stamps'):
-        read_recording(in_mcap[1], parsed_channels(['time=t']))
+        said(['time=t:mm'])
+    with pytest.raises(SignalError, match="has no column 't'; its columns are"):
+        read_recording(in_mcap[1], said(['time=t']))

@@ -21,6 +21,7 @@ _LEAST_NOISE = 0.5e-6  # m, chosen: five steps of the signal; a sensor with less
 _ORDER = 4  # of the difference that leaves noise and takes motion away: at 50 Hz 1 % of it remains
 _NOISE_OF_DIFFERENCE = math.sqrt(70.0 * 2.0 / math.pi)  # mean of |4th difference| of white noise of 1
 _SHARE = 10.0  # 1/s, chosen: of each sample in the mean, over about 0.1 s
+_KEPT = 64  # samples, chosen: the memory is kept so often, to go back to before the first in doubt
 _CUT = 4.0  # chosen: of the limit; no single reading counts for more
 
 
@@ -159,10 +160,13 @@ def _raise(law, now, doubt, value):
 
 @compiled
 def _believed(limits, memory, displacements):
-    before = memory.copy()
+    before, begin = memory.copy(), 0
     for index in range(len(displacements)):
-        before[:] = memory
+        if index == begin + _KEPT:
+            before[:], begin = memory, index
         if doubt_of(limits, memory, displacements[index], 0):
             memory[:] = before
+            for known in range(begin, index):
+                doubt_of(limits, memory, displacements[known], 0)
             return index
     return len(displacements)

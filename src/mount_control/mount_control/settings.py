@@ -1,5 +1,6 @@
 """All that the controller is set up with, checked, from the values of its parameters and the specimen."""
 
+import functools
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeVar
 
@@ -69,7 +70,7 @@ def control_settings(values: Mapping[str, Any], specimen: Specimen) -> ControlSe
     check_fits(parameters, specimen)
     friction = _identified(specimen, FrictionCoefficients(), values, 'friction')
     contact = _identified(specimen, FrictionContact(), values, 'contact')
-    check_friction(friction, contact)
+    _check_friction(friction, contact)
     return ControlSettings(parameters, policy, design, friction, contact)
 
 
@@ -78,6 +79,10 @@ def check_policies(values: Mapping[str, Any]) -> None:
     sample_time = 1.0 / with_flattened(ControlParameters(), values).sample_rate
     for name, policy in POLICIES.items():
         policy.design(with_flattened(policy.Parameters(), values, prefix_of(name)), sample_time)
+
+
+# It takes some milliseconds, and a replay of many recordings asks for the same again and again.
+_check_friction = functools.lru_cache(maxsize=64)(check_friction)
 
 
 def policy_parameters(values: Mapping[str, Any]) -> tuple[Policy, Any]:

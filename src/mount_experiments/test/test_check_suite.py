@@ -1,5 +1,7 @@
 """Suites of manoeuvres: what is read, what is refused, and how figures are judged."""
 
+import contextlib
+import io
 import json
 import math
 import re
@@ -9,12 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mount_bags.run.screen import Screen
+from mount_bringup.graph.domain import DomainError
+from mount_bringup.graph.errors import GraphError, Interrupted
+from mount_experiments.check import session, trial
 from mount_experiments.check.judgement import Judged, all_verdicts, passed, verdicts_of, worst_first
 from mount_experiments.check.measures import MEASURES
 from mount_experiments.check.page import write_page
-from mount_experiments.check.session import CheckError, CheckOrder, trials_of
+from mount_experiments.check.session import CheckError, CheckOrder, run_trials, trials_of
 from mount_experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
-from mount_experiments.check.telling import figures_of, table_of
+from mount_experiments.check.telling import Told, figures_of, table_of
 from mount_experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples
 from mount_models.plain_yaml import plain_yaml
 from mount_report.drive.signals import Truth
@@ -157,6 +163,78 @@ def test_a_manoeuvre_that_ends_before_it_is_looked_at_is_refused(tmp_path):
     late = suite_of(content(evaluated_from_s=3.0))
     with pytest.raises(CheckError, match=r'second: evaluated_from_s \(3 s\) must lie before the end'):
         trials_of(CheckOrder(late), tmp_path)
+
+
+@pytest.mark.parametrize('error', [GraphError('no gap'), DomainError('a graph already runs')])
+def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
+    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(error))
+    made = trials(tmp_path, through=GRAPH)[0]
+    broken = trial.run_trial(made)
+    assert (broken.figures, broken.remarks) == ({}, (str(error),))
+    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(Interrupted()))
+    with pytest.raises(Interrupted):
+        trial.run_trial(made)
+
+
+def raise_(error):
+    raise error
+
+
+class Seen(Screen):
+    """Keeps the texts that it is to show, and the shares of its bar."""
+
+    def __init__(self):
+        super().__init__(io.StringIO())
+        self.texts, self.shares = [], []
+
+    def say(self, text):
+        self.texts.append(text)
+
+    @contextlib.contextmanager
+    def bar(self, what, *, transient=False):
+        yield lambda share, what='', detail='': self.shares.append((round(share, 3), what, detail))
+
+
+def test_each_manoeuvre_is_told_when_it_is_done_and_the_bar_goes_on_within_it(tmp_path, monkeypatch):
+    given = content(set={**ROAD, 'mount_sim.timeline.duration': 17})  # 3 and 17 s, each behind a start
+
+    def drive(made, screen):
+        with screen.bar('driving') as show:
+            show(0.5, detail='no damping yet')
+        screen.say('of the drive alone')
+        return result(peak_over_undamped=0.9) if made.manoeuvre.name == 'first' else result()
+
+    monkeypatch.setattr(session, 'run_trial', drive)
+    made = trials_of(CheckOrder(suite_of(given), GRAPH), tmp_path)
+    first = made[0].seconds / (made[0].seconds + made[1].seconds)
+    screen, seen = Seen(), []
+    results = run_trials(made, 0, screen, lambda *told: seen.append((*told, list(screen.shares))))
+    assert [*results] == ['first', 'second']
+    assert results['first'].figures['peak_over_undamped'] == 0.9
+    assert [(name, round(share, 3)) for name, _, share, _ in seen] == [
+        ('first', round(first, 3)), ('second', 1.0),
+    ]  # fmt: skip
+    assert seen[0][3] == [(0.0, 'first', ''), (round(first / 2, 3), 'first', 'no damping yet'),
+                          (round(first, 3), 'first', '')]  # fmt: skip
+    assert screen.shares[-2] == (round((first + 1.0) / 2, 3), 'second', 'no damping yet')
+    assert screen.texts == []
+
+
+def test_the_line_of_a_manoeuvre_is_its_worst_limit_with_the_time_to_go_and_its_remarks_below():
+    name, quantity = 'gap_of_2mm', max(MEASURES, key=len)
+    limit = {'at_most': 1234.0, 'source': 'chosen', 'reason': 'x'}
+    given = {'manoeuvres': {name: {'about': 'A gap.', 'set': ROAD, 'limits': {quantity: limit}}}}
+    given['manoeuvres']['free'] = {'about': 'A road.', 'set': ROAD}
+    screen, now = Seen(), iter([100.0, 160.0, 400.0])
+    tell = Told(CheckOrder(suite_of(given), GRAPH), screen, clock=lambda: next(now))
+    tell(name, Result({quantity: 123456.0}, ('control began late',), Shown()), 0.0625)
+    tell('free', result(), 1.0)
+    head, failed_line, note, free = screen.texts
+    assert head.split() == ['manoeuvre', 'quantity', 'value', 'limit', 'left', 'to', 'go']
+    assert failed_line.split() == ['fail', name, quantity, '123456', '≤', '1234', '-9905', '%', '15:00']
+    assert max(map(len, screen.texts)) <= 80
+    assert note == f'{name} control began late'
+    assert free.split() == ['free', 'no', 'limit', '0:00']
 
 
 # How it is judged.

@@ -39,7 +39,7 @@ from mount_replay.given.input import ReplayError, ReplayInput, replay_input
 from mount_replay.given.parameter_changes import without
 from mount_replay.output import write_replay
 from mount_ros import topics
-from mount_signals.importing.importing import SCENARIO
+from mount_signals.importing.provenance import SCENARIO
 
 CORE, LOCKSTEP = 'core', 'lock-step'
 REPLAYED_NODES = ('mount_control', 'mount_init')

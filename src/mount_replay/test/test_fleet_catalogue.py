@@ -270,6 +270,7 @@ def test_every_column_has_a_meaning_and_what_has_a_unit_says_it():
     assert {band_name('peak', band) for band in BANDS} <= set(names)
     assert all(column.meaning for column in (*RECORDINGS, *EVENTS))
     units = {'_m': 'm', '_s': 's', '_a': 'A', '_j': 'J', '_degc': 'degC', '_bytes': 'B', '_ns': 'ns'}
+    units |= {'_hz': 'Hz', '_s2': 'm/s^2'}
     for column in (*RECORDINGS, *EVENTS):
         suffix = column.name[column.name.rfind('_') :]
         assert column.unit == units.get(suffix, ''), column.name

@@ -47,7 +47,7 @@ def serial(monkeypatch):
 
     def tasks(work, items, **_):
         for place, item in enumerate(items):
-            replayed.append(item.path)
+            replayed.append(item.recording)
             yield Done(place, work(item))
 
     monkeypatch.setattr(run, 'run_tasks', tasks)
@@ -158,6 +158,37 @@ def test_what_cannot_be_fetched_is_tried_again(fleet, tmp_path, serial, monkeypa
     assert again.result.read_bytes() == whole
 
 
+def test_a_recording_that_changed_is_replayed_again_and_has_its_new_rows_alone(fleet, tmp_path, serial):
+    whole = replay_fleet(order_of(fleet), tmp_path / 'result')
+    content = whole.result.read_bytes()
+    serial.clear()
+    os.utime(next((fleet / 'gap').glob('*.mcap')), (1.0, 1.0))  # of the same size
+    again = replay_fleet(order_of(fleet), tmp_path / 'result')
+    assert (serial, again.before) == (['gap'], 3)
+    assert again.result.read_bytes() == content
+
+
+def test_a_recording_that_changed_and_cannot_be_fetched_has_one_row(fleet, tmp_path, serial, monkeypatch):
+    replay_fleet(order_of(fleet), tmp_path / 'result')
+    os.utime(next((fleet / 'gap').glob('*.mcap')), (1.0, 1.0))
+    monkeypatch.setattr(one, 'local_copy', out_of_order)
+    again = replay_fleet(order_of(fleet), tmp_path / 'result').table.to_pylist()
+    assert [row['recording'] for row in again] == ['broken.mcap', *NAMES]
+    assert again[1]['reason'] == 'out of order'
+
+
+def out_of_order(uri):
+    raise SourceError('out of order')
+
+
+def test_the_same_order_from_another_folder_is_the_same(fleet, tmp_path, serial, monkeypatch):
+    replay_fleet(order_of(fleet), tmp_path / 'result')
+    serial.clear()
+    monkeypatch.chdir(tmp_path)
+    assert replay_fleet(FleetOrder(['./fleet/'], CHANGES), tmp_path / 'result').before == 4
+    assert serial == []
+
+
 KILLED = """
 import os, signal, sys
 from mount_replay.fleet.runner import Done
@@ -243,8 +274,8 @@ def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes
 
 
 def test_recordings_are_named_by_their_path_below_what_was_asked_for(fleet):
-    assert [asked.path for asked in recordings_asked([str(fleet)])] == ['broken.mcap', *NAMES]
-    assert [asked.path for asked in recordings_asked([str(fleet / 'gap')])] == ['gap']
+    assert [asked.recording for asked in recordings_asked([str(fleet)])] == ['broken.mcap', *NAMES]
+    assert [asked.recording for asked in recordings_asked([str(fleet / 'gap')])] == ['gap']
     with pytest.raises(AskedError, match='no recording at'):
         recordings_asked([str(Path(__file__).parent)])
 

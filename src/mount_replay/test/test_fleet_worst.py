@@ -7,6 +7,7 @@ import pytest
 from mount_replay.fleet.columns import table_of, write_table
 from mount_replay.fleet.questions import QueryError, query, result_of
 from mount_replay.fleet.what_if.columns import REPLAY_COLUMNS
+from mount_replay.fleet.what_if.run import FleetOrder
 from mount_replay.fleet.worst import worst
 
 CHANGES = json.dumps({'mount_control': {'switch_on_level': 0.0006, 'policy': 'switched_viscous'}})
@@ -63,6 +64,24 @@ def test_the_commands_name_the_place_the_mount_and_the_change(result):
         f"engine-mount replay '{place}' --mount left --set mount_control.switch_on_level=0.0006 "
         '--set mount_control.policy=switched_viscous',
     ]
+
+
+def test_the_places_are_found_from_any_folder(result, monkeypatch):
+    monkeypatch.chdir(result.parent)
+    told = FleetOrder(['my drives']).told()
+    (result / 'order.json').write_text(json.dumps(told))
+    (result.parent / 'elsewhere').mkdir()
+    monkeypatch.chdir(result.parent / 'elsewhere')
+    assert worst(result, BY, 1)[0].uri == str(result.parent / 'my drives' / 'b')
+
+
+def test_recordings_that_were_moved_are_told(result):
+    drives = result.parent / 'my drives'
+    drives.rename(result.parent / 'moved')
+    with pytest.raises(QueryError, match='my drives: No such file or directory; what was moved is found by'):
+        worst(result, BY)
+    drives.symlink_to(result.parent / 'moved')
+    assert worst(result, BY, 1)[0].uri == str(drives / 'b')
 
 
 def test_a_column_without_numbers_is_refused_with_those_that_have_some(result):

@@ -12,7 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from mount_ros.nodes.aside import wake
-from mount_ros.nodes.starter import environment_of_children
+from mount_ros.nodes.starter import environment_of_children, tied
 from mount_ros.testing import LIMIT, free_domain
 
 PROGRAM = """
@@ -139,6 +139,14 @@ def test_nodes_whose_starter_is_killed_are_closed_and_say_so(start, monkeypatch,
     who = f'the process that started this one ({starter.pid})'
     assert errors == f'[ERROR] [one]: {who} has ended, so this one ends too, at 0 A: start the graph again\n'
     assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
+
+
+def test_a_program_of_others_is_not_run_for_a_starter_that_has_ended(monkeypatch):
+    assert subprocess.run(tied(['echo', 'run']), stdout=subprocess.PIPE, check=True).stdout == b'run\n'
+    with subprocess.Popen(['true']) as other:
+        monkeypatch.setattr(os, 'getpid', lambda: other.pid)
+        ended = subprocess.run(tied(['echo', 'run']), stdout=subprocess.PIPE, check=False)
+    assert (ended.returncode, ended.stdout) == (1, b'')
 
 
 def test_a_burst_of_signals_ends_the_process_as_one_does(start):

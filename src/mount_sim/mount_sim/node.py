@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
-from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
@@ -19,6 +18,7 @@ from mount_models.arithmetic.compiled import compilation_told
 from mount_models.quantity import ParameterError, flattened
 from mount_ros import topics
 from mount_ros.data_path import DataPath
+from mount_ros.messages.level_imu import level_imu
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
@@ -41,7 +41,6 @@ from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
 
-_UNKNOWN_ORIENTATION = -1.0  # sensor_msgs/Imu: first element of a covariance
 _ALONE = ''  # name of the mount where there is one
 
 
@@ -252,15 +251,6 @@ class _Instruments:
         self._send_truth(self._truth.pack_record(stamp, truth_bytes))
         self._send_acceleration(self._acceleration.pack(stamp, truth['chassis_acceleration']))
         self._send_force(self._force.pack(stamp, truth['mount_force']))
-
-
-def level_imu() -> Imu:
-    """Return the message of an accelerometer that knows neither orientation nor rotation."""
-    message = Imu()
-    message.header.frame_id = 'mount_chassis'
-    message.orientation_covariance[0] = _UNKNOWN_ORIENTATION
-    message.angular_velocity_covariance[0] = _UNKNOWN_ORIENTATION
-    return message
 
 
 def main() -> None:

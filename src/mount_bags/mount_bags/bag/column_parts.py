@@ -1,6 +1,6 @@
 """Columns of topics straight from the unpacked chunks of a file, part by part: for many or long recordings.
 
-A compiled function walks the records of a chunk and picks the wanted bytes of each message. It takes one
+A compiled function walks the records of a chunk and picks the wanted numbers of each message. It takes one
 only if everything that fixes its layout is as in the first one of its topic; a chunk with any other goes the
 general way of `Recording.parts`, which gives the same numbers.
 """
@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.container.chunks import LENGTH_BESIDES_PAYLOAD, MESSAGE_HEAD, RECORD, Chunk
+from mount_bags.container.chunks import MESSAGE_HEAD, Chunk
 from mount_bags.container.mcap_file import McapFile
-from mount_bags.messages.series import STAMP_BYTES, Column, Series, Times
-from mount_bags.messages.taken import LOG_TIME_PLACE, take
+from mount_bags.messages.series import Column, Series, Times
+from mount_bags.messages.taken import LOG_TIME_PLACE, WORD, Wanted, take
 
 if TYPE_CHECKING:
     from mount_bags.bag.recording import Recording
 
-_WORD = 8  # bytes of a number that is picked
-_HEADS = 2  # numbers before the columns in a row: log time and stamp
 _KEPT = 16 * 1024 * 1024  # bytes of the file in memory, chosen
 _FLOAT = np.dtype('<f8')
 
@@ -67,7 +65,8 @@ class _FileColumns:
     ):
         self._recording, self._file, self._wanted, self._size = recording, file, wanted, size
         self._numbers = {name: recording.numbers_in(file, name) for name in wanted}
-        self._picked: dict[str, _Picked] = {}
+        self._held: dict[frozenset[int], list[str]] = {}
+        self._columns = _Columns(size)
 
     def parts(self) -> Iterator[ColumnPart]:
         forgotten = 0
@@ -75,33 +74,31 @@ class _FileColumns:
             if chunk.position - forgotten >= _KEPT:
                 self._file.forget(forgotten, chunk.position)
                 forgotten = chunk.position
-            held = [name for name in self._wanted if not self._held_in(chunk).isdisjoint(self._numbers[name])]
+            held = self._held_in(chunk)
             if not held:
                 continue
-            if not self._take(chunk, held):
-                yield from self._flushed()
+            filled = self._take(chunk) if self._columns.know(held) else -1
+            if filled < 0:
+                yield from self._columns.flushed()
                 yield from self._read(chunk)
-            yield from self._flushed(self._size)
-        yield from self._flushed()
+            elif filled >= self._size:
+                yield from self._columns.flushed(self._size)
+        yield from self._columns.flushed()
 
-    def _held_in(self, chunk: Chunk) -> frozenset[int]:
-        assert chunk.channels is not None  # of a plain file
-        return chunk.channels
+    def _held_in(self, chunk: Chunk) -> list[str]:
+        """Return which of the topics have messages in a chunk."""
+        channels = chunk.channels
+        assert channels is not None  # of a plain file
+        if channels not in self._held:
+            self._held[channels] = [
+                name for name, numbers in self._numbers.items() if not channels.isdisjoint(numbers)
+            ]
+        return self._held[channels]
 
-    def _take(self, chunk: Chunk, held: list[str]) -> bool:
-        """Take a chunk into the rows, all of it or nothing; return whether it is taken."""
-        if any(name not in self._picked for name in held):
-            return False
+    def _take(self, chunk: Chunk) -> int:
+        """Take a chunk into the columns; return as `_Columns.take` does."""
         content = self._file.unpacked(chunk)
-        if content is None:
-            return False
-        data = np.frombuffer(content, np.uint8)
-        filled = {name: self._picked[name].take(data) for name in held}
-        if any(count < 0 for count in filled.values()):
-            return False
-        for name, count in filled.items():
-            self._picked[name].filled = count
-        return True
+        return -1 if content is None else self._columns.take(content)
 
     def _read(self, chunk: Chunk) -> Iterator[ColumnPart]:
         """Read a chunk the general way, and learn from it the layout of topics not seen before."""
@@ -113,66 +110,82 @@ class _FileColumns:
             if not len(found):
                 continue
             series = self._recording.series_of(name, [found])
-            if name not in self._picked and len(numbers) == 1:
-                picked = _picked(series, self._wanted[name], numbers[0], self._size)
+            if len(numbers) == 1 and not self._columns.know([name]):
+                picked = _picked(series, self._wanted[name], numbers[0])
                 if picked is not None:
-                    self._picked[name] = picked
+                    self._columns.learn(name, picked)
             yield _part_of(series, self._wanted[name])
 
-    def _flushed(self, least: int = 1) -> Iterator[ColumnPart]:
-        """Yield what stands in the rows of the topics that have at least so many."""
-        for name, picked in self._picked.items():
-            if picked.filled >= least:
-                yield picked.flushed(name)
 
-
+@dataclass(frozen=True, eq=False)
 class _Picked:
-    """Rows of the wanted bytes of one topic's messages, and where these stand in a message."""
+    """Where log time, stamp and wanted numbers of one topic stand in a record, and how its messages look."""
 
-    def __init__(
-        self,
-        channel: int,
-        names: tuple[str, ...],
-        places: list[int],
-        raw: bytes,
-        shape: NDArray[np.int64],
-        size: int,
-    ):
-        head = MESSAGE_HEAD.itemsize
-        self.filled = 0
-        self._channel, self._names = channel, names
-        self._length = LENGTH_BESIDES_PAYLOAD + len(raw)
-        self._places = np.array([LOG_TIME_PLACE, *(head + place for place in places)], np.int64)
-        self._shape = np.zeros((2, len(raw)), np.uint8)
-        self._shape[0] = np.frombuffer(raw, np.uint8)
-        self._shape[1, shape] = 255
-        self._rows = np.empty((size, _WORD * len(self._places)), np.uint8)
+    channel: int
+    names: tuple[str, ...]
+    places: list[int]
+    raw: bytes
+    shape: NDArray[np.int64]  # bytes of the message that are the same in all
 
-    def take(self, data: NDArray[np.uint8]) -> int:
-        """Return how many rows there are with the messages in `data`; negative if one is another."""
-        needed = self.filled + len(data) // (RECORD.size + self._length) + 1
-        if needed > len(self._rows):
-            rows = np.empty((2 * needed, self._rows.shape[1]), np.uint8)
-            rows[: self.filled] = self._rows[: self.filled]
-            self._rows = rows
-        return take(data, self._channel, self._shape, self._places, self._rows, self.filled)
+    @property
+    def marked(self) -> NDArray[np.uint8]:
+        """The bytes of `shape` as a mask, (bytes,)."""
+        mask = np.zeros(len(self.raw), np.uint8)
+        mask[self.shape] = 255
+        return mask
 
-    def flushed(self, topic: str) -> ColumnPart:
-        """Return the rows as columns and begin anew."""
-        rows = self._rows[: self.filled].copy()
-        self.filled = 0
-        log_times = rows[:, :_WORD].copy().view('<i8')[:, 0]
-        seconds, nanoseconds = (
-            rows[:, begin : begin + STAMP_BYTES // 2].copy().view(kind)[:, 0].astype(np.int64)
-            for begin, kind in ((_WORD, '<i4'), (_WORD + STAMP_BYTES // 2, '<u4'))
+
+class _Columns:
+    """The wanted numbers of several topics' messages, filled chunk by chunk."""
+
+    def __init__(self, size: int):
+        self._size = size
+        self._topics: dict[str, _Picked] = {}
+
+    def know(self, names: list[str]) -> bool:
+        """Return whether messages of all these topics can be taken."""
+        return self._topics.keys() >= set(names)
+
+    def learn(self, name: str, picked: _Picked) -> None:
+        """Take messages of one more topic; nothing must be filled."""
+        self._topics[name] = picked
+        topics = list(self._topics.values())
+        counts = [(len(topic.raw), len(topic.places)) for topic in topics]
+        self._wanted = Wanted(
+            np.array([topic.channel for topic in topics]),
+            np.cumsum([(0, 0), *counts], axis=0),
+            np.frombuffer(b''.join(topic.raw for topic in topics), np.uint8),
+            np.concatenate([topic.marked for topic in topics]),
+            np.concatenate([topic.places for topic in topics]),
         )
-        numbers = rows[:, _WORD * _HEADS :].copy().view(_FLOAT)
-        columns = {name: numbers[:, place].copy() for place, name in enumerate(self._names)}
-        return ColumnPart(topic, seconds * 1_000_000_000 + nanoseconds, log_times, columns)
+        self._shortest = MESSAGE_HEAD.itemsize + min(size for size, _ in counts)
+        self._filled = np.zeros(len(topics), np.int64)
+        self._numbers = np.empty((len(topics), max(count for _, count in counts), 0), np.int64)
+
+    def take(self, content: bytes) -> int:
+        """Take the messages in a chunk, all or none; return how many the fullest topic has, else -1."""
+        needed = self._size + len(content) // self._shortest + 1
+        if needed > self._numbers.shape[2]:
+            rows = np.empty((*self._numbers.shape[:2], 2 * needed), np.int64)
+            rows[:, :, : self._numbers.shape[2]] = self._numbers
+            self._numbers = rows
+        return take(np.frombuffer(content, np.uint8), *self._wanted, self._numbers, self._filled)
+
+    def flushed(self, least: int = 1) -> Iterator[ColumnPart]:
+        """Yield the messages of the topics that have at least so many, and begin these anew."""
+        for place, (name, topic) in enumerate(self._topics.items()):
+            count = int(self._filled[place])
+            if count < least:
+                continue
+            log_times, stamps, *numbers = self._numbers[place, : len(topic.places), :count].copy()
+            self._filled[place] = 0
+            seconds, nanoseconds = (stamps << 32) >> 32, (stamps >> 32) & 0xFFFFFFFF
+            columns = {each: number.view(_FLOAT) for each, number in zip(topic.names, numbers, strict=True)}
+            yield ColumnPart(name, seconds * 1_000_000_000 + nanoseconds, log_times, columns)
 
 
-def _picked(series: Series, names: tuple[str, ...], channel: int, size: int) -> _Picked | None:
-    """Return rows for messages like those of `series`, None where they cannot be picked."""
+def _picked(series: Series, names: tuple[str, ...], channel: int) -> _Picked | None:
+    """Return where the numbers of messages like those of `series` stand, None where they cannot be picked."""
     layout, place = series.layout, series.stamp_place
     position = layout.numbers.get('position') if layout is not None else None
     if layout is None or place is None or position is None or position.dtype != _FLOAT:
@@ -180,5 +193,6 @@ def _picked(series: Series, names: tuple[str, ...], channel: int, size: int) -> 
     if position.count != len(series.names):
         return None
     known = tuple(name for name in names if name in series.names)
-    places = [place, *(position.offset + _WORD * series.names.index(name) for name in known)]
-    return _Picked(channel, known, places, series.payloads[0], layout.shape, size)
+    places = [place, *(position.offset + WORD * series.names.index(name) for name in known)]
+    in_record = [LOG_TIME_PLACE, *(MESSAGE_HEAD.itemsize + each for each in places)]
+    return _Picked(channel, known, in_record, series.payloads[0], layout.shape)

@@ -4,6 +4,7 @@ Old bags hold the policies as the numbers of `rmw/types.h`, newer ones as words;
 are written. A duration without end is 9223372036 s and 854775807 ns.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -74,11 +75,20 @@ def qos_text(offers: Sequence[OfferedQos]) -> str:
 def read_qos(source: Any) -> tuple[OfferedQos, ...]:
     """Return the offers in `source`: YAML text or the list that it holds; raises `QosError`."""
     try:
-        documents = plain_yaml(source) if isinstance(source, str) else source
-        return tuple(_offer(document) for document in documents or ())
+        return _offers_in(source) if isinstance(source, str) else _offers(source)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise QosError(f'offered quality of service not understood: {reason}') from None
+
+
+# The topics of a recording, and of many recordings, have the same few texts.
+@functools.lru_cache(maxsize=64)
+def _offers_in(text: str) -> tuple[OfferedQos, ...]:
+    return _offers(plain_yaml(text))
+
+
+def _offers(documents: Any) -> tuple[OfferedQos, ...]:
+    return tuple(_offer(document) for document in documents or ())
 
 
 def _offer(document: Any) -> OfferedQos:

@@ -13,6 +13,7 @@ import sys
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import zstandard
@@ -112,8 +113,7 @@ def partial_chunk(data: mmap.mmap, position: int) -> Chunk | None:
     return Chunk(position, begin, (len(data),), size, crc, name, start, last)
 
 
-@dataclass(slots=True, frozen=True)
-class IndexedChunk:
+class IndexedChunk(NamedTuple):
     """What a summary tells of a chunk; positions and lengths in bytes, times in ns."""
 
     position: int
@@ -138,12 +138,12 @@ def indexed_in(content: bytes) -> IndexedChunk | None:
         packed, size = _PACKED_SIZES.unpack_from(content, name_end)
         if offsets % _OFFSET.size:
             return None
-        channels = frozenset(each[0] for each in _OFFSET.iter_unpack(content[_INDEXED.size : place]))
+        low, high = (content[_INDEXED.size + byte : place : _OFFSET.size] for byte in range(2))
     except (struct.error, UnicodeDecodeError):
         return None
     # one object for all equal ones: a long recording has very many chunks
     return IndexedChunk(
-        position, length, index_length, packed, size, sys.intern(name), start, end, _same(channels)
+        position, length, index_length, packed, size, sys.intern(name), start, end, _channels(low, high)
     )
 
 
@@ -168,8 +168,13 @@ def indexed_chunk(data: mmap.mmap, index: IndexedChunk) -> Chunk | None:
 
 
 @functools.lru_cache(maxsize=256)
+def _channels(low: bytes, high: bytes) -> frozenset[int]:
+    """Return the channels of these low and high bytes, one object for all equal sets."""
+    return _same(frozenset(first | second << 8 for first, second in zip(low, high, strict=True)))
+
+
+@functools.lru_cache(maxsize=256)
 def _same(channels: frozenset[int]) -> frozenset[int]:
-    """Return one object for all equal sets."""
     return channels
 
 

@@ -91,9 +91,11 @@ def data_proof(data: mmap.mmap, end: int) -> Proof:
 def checksum(data: mmap.mmap, begin: int, end: int) -> int:
     """Return the CRC of a part of a file."""
     crc = 0
-    for position in range(begin, end, _STEP):
-        crc = zlib.crc32(data[position : min(position + _STEP, end)], crc)
-        forget(data, position, position + _STEP)  # a long recording is larger than a worker may be
+    with memoryview(data) as view:
+        for position in range(begin, end, _STEP):
+            with view[position : min(position + _STEP, end)] as part:
+                crc = zlib.crc32(part, crc)
+            forget(data, position, position + _STEP)  # a long recording is larger than a worker may be
     return crc
 
 
@@ -131,12 +133,12 @@ def _fill(summary: Summary, data: mmap.mmap) -> bool:
 
 
 def _take(summary: Summary, opcode: int, content: bytes) -> bool:
-    if opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
+    if opcode == Opcode.CHUNK_INDEX and (chunk := indexed_in(content)):
+        summary.chunks.append(chunk)
+    elif opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
         summary.schemas[schema.id] = schema
     elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):
         summary.channels[channel.id] = channel
-    elif opcode == Opcode.CHUNK_INDEX and (chunk := indexed_in(content)):
-        summary.chunks.append(chunk)
     elif opcode == Opcode.METADATA_INDEX and (metadata := parsed(MetadataIndex.read, content)):
         summary.beside.append(metadata)
     elif opcode == Opcode.ATTACHMENT_INDEX and (attachment := parsed(AttachmentIndex.read, content)):

@@ -1,50 +1,90 @@
-"""The compiled walk through the records of a chunk that picks the wanted bytes of one topic's messages."""
+"""The compiled walk through the records of a chunk that picks wanted numbers of several topics' messages."""
+
+from typing import NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
 
 LOG_TIME_PLACE = 15
 """Byte of a message record at which its log time begins: behind opcode, length, channel and sequence."""
+WORD = 8
+"""Bytes that are picked from each place, as one whole number, the lowest byte first."""
 _MESSAGE = int(Opcode.MESSAGE)
 _HEAD = 9  # bytes: opcode and length of what follows
 _SHORTEST = 22  # bytes behind the head of a message record without payload
-_WORD = 8  # bytes that are picked from each place
+
+
+class Wanted(NamedTuple):
+    """What is picked of the messages of n topics.
+
+    `channels` (n,); `begins` (n + 1, 2): where in `alike` and in `places` those of a topic begin, and at last
+    their ends. Each message of a topic has as many bytes as its part of `alike`, and what stands there in
+    those that are `marked` (255, else 0); `places` are bytes of its record.
+    """
+
+    channels: NDArray[np.int64]
+    begins: NDArray[np.int64]
+    alike: NDArray[np.uint8]
+    marked: NDArray[np.uint8]
+    places: NDArray[np.int64]
 
 
 @compiled
-def take(data, channel, shape, places, rows, filled):
-    """Fill `rows` from row `filled` on with the messages of a channel; return how many are filled then.
+def take(data, channels, begins, alike, marked, places, columns, filled):
+    """Fill `columns` from `filled` on with the messages in `data`; return how many the fullest has then.
 
-    `data`: bytes of a chunk, records from first to last. Each message has as many bytes as `shape`,
-    (2, bytes), and in those that its second row marks (255, else 0) what stands in the first; of its record
-    the 8 bytes from each of `places` on are taken. Negative: a message is another, or these are no whole
-    records.
+    `data`: bytes of a chunk, records from first to last; then the parts of `Wanted`. What stands at the
+    places of a topic are its rows of `columns`, (n, places, messages); of these `filled`, (n,), are taken.
+    Negative: a message is another, or these are no whole records; then `filled` stays.
     """
     position, size = 0, len(data)
-    length = _SHORTEST + shape.shape[1]
+    counts = filled.copy()
     while position + _HEAD <= size:
         told = int(data[position + 1]) | int(data[position + 2]) << 8
         told |= int(data[position + 3]) << 16 | int(data[position + 4]) << 24
         longer = data[position + 5] | data[position + 6] | data[position + 7] | data[position + 8]
         if longer or told > size - position - _HEAD:
             return -1
-        if data[position] == _MESSAGE and told < _SHORTEST:
-            return -1
-        if data[position] == _MESSAGE and int(data[position + 9]) | int(data[position + 10]) << 8 == channel:
-            if told != length:
+        if data[position] == _MESSAGE:
+            if told < _SHORTEST:
                 return -1
-            differing = np.uint8(0)
-            payload = data[position + _HEAD + _SHORTEST : position + _HEAD + told]
-            for index in range(len(payload)):  # without a branch, so that several are looked at at once
-                differing |= (payload[index] ^ shape[0, index]) & shape[1, index]
-            if differing:
-                return -1
-            for index in range(len(places)):
-                begin = position + places[index]
-                for byte in range(_WORD):
-                    rows[filled, _WORD * index + byte] = data[begin + byte]
-            filled += 1
+            channel = int(data[position + 9]) | int(data[position + 10]) << 8
+            for topic in range(len(channels)):
+                if channels[topic] != channel:
+                    continue
+                begin, end = begins[topic, 0], begins[topic + 1, 0]
+                payload = data[position + _HEAD + _SHORTEST : position + _HEAD + told]
+                if not _is_alike(payload, alike[begin:end], marked[begin:end]):
+                    return -1
+                begin, end = begins[topic, 1], begins[topic + 1, 1]
+                for index in range(end - begin):
+                    place = position + places[begin + index]
+                    columns[topic, index, counts[topic]] = _number(data[place : place + WORD])
+                counts[topic] += 1
         position += _HEAD + told
-    return filled if position == size else -1
+    if position != size:
+        return -1
+    filled[:] = counts
+    return counts.max()
+
+
+@compiled
+def _is_alike(payload, alike, marked):
+    if len(payload) != len(alike):
+        return False
+    differing = np.uint8(0)
+    for index in range(len(payload)):  # without a branch, so that several are looked at at once
+        differing |= (payload[index] ^ alike[index]) & marked[index]
+    return differing == 0
+
+
+@compiled
+def _number(word):
+    """Return the whole number in 8 bytes."""
+    number = np.int64(0)
+    for byte in range(WORD):
+        number |= np.int64(word[byte]) << (8 * byte)
+    return number

@@ -37,8 +37,9 @@ def recording_hash(path: Path) -> str:
     digest = hashlib.sha256()
     files = [part for part in path.rglob('*') if part.is_file()] if path.is_dir() else [path]
     parts = sorted(part for part in files if part.match('*.mcap*')) or sorted(files)
+    block = memoryview(bytearray(1 << 18))
     for part in parts:
-        with part.open('rb') as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
+        with part.open('rb', buffering=0) as stream:
+            while count := stream.readinto(block):
+                digest.update(block[:count])
     return digest.hexdigest()

@@ -11,6 +11,7 @@ bursts. So stamps are taken, in this order, as
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -30,6 +31,7 @@ LONGEST_BURST = 0.25
 _SLOW_CLOCK = 0.005  # chosen: so much slower than its name may a sensor of just the lowest rate be
 _AS_GOOD = 1.1  # chosen: even spacing is taken unless stamps foretell the samples better by more than that
 _FARTHEST_BACK = 2.0  # mean periods, chosen: so late a sample may come in the file
+_BLOCK = 1 << 18  # samples looked at together, chosen
 _OFTEN = 0.1  # share of steps, chosen: what is more frequent is a habit of the logger, or of the file
 
 
@@ -91,12 +93,11 @@ def gaps(signal: Signal, longest_gap: float) -> NDArray[np.intp]:
     time that goes back.
     """
     _refuse_time_that_goes_back(signal)
-    steps = np.diff(signal.times)
-    certain = np.flatnonzero(steps > max(longest_gap, LONGEST_BURST))
+    certain = _steps_where(signal.times, lambda steps: steps > max(longest_gap, LONGEST_BURST))
     edges = np.concatenate([[0], certain + 1, [signal.times.size]])
     found = [certain]
     for first, behind in pairwise(edges.tolist()):
-        places = first + np.flatnonzero(steps[first : behind - 1] > longest_gap)
+        places = first + _steps_where(signal.times[first:behind], lambda steps: steps > longest_gap)
         if places.size and not _in_bursts(np.sort(signal.times[first:behind])):
             found.append(places)
     return np.sort(np.concatenate(found))
@@ -104,17 +105,24 @@ def gaps(signal: Signal, longest_gap: float) -> NDArray[np.intp]:
 
 def _refuse_time_that_goes_back(signal: Signal) -> None:
     times = signal.times
-    steps = np.diff(times)
-    mean = (times.max() - times.min()) / steps.size
-    bad = steps < -_FARTHEST_BACK * mean
-    if np.mean(steps < 0.0) > _OFTEN or mean == 0.0:
-        bad = steps <= 0.0
-    if bad.any():
-        place = int(np.argmax(bad))
+    mean = (times.max() - times.min()) / (times.size - 1)
+    bad = _steps_where(times, lambda steps: steps < -_FARTHEST_BACK * mean)
+    backwards = _steps_where(times, lambda steps: steps < 0.0)
+    if backwards.size > _OFTEN * (times.size - 1) or mean == 0.0:
+        bad = _steps_where(times, lambda steps: steps <= 0.0)
+    if bad.size:
+        place = int(bad[0])
         raise SignalError(
             f'{signal.name}: time does not rise at sample {place + 1}: {times[place]:.6f} s is followed by '
             f'{times[place + 1]:.6f} s; sort the samples or remove the repeated ones'
         )
+
+
+def _steps_where(times: FloatArray, wanted: Callable[[FloatArray], NDArray[np.bool_]]) -> NDArray[np.intp]:
+    """Return behind which samples a step is as `wanted`, in blocks: all steps of an hour are not held."""
+    firsts = range(0, max(times.size - 1, 0), _BLOCK)
+    found = [first + np.flatnonzero(wanted(np.diff(times[first : first + _BLOCK + 1]))) for first in firsts]
+    return np.concatenate([np.zeros(0, np.intp), *found])
 
 
 def _once(signal: Signal) -> NDArray[np.bool_]:

@@ -9,4 +9,4 @@ class GraphError(RuntimeError):
 
 
 class Interrupted(Exception):  # noqa: N818 - no error: the user ends it
-    """The user asked to end."""
+    """The user asked to end; the text, if any, says what stands then."""

@@ -4,6 +4,7 @@ The stamps in the messages are the recorded ones, and the control goes by them a
 `use_sim_time` are not needed.
 """
 
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -12,6 +13,7 @@ from pathlib import Path
 import yaml
 
 from mount_bringup.graph.errors import GraphError
+from mount_ros.nodes.starter import tied
 from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE, DISPLACEMENT, Delivery, Topic
 
 PLAYED = (DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE)
@@ -22,22 +24,25 @@ _END_LIMIT = 5.0  # s, chosen: until a player that was told to end is killed
 
 
 class Player:
-    """Plays the inputs of the mount in `namespace` from a recording; `rate` 1: as fast as recorded."""
+    """Plays the inputs of the mount in `namespace` from a recording; `rate` 1: as fast as recorded.
+
+    It ends when this process does, whatever ends that, and leaves no file behind.
+    """
 
     def __init__(self, bag: Path, namespace: str, rate: float):
-        self._folder = tempfile.TemporaryDirectory(prefix='mount_replay_')
-        offers = Path(self._folder.name) / 'offers.yaml'
-        offers.write_text(offers_text(namespace))
-        self._command = play_command(bag, namespace, rate, offers)
+        self._offers = offers_text(namespace)
+        self._command = play_command(bag, namespace, rate)
         self._process: subprocess.Popen[bytes] | None = None
 
     def begin(self) -> None:
         """Start to play."""
-        try:
+        if shutil.which(self._command[0]) is None:
+            raise GraphError(f'{self._command[0]} cannot be started: it is not among the programs in PATH')
+        with tempfile.TemporaryFile('w+') as offers:
+            offers.write(self._offers)
+            offers.seek(0)
             # a session of its own: Ctrl-C is the supervisor's, which ends it
-            self._process = subprocess.Popen(self._command, start_new_session=True)
-        except OSError as error:
-            raise GraphError(f'{self._command[0]} cannot be started: {error}') from None
+            self._process = subprocess.Popen(tied(self._command), stdin=offers, start_new_session=True)
 
     @property
     def finished(self) -> bool:
@@ -52,7 +57,6 @@ class Player:
 
     def end(self) -> None:
         """End the player; safe to call twice."""
-        self._folder.cleanup()
         if self._process is None or self._process.poll() is not None:
             return
         self._process.send_signal(signal.SIGINT)
@@ -63,10 +67,10 @@ class Player:
             self._process.wait()
 
 
-def play_command(bag: Path, namespace: str, rate: float, offers: Path) -> list[str]:
-    """Return the command that plays what a control in `namespace` hears, with the offers of a file."""
+def play_command(bag: Path, namespace: str, rate: float) -> list[str]:
+    """Return the command that plays what a control in `namespace` hears; it reads `offers_text` as input."""
     return ['ros2', 'bag', 'play', str(bag), '--rate', f'{rate:g}', '--delay', f'{_DISCOVERY:g}',
-            '--disable-keyboard-controls', '--qos-profile-overrides-path', str(offers),
+            '--disable-keyboard-controls', '--qos-profile-overrides-path', '/dev/stdin',
             '--topics', *(_full_name(topic, namespace) for topic in PLAYED)]  # fmt: skip
 
 

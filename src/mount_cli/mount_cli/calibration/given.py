@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
-    from mount_signals.units.mapping import ColumnChoice
+    from mount_signals.formats.content import Stated
+    from mount_signals.units.mapping import ColumnChoice, Mapping
 
 _CHANNELS = ('gap', 'current', 'force', 'inductance', 'current_rate', 'flux_rate', 'coil_temperature')
 _MAPPED = {'air_gap': 'gap', 'temperature': 'coil_temperature'}
@@ -22,21 +23,18 @@ def orders_of(text: str) -> tuple[int, int, int, int, int]:
     return a, b, c, d, e
 
 
-def columns_of(settings: list[str], map_file: Path | None = None) -> dict[str, 'ColumnChoice']:
-    """Return the column of each channel, of a mapping file and of `--column`, which goes before it.
+def columns_of(settings: list[str], mapping: 'Mapping') -> dict[str, 'ColumnChoice']:
+    """Return the column of each channel, of a mapping and of `--column`, which goes before it.
 
-    Raises `typer.BadParameter` and `MappingError`.
+    Raises `typer.BadParameter`.
     """
-    from mount_signals.units.mapping import ColumnChoice, mapping_in_file
+    from mount_signals.units.mapping import ColumnChoice
 
-    chosen = {}
-    if map_file is not None:
-        mapping = mapping_in_file(map_file)
-        said = {
-            _MAPPED.get(name, name): choice
-            for name, choice in (*mapping.others.items(), *mapping.columns.items())
-        }
-        chosen = {name: choice for name, choice in said.items() if name in _CHANNELS}
+    said = {
+        _MAPPED.get(name, name): choice
+        for name, choice in (*mapping.others.items(), *mapping.columns.items())
+    }
+    chosen = {name: choice for name, choice in said.items() if name in _CHANNELS}
     for setting in settings:
         name, equals, header = setting.partition('=')
         if not (equals and name and header):
@@ -68,7 +66,7 @@ def per_file(settings: list[str], files: list[Path], option: str, factor: float)
     return values
 
 
-def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) -> Any:
+def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str], stated: 'Stated') -> Any:
     """Return what the caller says of gaps (um) and temperatures (degC) as `GivenValues`."""
     from mount_identification.rack.recordings import GivenValues
 
@@ -82,7 +80,7 @@ def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) ->
             raise typer.BadParameter(
                 f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
             )
-    return GivenValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None)
+    return GivenValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None, stated)
 
 
 def positive(value: float | None, option: str, unit: str) -> float | None:

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from mount_cli.calibration.given import columns_of, given_ripple, orders_of, per_file, positive
 from mount_cli.calibration.written import write_results
-from mount_cli.commands.options import MapFile
+from mount_cli.commands.options import Dbc, Decimal, Delimiter, MapFile, mapping_of, stated
 from mount_cli.fetching import local
 from mount_cli.help import Command, Group
 from mount_cli.terminal import note, terminal
@@ -30,6 +30,8 @@ Examples:
 `engine-mount calibrate actuator run1.csv run2.csv --orders 4,4,4,2,4 --figure force.png`
 
 `engine-mount calibrate actuator F.csv --column gap=Spalt:mm --column force=Kraft:kN`
+
+`engine-mount calibrate actuator F.blf --dbc rack.dbc --column gap=Rack.Spalt` - of a CAN log
 
 `engine-mount calibrate actuator bags/ramp_349um bags/ramp_400um ...` - MCAP, one gap each
 
@@ -87,6 +89,9 @@ def actuator(
     ] = '4,4,4,2,4',
     columns: Columns = None,
     map_file: MapFile = None,
+    dbc: Dbc = None,
+    decimal: Decimal = '',
+    delimiter: Delimiter = '',
     gaps: Gaps = None,
     base: Base = None,
     name: Name = '',
@@ -104,16 +109,19 @@ def actuator(
     from mount_identification.rack.recordings import GivenValues, read_force
     from mount_identification.specimen import check_targets, with_force_law
     from mount_models.specimen import chosen_specimen
+    from mount_signals.units.columns import stated_with
 
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     places = [local(file, console) for file in files]
-    given = GivenValues(per_file(gaps or [], places, '--gap', 1e-6), {})
+    mapping = mapping_of(map_file)
+    told = stated_with(mapping, stated(dbc, decimal, delimiter))
+    given = GivenValues(per_file(gaps or [], places, '--gap', 1e-6), {}, None, told)
     chosen_orders = orders_of(orders)
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=None)
-        points = read_force(places, columns_of(columns or [], map_file), given)
+        points = read_force(places, columns_of(columns or [], mapping), given)
         progress.update(task, description='fitting')
         fit = fit_force_law(
             points.gap,
@@ -183,6 +191,9 @@ def inductance(
     ] = None,
     columns: Columns = None,
     map_file: MapFile = None,
+    dbc: Dbc = None,
+    decimal: Decimal = '',
+    delimiter: Delimiter = '',
     base: Base = None,
     name: Name = '',
     out: Out = None,
@@ -200,6 +211,7 @@ def inductance(
     from mount_identification.specimen import check_targets, with_gap_curves
     from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
     from mount_models.specimen import chosen_specimen
+    from mount_signals.units.columns import stated_with
 
     console = terminal()
     check_targets(out, json_file, figure)
@@ -213,10 +225,12 @@ def inductance(
         held_out=tuple(held_out or ()),
     )
     area = positive(turns_area, '--turns-area', 'm^2') or starting.turns_area
-    given = given_ripple(places, gaps or [], temperatures or [])
+    mapping = mapping_of(map_file)
+    told = stated_with(mapping, stated(dbc, decimal, delimiter))
+    given = given_ripple(places, gaps or [], temperatures or [], told)
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=2)
-        recordings = read_ripple(places, columns_of(columns or [], map_file), given, area)
+        recordings = read_ripple(places, columns_of(columns or [], mapping), given, area)
         progress.update(task, description='fitting', completed=1)
         result = calibrate_inductance(recordings, starting.force_law, order)
         progress.update(task, completed=2)

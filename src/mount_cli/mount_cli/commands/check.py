@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.options import Domain, JsonFile, NewFolder, Settings
-from mount_cli.terminal import note, terminal
+from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when every manoeuvre stayed within its limits; 1 when a limit was exceeded; 2 for a
 wrong use of the command, of a suite or of a parameter, and nothing was driven.
@@ -52,7 +52,7 @@ def check(
     from mount_experiments.check.page import PAGE, write_page
     from mount_experiments.check.session import CheckOrder, run_trials, trials_of
     from mount_experiments.check.suite import chosen_of, shipped_suite, suite_in_file
-    from mount_experiments.check.telling import figures_of, table_of
+    from mount_experiments.check.telling import Told, figures_of, table_of
     from mount_experiments.check.trial import CORE, MODES
     from mount_report.json_file import write_json
 
@@ -79,12 +79,9 @@ def check(
         raise typer.BadParameter(str(error)) from None
     folder = make_run_folder(place, 'check').path
     screen = TerminalScreen(console)
-    results = run_trials(trials, jobs, screen)
+    results = run_trials(trials, jobs, screen, Told(order, screen))
     verdicts = all_verdicts(chosen, results, through)
     screen.table(table_of(verdicts))
-    for name, result in results.items():
-        for remark in result.remarks:
-            note(console, remark, name)
     if json_file is not None:
         write_json(figures_of(order, results, verdicts), json_file)
     write_page(order, results, verdicts, folder / PAGE)

@@ -8,6 +8,8 @@ from mount_bringup.graph.nodes import RESTART_LIMIT
 from mount_cli.commands.options import (
     Columns,
     Dbc,
+    Decimal,
+    Delimiter,
     Domain,
     JsonFile,
     MapFile,
@@ -18,6 +20,7 @@ from mount_cli.commands.options import (
     Snapshot,
     Split,
     TimeColumn,
+    stated,
 )
 from mount_cli.commands.road_arguments import (
     ContactLength,
@@ -96,6 +99,8 @@ def drive(
     rate: Rate = None,
     map_file: MapFile = None,
     dbc: Dbc = None,
+    decimal: Decimal = '',
+    delimiter: Delimiter = '',
     topic: Annotated[str, typer.Option(help='recorded: topic of a bag, --column being the field')] = '',
     scale: Annotated[
         float | None,
@@ -191,6 +196,7 @@ def drive(
     if composed and (lockstep or core):
         raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
     of_files = {'time': time, 'rate': rate, 'map-file': map_file, 'dbc': dbc, 'topic': topic, 'scale': scale}
+    of_files |= {'decimal': decimal, 'delimiter': delimiter}
     if not file:
         given_without_file(**of_files, column=None if road else column)
     if road:
@@ -235,7 +241,8 @@ def drive(
         from mount_replay.drive.recorded_file import recorded_acceleration
 
         said = [f'{topic}.{name}' if topic else name for name in column or []]
-        how = {'time': time, 'rate': rate, 'scale': scale, 'mapping_file': map_file, 'dbc': dbc}
+        how = {'time': time, 'rate': rate, 'scale': scale, 'mapping_file': map_file}
+        how['stated'] = stated(dbc, decimal, delimiter)
         recorded, factor = recorded_acceleration(str(local(file, console)), said, **how)
         brought = (recorded,)
         parameters['mount_sim']['recorded.scale'] = factor

@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from mount_cli.commands.options import MapFile
+from mount_cli.commands.options import (
+    Dbc,
+    Decimal,
+    Delimiter,
+    MapFile,
+    Rate,
+    TimeColumn,
+    mapping_of,
+    stated,
+)
 from mount_cli.completion.values import recordings
 from mount_cli.fetching import local
 from mount_cli.help import Command, Group
@@ -29,6 +38,8 @@ Examples:
 `engine-mount identify friction --file a.json b.json c.json` - trained on each, tried on each other one
 
 `engine-mount identify friction --train rig.mat --column friction_force=cell:lbf --step ladder` - any format
+
+`engine-mount identify friction --train rig.blf --dbc rig.dbc --step ladder` - or of a CAN log
 
 `engine-mount identify friction --train a.mf4 --held-out b.mf4 --map-file rig_2.yaml` - what a team agreed on
 """
@@ -63,6 +74,11 @@ def friction(
         ),
     ] = None,
     map_file: MapFile = None,
+    time: TimeColumn = '',
+    rate: Rate = None,
+    dbc: Dbc = None,
+    decimal: Decimal = '',
+    delimiter: Delimiter = '',
     clamp: Annotated[
         str,
         typer.Option(help="JSON: normal force from the band's pull while sliding, at rest, or none"),
@@ -93,23 +109,23 @@ def friction(
     from mount_cli.calibration.friction_screen import print_friction
     from mount_cli.calibration.written import note_foreign
     from mount_cli.screen import progress_bar
-    from mount_identification.friction.channels import mapped_channels, parsed_channels
+    from mount_identification.friction.channels import said
     from mount_identification.friction.figures import figures
     from mount_identification.friction.found import IdentifyOrder
     from mount_identification.friction.identify import identify
     from mount_identification.specimen import check_targets, foreign_parts, with_friction
     from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
     from mount_report.json_file import write_json
-    from mount_signals.units.mapping import mapping_in_file
+    from mount_signals.units.mapping import with_options
 
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
-    channels = mapped_channels(mapping_in_file(map_file)) if map_file else {}
-    channels |= parsed_channels(channel or [])
+    mapping = with_options(mapping_of(map_file), (), time, rate)
+    told = said(channel or [], mapping, stated(dbc, decimal, delimiter))
     order = IdentifyOrder(
         *([local(each, console) for each in places or []] for places in (train, held_out, file)),
-        step, clamp, zero, channels, seed, friction_contact(starting.friction),
+        step, clamp, zero, told, seed, friction_contact(starting.friction),
     )  # fmt: skip
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)

@@ -5,7 +5,19 @@ from typing import Annotated, Any
 
 import typer
 
-from mount_cli.commands.options import Columns, Dbc, JsonFile, MapFile, Rate, TimeColumn, recording_argument
+from mount_cli.commands.options import (
+    Columns,
+    Dbc,
+    Decimal,
+    Delimiter,
+    JsonFile,
+    MapFile,
+    Rate,
+    TimeColumn,
+    mapping_of,
+    recording_argument,
+    stated,
+)
 from mount_cli.fetching import local
 from mount_cli.terminal import note, terminal
 
@@ -39,6 +51,8 @@ def import_files(
     time: TimeColumn = '',
     rate: Rate = None,
     dbc: Dbc = None,
+    decimal: Decimal = '',
+    delimiter: Delimiter = '',
     first: Annotated[
         float | None, typer.Option('--from', metavar='S', help='s after the first sample of all files')
     ] = None,
@@ -54,16 +68,14 @@ def import_files(
     """
     from mount_cli.screen import progress_bar
     from mount_report.json_file import write_json
-    from mount_signals.formats.content import Stated
     from mount_signals.importing.importing import ImportOrder, import_recording
-    from mount_signals.units.mapping import Mapping, mapping_in_file, with_options
+    from mount_signals.units.mapping import with_options
 
     console = terminal()
-    mapping = mapping_in_file(map_file) if map_file else Mapping()
-    mapping = with_options(mapping, column or [], time, rate)
+    mapping = with_options(mapping_of(map_file), column or [], time, rate)
     places = [str(local(file, console)) for file in files]
     name = map_file.name if map_file else ''
-    order = ImportOrder(places, out, mapping, name, first, last, Stated(dbc=dbc))
+    order = ImportOrder(places, out, mapping, name, first, last, stated(dbc, decimal, delimiter))
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
         imported = import_recording(

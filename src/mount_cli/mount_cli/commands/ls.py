@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from mount_cli.commands.options import Dbc, JsonFile, RecordingPlace
+from mount_cli.commands.options import Dbc, Decimal, Delimiter, JsonFile, RecordingPlace, stated
 from mount_cli.fetching import local, named
 from mount_cli.terminal import note, terminal
 
 if TYPE_CHECKING:
     from mount_report.listing import Listed
     from mount_report.recording_facts import RecordingFacts
+    from mount_signals.formats.content import Stated
 
 EPILOG = """Exit code: 0, also where a recording is damaged, which its line tells; 1 when a folder is
 not there.
@@ -99,6 +100,8 @@ def _print_listed(found: 'list[Listed]', console: Console) -> None:
 def info(
     recording: RecordingPlace,
     dbc: Dbc = None,
+    decimal: Decimal = '',
+    delimiter: Delimiter = '',
     json_file: JsonFile = None,
 ) -> None:
     """Tell what a recording is and holds: session, versions, parameters, topics, gap, losses.
@@ -113,7 +116,7 @@ def info(
     console = terminal()
     place = local(recording, console)
     if is_foreign(place):
-        _info_of_columns(place, dbc, console, json_file)
+        _info_of_columns(place, stated(dbc, decimal, delimiter), console, json_file)
         return
     with console.status('reading'):
         facts = recording_facts(open_run(place))
@@ -122,17 +125,16 @@ def info(
         write_json(facts.as_json(), json_file)
 
 
-def _info_of_columns(place: Path, dbc: Path | None, console: Console, json_file: Path | None) -> None:
+def _info_of_columns(place: Path, said: 'Stated', console: Console, json_file: Path | None) -> None:
     from dataclasses import asdict
 
     from mount_cli.screen import TerminalScreen
     from mount_report.json_file import write_json
-    from mount_signals.formats.content import Stated
     from mount_signals.formats.described import columns_table, described
     from mount_signals.formats.reading import read
 
     with console.status('reading'):
-        measured = read(place, None, Stated(dbc=dbc))
+        measured = read(place, None, said)
     facts = described(measured)
     told = measured.provenance
     console.print(f'{"file":<20}{told.uri}, {told.format}, read by {told.reader}', soft_wrap=True)

@@ -1,11 +1,15 @@
 """Options that several sub-commands have."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mount_cli.completion.values import recordings, setting
+
+if TYPE_CHECKING:
+    from mount_signals.formats.content import Stated
+    from mount_signals.units.mapping import Mapping
 
 
 def recording_argument(metavar: str | None = None, instead: str = '') -> Any:
@@ -80,6 +84,34 @@ Dbc = Annotated[
     Path | None,
     typer.Option('--dbc', metavar='FILE', help='CAN log: the database by which its frames are decoded'),
 ]
+Decimal = Annotated[
+    str,
+    typer.Option('--decimal', metavar='SIGN', help='text table that can be read in two ways: "." or ","'),
+]
+Delimiter = Annotated[
+    str,
+    typer.Option(
+        '--delimiter',
+        metavar='SIGN',
+        help='text table that can be read in two ways: what separates its cells, as ";", tab or blank',
+    ),
+]
+
+
+def mapping_of(map_file: Path | None) -> 'Mapping':
+    """Return what a mapping file says, nothing without one; raises `MappingError`."""
+    from mount_signals.units.mapping import Mapping, mapping_in_file
+
+    return mapping_in_file(map_file) if map_file else Mapping()
+
+
+def stated(dbc: Path | None, decimal: str, delimiter: str) -> 'Stated':
+    """Return what the options say of a file of others beside its columns and times."""
+    from mount_signals.formats.content import Stated
+
+    return Stated(dbc=dbc, decimal=decimal, delimiter=delimiter)
+
+
 Scheduler = Annotated[
     str, typer.Option(metavar='local|ADDRESS', help='local, or tcp://HOST:PORT of a Dask cluster')
 ]

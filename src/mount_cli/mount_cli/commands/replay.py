@@ -9,12 +9,15 @@ from rich.console import Console
 from mount_cli.commands.options import (
     RATE,
     Dbc,
+    Decimal,
+    Delimiter,
     Domain,
     JsonFile,
     MapFile,
     NewFolder,
     TimeColumn,
     recording_argument,
+    stated,
 )
 from mount_cli.commands.other_than_recorded import OtherThanRecorded, changes_of
 from mount_cli.completion.values import listed, named
@@ -70,6 +73,8 @@ def replay(
     map_file: MapFile = None,
     time: TimeColumn = '',
     dbc: Dbc = None,
+    decimal: Decimal = '',
+    delimiter: Delimiter = '',
     scale: Annotated[
         float | None,
         typer.Option(help='foreign recording: factor to m, or on what --map names with a unit'),
@@ -145,8 +150,9 @@ def replay(
         from mount_replay.given.foreign import foreign_order
 
         foreign = foreign_order(
-            maps or [], scale, offset, mapping_file=map_file, time=time, rate=rate, dbc=dbc
-        )
+            maps or [], scale, offset, mapping_file=map_file, time=time, rate=rate,
+            stated=stated(dbc, decimal, delimiter),
+        )  # fmt: skip
     elif rate is not None or scale is not None or offset or time:
         raise typer.BadParameter('--scale, --offset, --time and --rate go with --map or --map-file')
     mode = LOCKSTEP if lockstep else CORE

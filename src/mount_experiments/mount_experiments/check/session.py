@@ -1,22 +1,29 @@
 """The suite driven: orders checked before the first manoeuvre, in core several at a time."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import contextlib
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mount_bags.run.screen import Screen
+from mount_bags.run.screen import Bar, Screen
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.mounts import mounts_of
 from mount_bringup.settings import checked_settings
 from mount_experiments.check.suite import Manoeuvre
-from mount_experiments.check.trial import CORE, Result, Trial, run_trial
-from mount_experiments.sensitivity.grid import run_all
+from mount_experiments.check.trial import CORE, Result, Trial, broken_down, run_trial
 from mount_models.quantity import ParameterError
 from mount_models.sampling import SAMPLE_RATE
 from mount_replay.drive.preflight import preflight
+from mount_replay.fleet.runner import run_tasks
 
 Settings = Mapping[str, Mapping[str, Any]]
+Told = Callable[[str, Result, float], None]
+"""Takes a manoeuvre that is done, what came of it, and the share of all that is done with it (0..1)."""
+
+_AROUND = 8.0  # s, chosen: through nodes, their start and end
 
 
 class CheckError(ValueError):
@@ -52,23 +59,61 @@ def trials_of(order: CheckOrder, out: Path) -> list[Trial]:
         Trial(manoeuvre, _merged(manoeuvre, settings), order.through, out, order.domain, order.priority)
         for manoeuvre in order.manoeuvres
     ]
-    for trial in trials:
-        _check(trial)
-    return trials
+    return [replace(trial, seconds=_checked_duration(trial)) for trial in trials]
 
 
-def run_trials(trials: Sequence[Trial], jobs: int, screen: Screen) -> dict[str, Result]:
-    """Drive all and return {manoeuvre: what came of it} in their order; raises `Interrupted`."""
+def run_trials(trials: Sequence[Trial], jobs: int, screen: Screen, tell: Told) -> dict[str, Result]:
+    """Drive all, `tell` of each when it is done, and return {manoeuvre: what came of it} in their order.
+
+    Raises `Interrupted`.
+    """
     results: dict[str, Result] = {}
-    with screen.bar('checking', transient=True) as show:
-        if trials[0].through == CORE:
-            told = run_all(trials, jobs, lambda done: show(done / len(trials)), run_trial)
-            results = {name: result for (name,), result in told.items()}
-        else:
-            for place, trial in enumerate(trials):
-                show(place / len(trials), trial.manoeuvre.name)
-                _, results[trial.manoeuvre.name] = run_trial(trial)
+    whole = sum(trial.seconds for trial in trials)
+    done = 0.0
+    with screen.bar('checking', transient=True) as bar:
+        for trial, result in _in_core(trials, jobs) if trials[0].through == CORE else _in_turn(trials, bar):
+            done += trial.seconds
+            bar(done / whole, trial.manoeuvre.name)
+            results[trial.manoeuvre.name] = result
+            tell(trial.manoeuvre.name, result, done / whole)
     return {trial.manoeuvre.name: results[trial.manoeuvre.name] for trial in trials}
+
+
+def _in_core(trials: Sequence[Trial], jobs: int) -> Iterator[tuple[Trial, Result]]:
+    """Return the trials as they are done, with what came of them."""
+    for done in run_tasks(run_trial, trials, workers=jobs):
+        if done.error is not None:
+            raise done.error
+        yield trials[done.place], done.result or broken_down(done.reason)
+
+
+def _in_turn(trials: Sequence[Trial], bar: Bar) -> Iterator[tuple[Trial, Result]]:
+    """Return the trials one by one, with what came of them; the bar goes on while one is driven."""
+    whole = sum(trial.seconds for trial in trials)
+    done = 0.0
+    for trial in trials:
+        name, begin, part = trial.manoeuvre.name, done / whole, trial.seconds / whole
+        bar(begin, name)
+        yield trial, run_trial(trial, _Within(partial(_show_part, bar, name, begin, part)))
+        done += trial.seconds
+
+
+class _Within(Screen):
+    """The screen of one drive of many: nothing of it is seen but how far it has come."""
+
+    def __init__(self, show: Bar):
+        super().__init__(io.StringIO())
+        self._show = show
+
+    @contextlib.contextmanager
+    def bar(self, what: str, *, transient: bool = False) -> Iterator[Bar]:
+        yield self._show
+
+
+def _show_part(
+    bar: Bar, name: str, begin: float, part: float, share: float, what: str = '', detail: str = ''
+) -> None:
+    bar(begin + part * share, name, detail)
 
 
 def _merged(manoeuvre: Manoeuvre, settings: Settings) -> dict[str, dict[str, Any]]:
@@ -84,7 +129,8 @@ def _merged(manoeuvre: Manoeuvre, settings: Settings) -> dict[str, dict[str, Any
     return with_control_of_mount(merged)
 
 
-def _check(trial: Trial) -> None:
+def _checked_duration(trial: Trial) -> float:
+    """Return how long (s) a drive is, start and end of its graph included, or raise `CheckError`."""
     manoeuvre = trial.manoeuvre
     try:
         excitation = preflight(trial.parameters, core=trial.through == CORE)
@@ -95,3 +141,4 @@ def _check(trial: Trial) -> None:
             f'{manoeuvre.name}: evaluated_from_s ({manoeuvre.evaluated_from:g} s) must lie before the end of '
             f'the excitation ({excitation.duration:g} s)'
         )
+    return excitation.start + excitation.duration + (0.0 if trial.through == CORE else _AROUND)

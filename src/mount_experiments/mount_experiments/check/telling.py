@@ -1,12 +1,13 @@
-"""What a check says: one table in the terminal, worst first, and the figures of `--json`."""
+"""What a check says: a line for each manoeuvre, one table, worst first, and the figures of `--json`."""
 
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
-from mount_bags.run.screen import Table
-from mount_experiments.check.judgement import Judged, Verdict, passed, worst_first
+from mount_bags.run.screen import Screen, Table
+from mount_experiments.check.judgement import Judged, Verdict, passed, verdicts_of, worst_first
 from mount_experiments.check.session import CheckOrder
 from mount_experiments.check.trial import Result
 
@@ -14,6 +15,34 @@ HEADS = ('', 'manoeuvre', 'quantity', 'value', 'limit', 'left')
 _SIGNS = {'at_most': '≤', 'at_least': '≥'}
 
 Verdicts = Mapping[str, Sequence[Verdict]]
+
+
+class Told:
+    """Tells each manoeuvre when it is done: the limit of which least is left, the time to go, its remarks."""
+
+    def __init__(self, order: CheckOrder, screen: Screen, clock: Callable[[], float] = time.monotonic):
+        self._suite = {each.name: each for each in order.manoeuvres}
+        self._through = order.through
+        self._screen = screen
+        self._clock = clock
+        self._begin = clock()
+        self._is_first = True
+
+    def __call__(self, name: str, result: Result, share: float) -> None:
+        if self._is_first:
+            self._screen.say(_line(*HEADS, 'to go'))
+            self._is_first = False
+        verdicts = worst_first(verdicts_of(self._suite[name], result, self._through))
+        row = cells(verdicts[0]) if verdicts else ('', name, 'no limit', '', '', '')
+        to_go = round((1.0 - share) / share * (self._clock() - self._begin))
+        self._screen.say(_line(*row, f'{to_go // 60}:{to_go % 60:02}'))
+        for remark in result.remarks:
+            self._screen.note(remark, name)
+
+
+def _line(*texts: str) -> str:
+    """Return a line of at most 80 columns; the longest quantity has 32 characters."""
+    return '{:<5}{:<11}{:<33}{:>7} {:>7} {:>7} {:>6}'.format(*texts)
 
 
 def table_of(verdicts: Verdicts) -> Table:

@@ -32,7 +32,10 @@ _FIELDS = ('displacement', 'velocity', 'mount_force', 'chassis_acceleration')
 
 @dataclass(frozen=True)
 class Trial:
-    """A manoeuvre with the parameters of all nodes, driven `through` what, into the folder `out`."""
+    """A manoeuvre with the parameters of all nodes, driven `through` what, into the folder `out`.
+
+    `seconds` is how long the drive is.
+    """
 
     manoeuvre: Manoeuvre
     parameters: Mapping[str, Mapping[str, Any]]
@@ -40,6 +43,7 @@ class Trial:
     out: Path
     domain: int = 0
     priority: int = 0
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,26 +68,29 @@ class Result:
     shown: Shown
 
 
-def run_trial(trial: Trial) -> tuple[tuple[str], Result]:
-    """Drive one manoeuvre and return its name, as a key, and what came of it; raises `Interrupted`.
+def run_trial(trial: Trial, screen: Screen | None = None) -> Result:
+    """Drive one manoeuvre and return what came of it; raises `Interrupted`. `screen` is told of the drive.
 
-    A graph that breaks down is a remark, and none of its figures is known.
+    One that breaks down, or whose recording cannot be judged, is `broken_down`: the others go on.
     """
-    name = trial.manoeuvre.name
     order = DriveOrder(
         scenario=str(trial.parameters['mount_sim']['scenario']),
         mode=MODES[trial.through],
         parameters={node: dict(values) for node, values in trial.parameters.items()},
         domain=trial.domain,
-        out=trial.out / name,
+        out=trial.out / trial.manoeuvre.name,
         priority=trial.priority,
     )
     try:
-        folder, run, complaints = record_drive(order, Screen(io.StringIO()))
-    except GraphError as error:
-        return (name,), Result({}, (str(error),), Shown())
-    recording = open_recording(folder.recording)
-    return (name,), _result(trial, recording, run, complaints)
+        folder, run, complaints = record_drive(order, screen or Screen(io.StringIO()))
+        return _result(trial, open_recording(folder.recording), run, complaints)
+    except (GraphError, ValueError) as error:
+        return broken_down(str(error))
+
+
+def broken_down(reason: str) -> Result:
+    """Return the result of a manoeuvre of which no figure is known."""
+    return Result({}, (reason,), Shown())
 
 
 def _result(trial: Trial, recording: Recording, run: dict[str, Any], complaints: list[str]) -> Result:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mount_bags.signals.json_file import read_json
 from mount_bags.signals.table import Table
-from mount_identification.friction.channels import DESIRED, NEEDED, Channel, columns_in_si
+from mount_identification.friction.channels import DESIRED, NEEDED, Said, columns_in_si
 from mount_identification.friction.recording import (
     COEFFICIENT_RANGE,
     DIRECTION_SPREAD,
@@ -27,10 +27,10 @@ _BAND_SPREAD = 0.8
 """Deviation of ln(mu_p / mu_n) of a band whose taut ends are not told (chosen): it tightens itself."""
 
 
-def read_damper(path: Path, channels: dict[str, Channel], clamp: str) -> FrictionRecording:
+def read_damper(path: Path, said: Said, clamp: str) -> FrictionRecording:
     """Return a test of the measured friction damper: a band round a drum, an actuator pulls at either end.
 
-    Columns: `_RIG_HEADER`, others by their number, and last `_RIG_PULLS`; `channels` may name others, by name
+    Columns: `_RIG_HEADER`, others by their number, and last `_RIG_PULLS`; `said` may name others, by name
     or number. The zero of its cell is not known; the loop tells it (`looks/force_zero.py`).
 
     What presses the band onto the drum is its tension. At rest that is the clamp that was set, but a band
@@ -48,7 +48,7 @@ def read_damper(path: Path, channels: dict[str, Channel], clamp: str) -> Frictio
     if clamp not in CLAMPS:
         raise IdentificationError(f'clamp {clamp!r} must be one of {", ".join(CLAMPS)}')
     table = _rig_table(path)
-    columns = columns_in_si(table, channels, NEEDED[:2])
+    columns = columns_in_si(table, said, NEEDED[:2])
     time, displacement, force = columns['time'], columns['displacement'], columns['friction_force']
     notes = []
     quiet = time <= time[0] + _REST

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_identification.friction.channels import Channel
+from mount_identification.friction.channels import Said
 from mount_identification.friction.ladder import Rung
 from mount_identification.friction.looks.cases import Case, explained
 from mount_identification.friction.looks.first_look import FirstLook
@@ -34,7 +34,7 @@ class IdentifyOrder:
     step: str = 'auto'
     clamp: str = 'sliding'
     zero: str = ''
-    channels: dict[str, Channel] = field(default_factory=dict)
+    said: Said = field(default_factory=Said)
     seed: int = 0
     contact: FrictionContact = field(default_factory=FrictionContact)
     """Taken by step 2 where no ramp and hold tells it."""

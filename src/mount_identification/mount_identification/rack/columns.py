@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mount_bags.signals.signal import SignalError
 from mount_identification.rack.measured_table import MeasuredTable
 from mount_identification.rack.unit_words import unit_word
+from mount_signals.formats.content import Stated
 from mount_signals.units.mapping import ColumnChoice
 from mount_signals.units.unit import ZERO_CELSIUS
 
@@ -46,14 +47,18 @@ TEMPERATURE = Channel('coil_temperature', 'temperature', ('c', 'degc', 'k'), -60
 
 
 def read_columns(
-    file: Path, channels: Sequence[Channel], optional: Sequence[Channel], chosen: Mapping[str, ColumnChoice]
+    file: Path,
+    channels: Sequence[Channel],
+    optional: Sequence[Channel],
+    chosen: Mapping[str, ColumnChoice],
+    stated: Stated | None = None,
 ) -> dict[str, FloatArray]:
     """Return the channels of a `file` of any format in SI units (temperatures in degC), by name.
 
     A channel is the column `<name>_<unit>` or `<name> [<unit>]`, or the one `chosen` for it. Raises
     `RackRecordingError` or `SignalError`.
     """
-    table = MeasuredTable(file)
+    table = MeasuredTable(file, stated)
     found = {}
     for channel in (*channels, *optional):
         column = _column(table, channel, chosen.get(channel.name))

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from mount_identification.rack.columns import (
 from mount_identification.rack.measured_table import in_topics
 from mount_models.coil.gap import measured_inductance
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
+from mount_signals.formats.content import Stated
 from mount_signals.units.mapping import ColumnChoice
 
 FloatArray = NDArray[np.float64]
@@ -45,11 +46,15 @@ class ForcePoints:
 
 @dataclass(frozen=True)
 class GivenValues:
-    """What the caller says of single files, by their names as given: gap (m), coil temperature (degC)."""
+    """What the caller says of single files, by their names as given: gap (m), coil temperature (degC).
+
+    `stated` is what no file tells of itself.
+    """
 
     gap: Mapping[Path, float]
     celsius: Mapping[Path, float]
     celsius_of_others: float | None = None
+    stated: Stated = field(default_factory=Stated)
 
 
 def read_force(files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given: GivenValues) -> ForcePoints:
@@ -62,7 +67,7 @@ def read_force(files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given:
         if _is_table(file):
             known = given.gap.get(file)
             columns = read_columns(
-                file, (CURRENT, FORCE) if known is not None else (GAP, CURRENT, FORCE), (), chosen
+                file, (*([] if known is not None else [GAP]), CURRENT, FORCE), (), chosen, given.stated
             )
             current, force = columns['current'], columns['force']
             gap = columns['gap'] if known is None else np.full(current.shape, known)
@@ -129,8 +134,8 @@ def _checked_files(files: Sequence[Path]) -> Sequence[Path]:
 
 
 def _is_table(file: Path) -> bool:
-    """Return whether a file holds columns, and is no recording of ours in topics."""
-    return not in_topics(file)
+    """Return whether a file holds columns: no recording of this project, whose topics tell what is what."""
+    return not in_topics(file) or COIL_RIPPLE.name not in open_run(file)
 
 
 def _gap_of(file: Path, given: Mapping[Path, float]) -> float:
@@ -169,7 +174,8 @@ def _celsius_of(file: Path, given: GivenValues) -> float:
 def _ripple_from_table(
     file: Path, chosen: Mapping[str, ColumnChoice], given: GivenValues, turns_area: float
 ) -> list[RippleRecording]:
-    columns = read_columns(file, (CURRENT,), (INDUCTANCE, CURRENT_RATE, FLUX_RATE, GAP, TEMPERATURE), chosen)
+    optional = (INDUCTANCE, CURRENT_RATE, FLUX_RATE, GAP, TEMPERATURE)
+    columns = read_columns(file, (CURRENT,), optional, chosen, given.stated)
     current = columns['current']
     if current.size < _FEWEST:
         raise RackRecordingError(

@@ -15,7 +15,7 @@ from mount_signals.formats.measured import Heading
 from mount_signals.formats.reading import headings
 from mount_signals.importing.provenance import told_columns, told_mapping, told_source
 from mount_signals.importing.topics import recorded_as
-from mount_signals.units.columns import read_chosen
+from mount_signals.units.columns import read_chosen, stated_with
 from mount_signals.units.mapping import (
     ColumnChoice,
     Mapping,
@@ -41,7 +41,7 @@ def recorded_acceleration(
     rate: float | None = None,
     scale: float | None = None,
     mapping_file: Path | None = None,
-    dbc: Path | None = None,
+    stated: Stated | None = None,
 ) -> tuple[Brought, float]:
     """Return the acceleration that the options of the command name in `file`, and the factor to m/s^2.
 
@@ -50,11 +50,11 @@ def recorded_acceleration(
     what the simulator computes does not depend on who reads them. Raises `MappingError`, `UnitError`,
     `SignalError` or `SourceError`, also for values that could be in another unit.
     """
-    stated = Stated(dbc=dbc)
     mapping = mapping_in_file(mapping_file) if mapping_file else Mapping()
     mapping = with_options(mapping, columns, time, rate, default=_ACCELERATION)
     if _ACCELERATION not in mapping.columns:
-        mapping = replace(mapping, columns={_ACCELERATION: _own_column(headings(file, stated), file)})
+        there = headings(file, stated_with(mapping, stated))
+        mapping = replace(mapping, columns={_ACCELERATION: _own_column(there, file)})
     choice = mapping.columns[_ACCELERATION]
     if scale is not None:
         choice = replace(choice, scale=checked_scale(scale, '--scale'))

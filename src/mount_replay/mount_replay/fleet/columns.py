@@ -3,9 +3,10 @@
 What is unknown is null in a file, never NaN: DuckDB counts NaN as the largest number.
 """
 
+import contextlib
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,10 @@ TABLES = 'a table of a fleet'
 
 TEXT, NUMBER, COUNT, FLAG, TIME = 'string', 'double', 'int64', 'bool', 'timestamp[us]'
 """Types of columns, as pyarrow names them; times are UTC."""
+
+
+class WritingError(OSError):
+    """A folder of a fleet cannot be written; the text says why, and what would help."""
 
 
 @dataclass(frozen=True)
@@ -61,14 +66,31 @@ def table_of(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> 'p
 
 
 def write_table(table: 'pyarrow.Table', file: Path) -> None:
-    """Write a table as Parquet, whole or not at all; the same table gives the same bytes."""
+    """Write a table as Parquet, whole or not at all; the same table gives the same bytes.
+
+    Raises `WritingError`.
+    """
     parquet = required('pyarrow.parquet', TABLES)
     beside = file.with_name(f'.{file.name}.{os.getpid()}')
+    with writing(file):
+        try:
+            parquet.write_table(table, beside, compression='zstd')
+            beside.replace(file)
+        finally:
+            beside.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def writing(file: Path) -> Iterator[None]:
+    """Tell in a sentence why a file of a fleet's folder cannot be written, as on a full disk."""
     try:
-        parquet.write_table(table, beside, compression='zstd')
-        beside.replace(file)
-    finally:
-        beside.unlink(missing_ok=True)
+        yield
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise WritingError(
+            f'{file} cannot be written: {why}; what was written stands, and once that is mended the same '
+            'command goes on where it stopped'
+        ) from error
 
 
 def _known(value: Any) -> Any:

@@ -14,7 +14,6 @@ from mount_bags.run.place import open_run
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading
 from mount_signals.formats.reading import headings, is_foreign
-from mount_signals.importing.importing import ImportOrder, import_recording
 from mount_signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
 from mount_signals.importing.reading import part_in, told_by_titles
 from mount_signals.units.columns import stated_with
@@ -166,6 +165,8 @@ def as_recording(mapped: Mapped, *, closed_loop: bool) -> Iterator[Path]:
 
     That is the displacement, in a closed loop the acceleration of the chassis. Raises a `ValueError`.
     """
+    from mount_signals.importing.importing import ImportOrder, import_recording  # loads the simulator
+
     columns = mapped.of(ACCELERATION) if closed_loop else mapped.motion()
     name = mapped.path.name
     if not columns:

@@ -11,9 +11,10 @@ from typing import Any
 from mount_replay.fleet.catalogue.columns import FOREIGN
 from mount_replay.fleet.foreign import Said, said_in
 from mount_replay.fleet.questions import QueryError, query, tables_of
-from mount_replay.fleet.what_if.asked import recordings_asked
+from mount_replay.fleet.what_if.asked import AskedError, recordings_asked
 from mount_replay.fleet.what_if.columns import DISPLACEMENT
 from mount_replay.fleet.what_if.result import ORDER
+from mount_signals.sources.source import SourceError
 
 COUNT = 10
 """Rows, chosen."""
@@ -84,7 +85,7 @@ def worst(
 
     Of a result, or where there is none of a catalogue. `lowest`: those with the smallest values instead.
     Rows without a number are left out; equal ones stand by the names of their recordings. Raises
-    `QueryError`, and `SourceError` where the place of a recording cannot be listed.
+    `QueryError`.
     """
     tables = tables_of(folder)
     name = 'result' if 'result' in tables else 'recordings'
@@ -97,14 +98,24 @@ def worst(
     ).to_pylist()
     if name != 'result':
         return [Worst(row, float(row[by]), row['uri']) for row in rows]
-    told = _order_of(folder)
-    of_others = told.get('of_others', {})
-    asked = recordings_asked(told['asked_for'], others=bool(of_others.get('mapping_files')))
-    places = {one.path: one.uri for one in asked}
-    return [
-        Worst(row, float(row[by]), places.get(row['recording'], row['recording']), of_others.get('dbc') or '')
-        for row in rows
-    ]
+    places, dbc = places_of(folder), _of_others(folder).get('dbc') or ''
+    return [Worst(row, float(row[by]), places.get(row['recording'], row['recording']), dbc) for row in rows]
+
+
+def places_of(folder: str | os.PathLike[str]) -> dict[str, str]:
+    """Return {recording: URI} of the recordings of a result, looked up where its order found them.
+
+    Raises `QueryError` where nothing of it is there any more.
+    """
+    others = bool(_of_others(folder).get('mapping_files'))
+    try:
+        found = recordings_asked(_order_of(folder)['asked_for'], others=others)
+    except (AskedError, SourceError) as error:
+        raise QueryError(
+            f'where the recordings of {folder} lie is not known: {error}; what was moved is found by a '
+            'link where it was'
+        ) from None
+    return {asked.recording: asked.uri for asked in found}
 
 
 def said_of(folder: str | os.PathLike[str]) -> Said:
@@ -112,9 +123,14 @@ def said_of(folder: str | os.PathLike[str]) -> Said:
 
     Raises a `ValueError` or `OSError` where one is not there any more.
     """
-    told = _order_of(folder).get('of_others', {})
+    told = _of_others(folder)
     dbc = told.get('dbc')
     return said_in([Path(file) for file in told.get('mapping_files', ())], Path(dbc) if dbc else None)
+
+
+def _of_others(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    told: dict[str, Any] = _order_of(folder).get('of_others', {})
+    return told
 
 
 def _order_of(folder: str | os.PathLike[str]) -> dict[str, Any]:

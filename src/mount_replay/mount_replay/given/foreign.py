@@ -62,7 +62,7 @@ def foreign_order(
     mapping_file: Path | None = None,
     time: str = '',
     rate: float | None = None,
-    dbc: Path | None = None,
+    stated: Stated | None = None,
 ) -> ForeignOrder:
     """Return the order that the options of the command describe, or raise `ReplayError`.
 
@@ -95,7 +95,7 @@ def foreign_order(
     options = '--map {quantity}={column}:{unit}'
     return ForeignOrder(
         replace(mapping, columns=columns, others={}, options=options), offset or str(said),
-        mapping_file.name if mapping_file else '', Stated(dbc=dbc),
+        mapping_file.name if mapping_file else '', stated or Stated(),
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from mount_ros import topics
 from mount_ros.messages.event import ParametersChanged
 from mount_ros.messages.force_table import ForceTable
 from mount_ros.topics import Topic
-from mount_signals.importing.importing import SCENARIO
+from mount_signals.importing.provenance import SCENARIO
 
 _INPUTS = (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.COIL_TEMPERATURE)
 _READ = (

@@ -27,6 +27,7 @@ from mount_replay.given.taken import (
     Times,
     control_runs,
     looked_up,
+    places_in,
 )
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
@@ -162,7 +163,7 @@ class Stretches:
             moving = np.zeros(len(times), np.bool_)
             for name in self._quiet:
                 moving |= traces[name] != 0.0 if name in traces else False
-            at = np.clip(np.searchsorted(times, stamps), 0, max(len(times) - 1, 0))
+            at = places_in(times, stamps)[1]
             sound &= moving[at[:-1]] & moving[at[1:]] if len(times) else False
         places = np.flatnonzero(sound)
         return int(stamps[places[-1] + 1]) if places.size else None
@@ -227,8 +228,5 @@ class _Waiting:
 
 def _both_known(stamps: Times, others: Times) -> NDArray[np.bool_]:
     """Return of each two neighbours in `stamps` whether they are neighbours in `others` too; both rise."""
-    if not len(others):
-        return np.zeros(len(stamps) - 1, np.bool_)
-    places = np.searchsorted(others, stamps)
-    found = others[np.clip(places, 0, len(others) - 1)] == stamps
+    found, places = places_in(others, stamps)
     return found[:-1] & found[1:] & (np.diff(places) == 1)

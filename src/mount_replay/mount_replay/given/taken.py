@@ -134,9 +134,7 @@ def _without_foreign(answered: Times, answers: RecordedAnswers, period: int, not
     if not answers.trace_stamps.size:
         return answered
     traced = _among(answered, answers.trace_stamps)
-    currents = answers.currents[
-        np.clip(np.searchsorted(answers.stamps, answered), 0, len(answers.stamps) - 1)
-    ]
+    currents = answers.currents[places_in(answers.stamps, answered)[1]]
     odd = ~traced & (currents != 0.0)  # every answer without a trace has a setpoint
     places = np.searchsorted(answers.trace_stamps, answered[odd])
     bounds = np.concatenate([[-(1 << 62)], answers.trace_stamps, [1 << 62]])
@@ -229,18 +227,33 @@ def _without(stamps: Times, others: Times) -> Times:
 
 
 def _among(stamps: Times, others: Times) -> NDArray[np.bool_]:
-    if not len(others):
-        return np.zeros(len(stamps), np.bool_)
-    return others[np.clip(np.searchsorted(others, stamps), 0, len(others) - 1)] == stamps
+    return places_in(others, stamps)[0]
 
 
 def looked_up(wanted: Times, stamps: Times, values: Column) -> tuple[NDArray[np.bool_], Column]:
     """Return whether each wanted stamp is there, and its value, NaN where it is not."""
     if not len(stamps):
         return np.zeros(len(wanted), bool), np.full(len(wanted), np.nan)
-    places = np.clip(np.searchsorted(stamps, wanted), 0, len(stamps) - 1)
-    found = stamps[places] == wanted
+    found, places = places_in(stamps, wanted)
     return found, np.where(found, values[places], np.nan)
+
+
+def places_in(stamps: Times, wanted: Times) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Return whether each of `wanted` is among `stamps`, and its place there; both rise.
+
+    The place of one that is not there is that of the next stamp, or of the last one.
+    """
+    if not (len(stamps) and len(wanted)):
+        return np.zeros(len(wanted), np.bool_), np.zeros(len(wanted), np.intp)
+    # Mostly one of the two is a part of the other, or both are parts of the same without a hole.
+    before, behind = int(np.searchsorted(wanted, stamps[0])), int(np.searchsorted(stamps, wanted[0]))
+    common = min(len(wanted) - before, len(stamps) - behind)
+    if np.array_equal(wanted[before : before + common], stamps[behind : behind + common]):
+        found = np.zeros(len(wanted), np.bool_)
+        found[before : before + common] = True
+        return found, np.clip(np.arange(behind - before, behind - before + len(wanted)), 0, len(stamps) - 1)
+    places = np.clip(np.searchsorted(stamps, wanted), 0, len(stamps) - 1)
+    return stamps[places] == wanted, places
 
 
 # Runs.

@@ -6,6 +6,8 @@ node stands for itself.
 
 import os
 import select
+import sys
+from collections.abc import Sequence
 
 _STARTER, _PRIORITY = 'ENGINE_MOUNT_STARTER', 'ENGINE_MOUNT_PRIORITY'
 
@@ -13,6 +15,24 @@ _STARTER, _PRIORITY = 'ENGINE_MOUNT_STARTER', 'ENGINE_MOUNT_PRIORITY'
 def environment_of_children(priority: int) -> dict[str, str]:
     """Return what processes need that shall end with this one and run their loops at `priority` (0: none)."""
     return {_STARTER: str(os.getpid()), _PRIORITY: str(priority)}
+
+
+_TIED = """
+import ctypes, os, signal, sys
+ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG of Linux, linux/prctl.h; it outlives exec
+if os.getppid() != int(sys.argv[1]):  # it ended before
+    sys.exit(1)
+os.execvp(sys.argv[2], sys.argv[2:])
+"""
+
+
+def tied(command: Sequence[str]) -> list[str]:
+    """Return the command that runs `command`, a program of others, and is killed when this process ends.
+
+    By the kernel, whatever ends this process (prctl(2)): a process that knows its starter ends by itself. To
+    be started by a thread that lives as long as this process; what `command` starts in turn is its own.
+    """
+    return [sys.executable, '-I', '-S', '-c', _TIED, str(os.getpid()), *command]
 
 
 def given_priority() -> int:

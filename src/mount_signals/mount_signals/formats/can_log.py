@@ -44,7 +44,8 @@ class CanLog:
         self._path = path
         if stated.dbc is None:
             raise SignalError(
-                f'{path} holds CAN frames; name the database that decodes them (.dbc, .arxml, .kcd)'
+                f'{path} holds CAN frames; name the database that decodes them with --dbc (.dbc, .arxml, '
+                '.kcd)'
             )
         self._database = _database(stated.dbc)
         self._frames: dict[tuple[str, int], _Frames] = {}

@@ -78,7 +78,8 @@ class Mdf:
                 f'{self._path}, channel {heading.name!r}: {samples.dtype} of shape {samples.shape} is no '
                 'number for each sample; choose another channel'
             )
-        values = np.ma.filled(np.ma.asarray(samples).astype(np.float64), np.nan)
+        values = np.ma.filled(np.ma.asarray(samples, np.float64), np.nan)
+        values = np.ascontiguousarray(values)  # a view would hold the records that it is of
         invalid = getattr(signal, 'invalidation_bits', None)
         if invalid is not None:
             bits = np.asarray(invalid, bool)

@@ -42,8 +42,12 @@ def channels_of(
     for name, signal in signals.items():
         if name == DISPLACEMENT:
             continue
-        stamps, values = _acceleration(signal, notes) if name == 'acceleration' else _as_sampled(signal)
-        shared = next((one.stamps for one in channels if np.array_equal(one.stamps, stamps)), stamps)
+        if name == 'acceleration':
+            stamps, values = _acceleration(signal, channels[0].stamps if pair and channels else None, notes)
+        else:
+            stamps, values = _as_sampled(signal)
+        known = (one.stamps for one in channels)
+        shared = next((each for each in known if each is stamps or np.array_equal(each, stamps)), stamps)
         channels.append(Channel(recorded_as(quantities[name]), quantities[name].unit.symbol, shared, values))
     return channels, notes
 
@@ -63,8 +67,8 @@ def _displacement(signals: Mapping[str, Signal], notes: list[str]) -> Channel:
     return Channel(recorded_as(wanted), wanted.unit.symbol, stamps, values)
 
 
-def _acceleration(signal: Signal, notes: list[str]) -> tuple[Times, FloatArray]:
-    """Return the acceleration at the rate that its topic has."""
+def _acceleration(signal: Signal, grid: Times | None, notes: list[str]) -> tuple[Times, FloatArray]:
+    """Return the acceleration at the rate that its topic has; its stamps are those of `grid` if equal."""
     even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE_OF_ACCELERATION)
     notes += [note for note in even.notes if note not in notes]
     step = 1.0 / SAMPLE_RATE
@@ -73,7 +77,10 @@ def _acceleration(signal: Signal, notes: list[str]) -> tuple[Times, FloatArray]:
             f'{even.name}: resampled from {even.rate:.4g} Hz to {rate_text(SAMPLE_RATE)}, band-limited'
         )
     values = resampled(even, step, 0.0, round(even.length / step) + 1)[:]
-    return even.begin + sample_time_ns(SAMPLE_RATE) * np.arange(values.size, dtype=np.int64), values
+    step_ns = sample_time_ns(SAMPLE_RATE)
+    if grid is not None and (int(grid[0]), grid.size) == (even.begin, values.size):
+        return grid, values
+    return np.arange(even.begin, even.begin + values.size * step_ns, step_ns, dtype=np.int64), values
 
 
 def _as_sampled(signal: Signal) -> tuple[Times, FloatArray]:

@@ -12,13 +12,11 @@ from mount_signals.formats.content import Stated
 from mount_signals.importing.channels import channels_of
 from mount_signals.importing.joined import joined
 from mount_signals.importing.pieces import Piece, pieces, within
-from mount_signals.importing.provenance import told_mapping
+from mount_signals.importing.provenance import SCENARIO, told_mapping
 from mount_signals.importing.reading import Read, read_files
 from mount_signals.importing.writing import Channel, write_channels
 from mount_signals.units.mapping import Mapping
 
-SCENARIO = 'imported'
-"""What the session of a recording says that was made of files of others."""
 Progress = Callable[[float, str], None]
 
 
@@ -65,20 +63,23 @@ def import_recording(order: ImportOrder, progress: Progress = lambda share, what
     parts, shifted = _with_room_before(parts)
     imported.notes += [*cuts, *shifted]
     quantities = {name: quantity for one in files for name, quantity in one.quantities.items()}
+    files, signals = [replace(one, signals={}) for one in files], {}  # else an hour is held to the end
     written = []
-    for part in parts:
+    while parts:
+        part = parts.pop(0)
         channels, done = channels_of(part.signals, quantities)
         imported.notes += [note for note in done if note not in imported.notes]
-        written.append(channels)
-    for number, (part, channels) in enumerate(zip(parts, written, strict=True)):
-        folder = _place(order.out, number, len(parts))
-        session = _session(order, files, channels, imported.notes, f'{number + 1} of {len(parts)}')
+        written.append((channels, (part.end - part.begin) / SECOND))
+    del part
+    for number, (channels, length) in enumerate(written):
+        folder = _place(order.out, number, len(written))
+        session = _session(order, files, channels, imported.notes, f'{number + 1} of {len(written)}')
 
         def show(share: float, begun: int = number) -> None:
-            progress((begun + share) / len(parts), 'writing')
+            progress((begun + share) / len(written), 'writing')
 
         write_channels(folder, channels, session, show)
-        _count(imported, folder, part, channels)
+        _count(imported, folder, length, channels)
     return imported
 
 
@@ -86,9 +87,9 @@ def _place(out: Path, number: int, count: int) -> Path:
     return out if count == 1 else out.with_name(f'{out.name}_{number + 1}')
 
 
-def _count(imported: Imported, folder: Path, part: Piece, channels: Sequence[Channel]) -> None:
+def _count(imported: Imported, folder: Path, length: float, channels: Sequence[Channel]) -> None:
     imported.recordings.append(folder)
-    imported.lengths.append((part.end - part.begin) / SECOND)
+    imported.lengths.append(length)
     for channel in channels:
         topic = f'/{channel.place.topic.name}'
         imported.samples[topic] = imported.samples.get(topic, 0) + int(channel.stamps.size)

@@ -42,7 +42,7 @@ def displacement_on_grid(
         for even in signals.values()
         if not has_step(even, step)
     ]
-    stamps = begin + step_ns * np.arange(count, dtype=np.int64)
+    stamps = np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64)
     if DISPLACEMENT in columns:
         return stamps, columns[DISPLACEMENT]
     return stamps, columns[ENGINE] - columns[CHASSIS]

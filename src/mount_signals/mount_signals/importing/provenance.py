@@ -13,6 +13,9 @@ from mount_signals.units.signals import ChosenSignal
 
 Told = dict[str, Any]
 
+SCENARIO = 'imported'
+"""The scenario of such a recording, as its session tells it."""
+
 
 def told_source(measured: Measured) -> Told:
     """Return what a session says of a file: its name, URI where it has one, hash, size, format, reader."""

@@ -37,7 +37,8 @@ def read_files(files: Sequence[str], mapping: Mapping, stated: Stated | None = N
     Of several files each gives the columns that it has. Without another offset the mean of a displacement is
     its rest position. Raises `MappingError`, `UnitError`, `SignalError` or `SourceError`.
     """
-    there = {file: headings(file, stated_with(mapping, stated)) for file in files}
+    stated = stated_with(mapping, stated)
+    there = {file: headings(file, stated) for file in files}
     if not mapping.columns and not mapping.others:
         mapping = told_by_titles(there, mapping)
     found = {file: _of_file(mapping, file, own, alone=len(files) == 1) for file, own in there.items()}
@@ -52,14 +53,12 @@ def read_files(files: Sequence[str], mapping: Mapping, stated: Stated | None = N
 def _read(file: str, mapping: Mapping, stated: Stated | None) -> Read:
     measured = read_chosen(file, mapping, stated)
     chosen = chosen_signals(measured, mapping)
-    return Read(
-        place(measured),
-        told_source(measured),
-        told_columns(chosen),
-        {name: one.quantity for name, one in chosen.items()},
-        {name: one.in_si() for name, one in chosen.items()},
-        measured.notes,
-    )
+    name, source, notes = place(measured), told_source(measured), measured.notes
+    del measured  # an hour of columns is not held beside its signals in SI
+    told = told_columns(chosen)
+    quantities = {name: one.quantity for name, one in chosen.items()}
+    signals = {name: chosen.pop(name).in_si() for name in list(chosen)}
+    return Read(name, source, told, quantities, signals, notes)
 
 
 def _of_file(mapping: Mapping, file: str, there: Sequence[Heading], *, alone: bool) -> Mapping:

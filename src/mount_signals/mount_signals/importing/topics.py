@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from mount_bags.signals.signal import FloatArray
 from mount_ros import topics
+from mount_ros.messages.level_imu import level_imu
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
 from mount_ros.topics import JOINT_STATE, Delivery, Scalar, Topic
 from mount_signals.units.quantities import Quantity
-from mount_sim.node import level_imu
 
 PREFIX = 'measured/'
 """What the topics begin with that only recordings of others have."""

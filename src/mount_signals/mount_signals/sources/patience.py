@@ -9,7 +9,7 @@ from typing import TypeVar
 from mount_signals.extras import MissingLibraryError
 from mount_signals.sources.filesystems import forget_connections
 from mount_signals.sources.reasons import is_lasting, remedy, told
-from mount_signals.sources.source import SourceError
+from mount_signals.sources.source import SourceError, StoreAwayError
 from mount_signals.sources.uris import shown
 
 T = TypeVar('T')
@@ -51,13 +51,18 @@ class Attempts:
         self._pauses = self._patience.pauses()
 
     def failed(self, error: Exception) -> None:
-        """Wait before the next attempt; raises `SourceError` where there is none."""
+        """Wait before the next attempt; raises `SourceError` where there is none.
+
+        `StoreAwayError` where the attempts are used up.
+        """
         if isinstance(error, (SourceError, MissingLibraryError)):
             raise error
         self._failed += 1
-        pause = None if is_lasting(error) else next(self._pauses, None)
-        if pause is None:
+        if is_lasting(error):
             raise SourceError(self._sentence(error)) from error
+        pause = next(self._pauses, None)
+        if pause is None:
+            raise StoreAwayError(self._sentence(error)) from error
         self._pause(pause)
         forget_connections(self._uri)
 

@@ -10,6 +10,10 @@ class SourceError(OSError):
     """A recording cannot be fetched; the text says from where, why, and what would help."""
 
 
+class StoreAwayError(SourceError):
+    """A store did not answer, however often it was asked; the text says for how long."""
+
+
 @dataclass(frozen=True)
 class Entry:
     """A file in a store: its URI, size in bytes, and what changes when its content does.

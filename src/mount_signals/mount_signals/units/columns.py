@@ -9,7 +9,7 @@ from mount_bags.signals.signal import SignalError
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading, Measured, MeasuredColumn, found, listed
 from mount_signals.formats.reading import headings, read
-from mount_signals.units.mapping import Mapping
+from mount_signals.units.mapping import Mapping, TimeChoice
 from mount_signals.units.unit import UnitError, unit_of
 
 TITLES = (
@@ -28,22 +28,27 @@ def read_chosen(uri: str | Path, mapping: Mapping, stated: Stated | None = None)
     there = headings(uri, stated)
     wanted = [choice.column for choice in (*mapping.columns.values(), *mapping.others.values())]
     chosen = {heading_of(there, text, str(uri)).name for text in wanted}
-    if mapping.time.column:
-        chosen.add(heading_of(there, mapping.time.column, str(uri)).name)
-    else:  # also beside a stated rate, which they may contradict
-        chosen |= {heading.name for heading in there if is_time(heading)}
-        chosen |= {heading.name for heading in there[:1] if not heading.timed}
+    chosen |= may_hold_times(there, mapping.time, str(uri))
     return read(uri, [heading.name for heading in there if heading.name in chosen], stated)
 
 
 def stated_with(mapping: Mapping, stated: Stated | None = None) -> Stated:
-    """Return what is stated of a text table, that of the mapping first."""
+    """Return what is said of a file beside its columns: options go before the mapping file."""
     stated = stated or Stated()
     return replace(
         stated,
-        decimal=mapping.decimal or stated.decimal,
-        delimiter=mapping.delimiter or stated.delimiter,
+        decimal=stated.decimal or mapping.decimal,
+        delimiter=stated.delimiter or mapping.delimiter,
     )
+
+
+def may_hold_times(there: Sequence[Heading], choice: TimeChoice, uri: str) -> set[str]:
+    """Return the names of the columns that are read for the times of others; raises as `heading_of`."""
+    if choice.column:
+        return {heading_of(there, choice.column, uri).name}
+    # also beside a stated rate, which they may contradict
+    titled = {heading.name for heading in there if is_time(heading)}
+    return titled | {heading.name for heading in there[:1] if not heading.timed}
 
 
 def column_of(measured: Measured, wanted: str) -> MeasuredColumn:

@@ -36,13 +36,17 @@ class ChosenSignal:
     def in_si(self) -> Signal:
         """Return the signal in SI."""
         values = self.unit.to_si(self.signal.values)
-        values = values * self.scale if self.scale != 1.0 else values
+        if values is self.signal.values:
+            values = values.copy()  # from here on in place: it can be an hour
+        if self.scale != 1.0:
+            values *= self.scale
         offset = mean(values) if self.offset == MEAN else float(self.offset or 0.0)
         if not offset:
             return replace(self.signal, values=values)
         which = 'its mean' if self.offset == MEAN else 'as said'
         note = f'{self.signal.name}: {offset:.5g} {self.quantity.unit.symbol} subtracted ({which})'
-        return replace(self.signal, values=values - offset, notes=(*self.signal.notes, note))
+        values -= offset
+        return replace(self.signal, values=values, notes=(*self.signal.notes, note))
 
 
 def signals(measured: Measured, mapping: Mapping) -> dict[str, Signal]:

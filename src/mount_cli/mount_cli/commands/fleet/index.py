@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.commands.fleet.resuming import resumable
 from mount_cli.commands.options import Dbc, JsonFile, MapFiles, Scheduler, Workers
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when the catalogue is written, also where recordings are damaged, which their rows
-tell; 1 when a place cannot be listed, or the cluster is lost.
+tell; 1 when a place cannot be listed, its store no longer answers, or the cluster is lost.
 
 Examples:
 
@@ -49,7 +50,7 @@ def index(
     from mount_report.json_file import write_json
 
     console, began = terminal(), monotonic()
-    with TerminalScreen(console).bar('indexing', transient=True) as show:
+    with resumable(), TerminalScreen(console).bar('indexing', transient=True) as show:
         found = indexed(
             uris,
             out,

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mount_cli.commands.fleet.resuming import resumable
 from mount_cli.commands.options import Dbc, JsonFile, MapFiles, Scheduler, Workers
 from mount_cli.commands.other_than_recorded import OtherThanRecorded, changes_of
 from mount_cli.completion.values import named
@@ -29,6 +30,8 @@ others too
 An interrupted run goes on with the same command. The table is result.parquet in the folder of the result;
 setpoints are compared for the recorded displacement, with --closed-loop the displacement is simulated anew.
 """
+
+_TOLD = 10  # chosen: recordings that could not be fetched; all of them are in the table
 
 
 def replay(
@@ -64,7 +67,7 @@ def replay(
         raise typer.BadParameter('say what is to be other than recorded, with --set or --policy')
     console = terminal()
     order = FleetOrder(places, changes, closed_loop, said_in(map_files or [], dbc))
-    with TerminalScreen(console).bar('replaying') as show:
+    with resumable(), TerminalScreen(console).bar('replaying') as show:
 
         def told(progress: Advance) -> None:
             show(progress.done / progress.of, detail=_progress_text(progress))
@@ -74,8 +77,10 @@ def replay(
     _print(figures, console)
     if json_file is not None:
         write_json(figures, json_file)
-    for row in outcome.not_fetched:
+    for row in outcome.not_fetched[:_TOLD]:
         note(console, f'{row["recording"]}: {row["reason"]}; the same command tries it again')
+    if (others := len(outcome.not_fetched) - _TOLD) > 0:
+        note(console, f'{others} more, whose rows tell the reason; the same command tries them again')
     if outcome.not_fetched:
         raise typer.Exit(1)
 

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.columns import UNREADABLE
 from mount_replay.fleet.catalogue.journal import Journal
 from mount_replay.fleet.catalogue.places import Place, below, places
@@ -65,13 +66,15 @@ def indexed(
         }
         waiting = [place for uri, place in found.items() if uri not in known]
         told(0, len(waiting))
+        watch = StoreWatch()
         tasks = run_tasks(
             partial(read_place, said=said), waiting, scheduler=scheduler, workers=workers, memory=memory
         )
         for count, done in enumerate(tasks, 1):
             place = waiting[done.place]
-            rows = done.result or unreadable(place, done.reason, fingerprint='')
+            rows = done.result or unreadable(place, reason_of(done), fingerprint='')
             journal.add(place.uri, rows)
+            watch.take(done)
             known[place.uri] = rows
             told(count, len(waiting))
         elsewhere = {uri: rows for uri, rows in kept.items() if not below(uri, roots)}

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mount_replay.fleet.catalogue.rows import Rows
+from mount_replay.fleet.columns import writing
 
 _NAME = '.unfinished.jsonl'
 _TIMES = ('started',)
@@ -36,13 +37,15 @@ class Journal:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._lines.close()
+        with contextlib.suppress(OSError):  # of a line that `add` could not write, as it has said
+            self._lines.close()
 
     def add(self, uri: str, rows: Rows) -> None:
-        """Keep the rows of a recording."""
+        """Keep the rows of a recording; raises `WritingError`."""
         written = [[_plain(row) for row in rows.recordings], rows.events]
-        self._lines.write(json.dumps([uri, *written]) + '\n')
-        self._lines.flush()
+        with writing(self._file):
+            self._lines.write(json.dumps([uri, *written]) + '\n')
+            self._lines.flush()
 
     def finish(self) -> None:
         """Remove the file: the catalogue is written."""

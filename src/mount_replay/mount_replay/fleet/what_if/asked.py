@@ -1,10 +1,10 @@
 """Which recordings an order means: those of a catalogue, and all that lie below URIs or paths."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mount_replay.fleet.catalogue.places import Place
 from mount_replay.fleet.catalogue.places import places as listed
 from mount_replay.fleet.columns import TABLES
 from mount_signals.extras import required
@@ -17,30 +17,23 @@ class AskedError(ValueError):
     """An order means no recording, or one name means two; the text says which."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """One recording: where it lies, its path below what was asked for, and its size in bytes."""
-
-    uri: str
-    path: str
-    size: int
-
-
-def recordings_asked(places: Sequence[str], *, others: bool = False) -> list[Asked]:
-    """Return the recordings of catalogues and below URIs or paths, by their paths; raises a `ValueError`.
+def recordings_asked(places: Sequence[str], *, others: bool = False) -> list[Place]:
+    """Return the recordings of catalogues and below URIs or paths, by their names; raises a `ValueError`.
 
     With `others` files of others below URIs or paths are meant too, of a catalogue always. A catalogue is a
-    table with the columns `uri`, `recording` and `size_bytes`, a Parquet file or the folder of
-    `engine-mount fleet index`. Raises `SourceError` where a place cannot be listed.
+    table with the columns `uri`, `recording`, `size_bytes` and `fingerprint`, a Parquet file or the folder of
+    `engine-mount fleet index`; it tells of files as they were when it was made. Raises `SourceError` where a
+    place cannot be listed.
     """
-    found: dict[str, Asked] = {}
+    found: dict[str, Place] = {}
     for place in places:
         table = _catalogue(place)
-        for asked in _of_catalogue(table) if table is not None else _below(place, others):
-            other = found.setdefault(asked.path, asked)
+        below = listed([place], others=others).values() if table is None else _of_catalogue(table)
+        for asked in below:
+            other = found.setdefault(asked.recording, asked)
             if other.uri != asked.uri:
                 raise AskedError(
-                    f'{asked.path} means two recordings: {shown(other.uri)} and {shown(asked.uri)}; '
+                    f'{asked.recording} means two recordings: {shown(other.uri)} and {shown(asked.uri)}; '
                     'ask for a folder that holds both'
                 )
     if not found:
@@ -56,13 +49,9 @@ def _catalogue(place: str) -> Path | None:
     return path if path.suffix == _CATALOGUE and path.is_file() else None
 
 
-def _of_catalogue(table: Path) -> Iterator[Asked]:
+def _of_catalogue(table: Path) -> Iterator[Place]:
     parquet: Any = required('pyarrow.parquet', TABLES)
-    rows = parquet.read_table(table, columns=['uri', 'recording', 'size_bytes']).to_pylist()
+    columns = ['uri', 'recording', 'size_bytes', 'fingerprint']
+    rows = parquet.read_table(table, columns=columns).to_pylist()
     for row in {row['recording']: row for row in rows}.values():
-        yield Asked(row['uri'], row['recording'], row['size_bytes'] or 0)
-
-
-def _below(place: str, others: bool) -> Iterator[Asked]:
-    found = listed([place], others=others).values()
-    return (Asked(one.uri, one.recording, one.size) for one in found)
+        yield Place(row['uri'], row['recording'], row['size_bytes'] or 0, row['fingerprint'] or '')

@@ -21,7 +21,7 @@ from mount_replay.given.stretches import STRETCH, OutOfOrderError, Stretch, Stre
 from mount_replay.given.taken import Column, ControlRun, Notes, ReplayError, quiet_at_first
 from mount_replay.replay import check_parameters, refuse_other_rate, with_changes
 from mount_ros import topics
-from mount_signals.importing.importing import SCENARIO
+from mount_signals.importing.provenance import SCENARIO
 
 Parameters = Mapping[str, Mapping[str, Any]]
 

@@ -12,11 +12,11 @@ from typing import Any
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_hash, recording_place
 from mount_bags.run.versions import versions
+from mount_replay.fleet.catalogue.places import Place
 from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
-from mount_replay.fleet.what_if.asked import Asked
-from mount_replay.fleet.what_if.closed_loop import compared_motion
 from mount_replay.fleet.what_if.columns import DISPLACEMENT, SETPOINTS
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
+from mount_signals.sources.source import StoreAwayError
 from mount_signals.sources.stores import local_copy
 
 Changes = Mapping[str, Mapping[str, Any]]
@@ -40,20 +40,26 @@ class Replayed:
 
 
 def replay_one(
-    asked: Asked, changes: Changes, closed_loop: bool = False, said: Said = NOTHING_SAID
+    asked: Place, changes: Changes, closed_loop: bool = False, said: Said = NOTHING_SAID
 ) -> Replayed:
     """Return the rows of one recording with `changes` {node: {parameter: value}}; nothing is remembered.
 
     `said` is what is said of files of others. What cannot be replayed, and what cannot be fetched, is a row
-    with its reason.
+    with its reason. Raises `StoreAwayError` where the store does not answer.
     """
     begin, worker = time.process_time(), f'{platform.node()}/{os.getpid()}'
-    common = {'recording': asked.path, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
+    common = {'recording': asked.recording, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
     try:
         with local_copy(asked.uri) as path:
-            make = _foreign_rows if is_of_others(path, said) else _rows
-            rows = tuple({**common, **row} for row in make(asked, path, changes, closed_loop, said))
+            found = (
+                [_foreign_row(asked, path, changes, closed_loop, said)]
+                if is_of_others(path, said)
+                else _rows(asked, path, changes, closed_loop)
+            )
+            rows = tuple({**common, **row} for row in found)
         fetched = True
+    except StoreAwayError:
+        raise
     except OSError as error:
         rows, fetched = ({**common, 'mount': '', 'reason': str(error)},), False
     return Replayed(rows, fetched, time.process_time() - begin, worker)
@@ -69,7 +75,7 @@ def told_of(changes: Changes, closed_loop: bool) -> Row:
     }
 
 
-def _foreign_rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool, said: Said) -> list[Row]:
+def _foreign_row(asked: Place, path: Path, changes: Changes, closed_loop: bool, said: Said) -> Row:
     """Return the row of a file of others, which is made a recording for as long as it is replayed."""
     row: Row = {'sha256': recording_hash(path), 'mount': ''}
     try:
@@ -79,10 +85,10 @@ def _foreign_rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool,
             row |= _figures(open_run(place), changes, closed_loop) | {'recorded_with': ''}
     except ValueError as error:
         row['reason'] = _told(error, asked, path)
-    return [row]
+    return row
 
 
-def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool, said: Said) -> list[Row]:
+def _rows(asked: Place, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
     whole = {'sha256': recording_hash(recording_place(path))}
     try:
         mounts = open_run(path).by_mount()
@@ -101,13 +107,18 @@ def _rows(asked: Asked, path: Path, changes: Changes, closed_loop: bool, said: S
 
 def _figures(recording: Recording, changes: Changes, closed_loop: bool) -> Row:
     recorded = recorded_in(recording)
-    figures = compared_motion(recorded, changes) if closed_loop else compared_setpoints(recorded, changes)
+    if closed_loop:
+        from mount_replay.fleet.what_if.closed_loop import compared_motion  # loads the simulator
+
+        figures = compared_motion(recorded, changes)
+    else:
+        figures = compared_setpoints(recorded, changes)
     return {'reason': '', 'recorded_with': recorded.version, **figures}
 
 
-def _told(error: ValueError, asked: Asked, path: Path) -> str:
+def _told(error: ValueError, asked: Place, path: Path) -> str:
     """Return the reason with the path below what was asked for: the same from whatever store it comes."""
-    return str(error).replace(str(path), asked.path)
+    return str(error).replace(str(path), asked.recording)
 
 
 def _json(content: Mapping[str, Any]) -> str:

@@ -5,8 +5,9 @@
     result.parquet  all rows, sorted; there once the order is done
 
 A file comes into being under another name and is renamed when it is whole, so that whatever ends a run leaves
-finished recordings or none. A recording is finished when its rows are in a part; rows of what could not be
-fetched are in no part, so that the same command tries them again.
+finished recordings or none. A recording is finished when its rows are in a part, with the fingerprint that
+its files have now; rows of what could not be fetched are in no part, so that the same command tries them
+again.
 """
 
 import contextlib
@@ -17,7 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mount_replay.fleet.columns import TABLES, table_of, write_table
+from mount_replay.fleet.columns import TABLES, TEXT, Column, table_of, write_table, writing
 from mount_replay.fleet.what_if.columns import REPLAY_COLUMNS
 from mount_signals.extras import required
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 Row = Mapping[str, Any]
 
 RESULT, ORDER, PARTS = 'result.parquet', 'order.json', 'parts'
+_FINGERPRINT = 'fingerprint'
+_OF_PARTS = (*REPLAY_COLUMNS, Column(_FINGERPRINT, TEXT, '', 'of the files, as in a catalogue'))
 _SORTED_BY = [('recording', 'ascending'), ('mount', 'ascending')]
 
 
@@ -62,23 +65,25 @@ class Result:
             self._numbers = iter(range(begin, 1 << 62))
             yield
 
-    def finished(self) -> set[tuple[str, int]]:
-        """Return the recordings whose rows are here, with their sizes in bytes."""
-        return {(row['recording'], row['size_bytes']) for part in self._read() for row in part.to_pylist()}
+    def finished(self) -> set[tuple[str, str]]:
+        """Return the recordings whose rows are here, with the fingerprints of their files."""
+        return {(row['recording'], row[_FINGERPRINT]) for part in self._read() for row in part.to_pylist()}
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Write the rows of recordings as a new part, all rows of each of them in it."""
-        write_table(table_of(REPLAY_COLUMNS, rows), self._parts / f'{next(self._numbers):06d}.parquet')
+        """Write the rows of recordings, with fingerprints, as a new part, all rows of each of them in it.
 
-    def finish(self, asked: Iterable[str], others: Iterable[Row]) -> 'pyarrow.Table':
-        """Write and return the table: rows of `asked` recordings in the parts, and `others`, sorted."""
-        wanted, latest = set(asked), dict[str, list[Row]]()
-        for part in self._read():
-            found: dict[str, list[Row]] = {}
-            for row in part.to_pylist():
-                found.setdefault(row['recording'], []).append(row)
-            latest |= found  # of a recording that was another one before, the last rows
-        rows = [row for name, rows in latest.items() if name in wanted for row in rows]
+        Raises `WritingError`.
+        """
+        write_table(table_of(_OF_PARTS, rows), self._parts / f'{next(self._numbers):06d}.parquet')
+
+    def finish(self, asked: Mapping[str, str], others: Iterable[Row]) -> 'pyarrow.Table':
+        """Write and return the table: rows of `asked` {recording: fingerprint} in the parts, and `others`.
+
+        Raises `WritingError`.
+        """
+        parts = (row for part in self._read() for row in part.to_pylist())
+        # a recording that was another one before has other rows there, of another fingerprint
+        rows = [row for row in parts if asked.get(row['recording']) == row.pop(_FINGERPRINT)]
         table = table_of(REPLAY_COLUMNS, [*rows, *others]).sort_by(_SORTED_BY).combine_chunks()
         write_table(table, self.table)
         return table
@@ -87,8 +92,9 @@ class Result:
         place = self.folder / ORDER
         if not place.exists():
             beside = self.folder / f'.{ORDER}.{os.getpid()}'
-            beside.write_text(json.dumps(order, indent=2, sort_keys=True) + '\n', encoding='utf-8')
-            beside.replace(place)
+            with writing(place):
+                beside.write_text(json.dumps(order, indent=2, sort_keys=True) + '\n', encoding='utf-8')
+                beside.replace(place)
             return
         before = json.loads(place.read_text(encoding='utf-8'))
         for name in sorted(before.keys() | order.keys()):

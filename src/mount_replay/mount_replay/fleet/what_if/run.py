@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mount_bags.run.versions import versions
-from mount_replay.fleet.catalogue.places import root_of
+from mount_replay.fleet.away import StoreWatch, reason_of
+from mount_replay.fleet.catalogue.places import Place, root_of
 from mount_replay.fleet.cluster import LOCAL
 from mount_replay.fleet.foreign import NOTHING_SAID, Said
 from mount_replay.fleet.runner import Done, run_tasks
-from mount_replay.fleet.what_if.asked import Asked, recordings_asked
+from mount_replay.fleet.what_if.asked import recordings_asked
 from mount_replay.fleet.what_if.one import Replayed, Row, replay_one, told_of
 from mount_replay.fleet.what_if.result import Result
 from mount_signals.sources.uris import shown
@@ -115,10 +116,10 @@ def replay_fleet(
     result = Result(out)
     with result.taken(order.told()):
         finished = result.finished()
-        left = [each for each in asked if (each.path, each.size) not in finished]
+        left = [each for each in asked if (each.recording, each.fingerprint) not in finished]
         run = _Run(order, result, left, told, before=len(asked) - len(left), of=len(asked))
         run.through(scheduler, workers)
-        table = result.finish([each.path for each in asked], run.not_fetched)
+        table = result.finish({each.recording: each.fingerprint for each in asked}, run.not_fetched)
     return FleetOutcome(
         table=table,
         result=result.table,
@@ -140,7 +141,7 @@ class _Run:
         self,
         order: FleetOrder,
         result: Result,
-        left: Sequence[Asked],
+        left: Sequence[Place],
         told: Callable[[Advance], None],
         *,
         before: int,
@@ -157,7 +158,7 @@ class _Run:
 
     def through(self, scheduler: str, workers: int) -> None:
         """Replay all that is left; what is done is written, whatever ends this."""
-        order = self._order
+        order, watch = self._order, StoreWatch()
         work = partial(replay_one, changes=order.changes, closed_loop=order.closed_loop, said=order.said)
         begin = written = time.monotonic()
         try:
@@ -165,6 +166,7 @@ class _Run:
                 run_tasks(work, self._left, scheduler=scheduler, workers=workers), 1
             ):
                 self._take(self._left[done.place], done)
+                watch.take(done)
                 now = time.monotonic()
                 if now - written >= _WRITTEN_AFTER or self._recordings >= _WRITTEN_TOGETHER:
                     self._write()
@@ -175,10 +177,15 @@ class _Run:
         finally:
             self._write()
 
-    def _take(self, asked: Asked, done: Done[Replayed]) -> None:
+    def _take(self, asked: Place, done: Done[Replayed]) -> None:
         replayed = done.result
-        if replayed is None:  # a fault of this program, or the workers were lost with it
-            row = {'recording': asked.path, 'mount': '', 'size_bytes': asked.size, 'reason': done.reason}
+        if replayed is None:  # the store is away, the workers were lost, or a fault of this program
+            row = {
+                'recording': asked.recording,
+                'mount': '',
+                'size_bytes': asked.size,
+                'reason': reason_of(done),
+            }
             row |= told_of(self._order.changes, self._order.closed_loop)
             replayed = Replayed((row,), False, 0.0, '')
         self.busy += replayed.busy
@@ -188,7 +195,7 @@ class _Run:
         if not replayed.fetched:
             self.not_fetched += replayed.rows
             return
-        self._waiting += replayed.rows
+        self._waiting += [{**row, 'fingerprint': asked.fingerprint} for row in replayed.rows]
         self._recordings += 1
 
     def _write(self) -> None:

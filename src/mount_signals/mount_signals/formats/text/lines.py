@@ -11,7 +11,7 @@ from mount_bags.signals.signal import SignalError
 HEAD = 1 << 18
 """B at the beginning of a file by which its dialect is found, chosen: some thousand lines."""
 _ELSEWHERE = 1 << 16  # B in the middle and at the end, chosen: a decimal sign may come late
-_BLOCK = 1 << 23  # B read at once, chosen
+_BLOCK = 1 << 22  # B read at once, chosen: larger ones are read no faster
 _LONGEST = 1 << 24  # B, chosen: a line of samples is far shorter
 _MARKS = (
     (codecs.BOM_UTF8, 'utf-8'),

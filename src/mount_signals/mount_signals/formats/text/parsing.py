@@ -33,18 +33,42 @@ def columns_of(path: Path, dialect: Dialect, places: Sequence[int]) -> list[Valu
 
     Raises `SignalError` with line, column and cell.
     """
-    parts: list[list[Values]] = [[] for _ in places]
+    columns = [_Growing() for _ in places]
+    size, seen = path.stat().st_size, 0
     for first, block in _samples(path, dialect):
         found = _in_bulk(block, dialect, places)
         if found is None:
             found = _cell_by_cell(path, first, block, dialect, places)
-        for part, values in zip(parts, found, strict=True):
-            part.append(values)
-    whole: list[Values] = []
-    for part in parts:
-        whole.append(np.concatenate(part) if part else np.empty(0))
-        part.clear()
-    return whole
+        seen += len(block)
+        for column, values in zip(columns, found, strict=True):
+            column.add(values, size / seen)
+    return [column.values for column in columns]
+
+
+class _Growing:
+    """A column that grows block by block, in place: put together at the end it would be held twice."""
+
+    def __init__(self) -> None:
+        self._room: Values = np.empty(0)
+        self._size = 0
+
+    @property
+    def values(self) -> Values:
+        """What was added."""
+        return self._room[: self._size]
+
+    def add(self, values: Values, share: float) -> None:
+        """Add a block; when the whole will have `share` times what is there, room for that is made."""
+        size = self._size + values.size
+        if size > self._room.size:
+            room = np.empty(max(size, int(_SPARE * size * share)), values.dtype)
+            room[: self._size] = self.values
+            self._room = room
+        self._room[self._size : size] = values
+        self._size = size
+
+
+_SPARE = 1.02  # chosen: lines grow longer or shorter; room that is not used takes no memory
 
 
 def _samples(path: Path, dialect: Dialect) -> Iterator[tuple[int, bytes]]:
@@ -86,6 +110,7 @@ def _in_bulk(block: bytes, dialect: Dialect, places: Sequence[int]) -> list[Valu
                 check_utf8=False, column_types=types, include_columns=list(types), null_values=MISSING,
                 decimal_point=dialect.decimal, quoted_strings_can_be_null=True,
             ),
+            pyarrow.system_memory_pool(),  # gives back what a block took
         )  # fmt: skip
     except pyarrow.ArrowInvalid:
         return None
@@ -135,7 +160,7 @@ def _value(path: Path, number: int, dialect: Dialect, place: int, cell: str) -> 
     sign, other = ('point', 'comma') if dialect.decimal == '.' else ('comma', 'point')
     remedy = 'correct or remove the line'
     if not date and kind_of(cell, ',' if dialect.decimal == '.' else '.') == 'number':
-        remedy = f'is the decimal sign a {other}? State decimal in the mapping file, or correct the line'
+        remedy = f'is the decimal sign a {other}? Say so with --decimal, or correct the line'
     elif not date and cell.replace('.', '').replace(',', '').replace(' ', '').lstrip('+-').isdecimal():
         remedy = 'export without signs between thousands'
     expected = 'a date such as 2024-05-01 12:00:00.001' if date else f'a number with decimal {sign}'

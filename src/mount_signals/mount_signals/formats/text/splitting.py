@@ -180,7 +180,7 @@ def _refuse_thousands(path: Path, split: Split, stated: Stated) -> None:
             raise SignalError(
                 f'{path}: column {place} holds {signed[0]!r} beside whole numbers, which may be '
                 f'{signed[0].replace(split.decimal, other)} or {signed[0].replace(split.decimal, "")}; state '
-                f'decimal in the mapping file, or export without signs between thousands'
+                f'it with --decimal, or export without signs between thousands'
             )
 
 
@@ -204,7 +204,4 @@ def _ambiguous(path: Path, possible: list[Split]) -> str:
     ways = ' or '.join(
         f'{split.told} ({", ".join(split.rows[0][:4]).replace(chr(9), " ")})' for split in possible
     )
-    return (
-        f'{path} can be read as {ways}; state decimal or delimiter in the mapping file, or export with '
-        'semicolons'
-    )
+    return f'{path} can be read as {ways}; state --decimal or --delimiter, or export with semicolons'

@@ -1,0 +1,297 @@
+"""A fleet that is ended in the middle: a sentence, and the same command goes on to the same table."""
+
+import contextlib
+import json
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from mount_replay.fleet.away import IN_A_ROW
+from mount_replay.fleet.catalogue import index as indexing
+from mount_replay.fleet.catalogue.index import indexed
+from mount_replay.fleet.columns import WritingError
+from mount_replay.fleet.runner import Done
+from mount_replay.fleet.what_if import run
+from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
+from mount_replay.replay import parsed_changes
+from mount_signals.sources import remote
+from mount_signals.sources.patience import Patience
+from mount_signals.sources.source import StoreAwayError
+
+# The stores are those that the tests of mount_signals fetch from.
+sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'mount_signals' / 'test'))
+
+from served_stores import BreakingWay, Bucket, name_s3_store, s3_server
+
+REFERENCES = Path(__file__).parents[2] / 'bags' / 'reference'
+CHANGES = parsed_changes({'highest_current': 0.7})
+NAMES = [f'{number}_{name}' for number in range(3) for name in ('gap', 'opening', 'rough')]
+DONE = 2
+"""Recordings that are finished when something happens."""
+SMALLER = 300_000  # bytes: a file of a recording is larger, those of a result are smaller
+PATIENCE = 120.0  # s
+GOES_ON = 'the same command goes on where it stopped'
+COMMAND = """
+import os, signal, sys
+from mount_replay.fleet.what_if import run
+
+run._WRITTEN_AFTER = 0.0
+take, taken = run._Run._take, []
+
+def interrupted(self, *given):
+    if len(taken) == {done}:
+        os.kill({process}, {blow})
+    taken.append(take(self, *given))
+
+if __name__ == '__main__':
+    run._Run._take = interrupted
+    from mount_cli.command import main
+    main(sys.argv[1:])
+"""
+
+
+@pytest.fixture(scope='module')
+def drives(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('fleet') / 'drives'
+    for name in NAMES:
+        shutil.copytree(REFERENCES / name[2:], folder / name)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def whole(drives):
+    """Return the bytes of the table of a run that nothing ended."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, 'run_tasks', in_this_process)
+        return replayed(drives, drives.parent / 'whole').result.read_bytes()
+
+
+@pytest.fixture
+def inside(monkeypatch):
+    """Let tasks run in this process, one after the other, and what is written be written at once."""
+    monkeypatch.setattr(run, 'run_tasks', in_this_process)
+    monkeypatch.setattr(indexing, 'run_tasks', in_this_process)
+    monkeypatch.setattr(run, '_WRITTEN_AFTER', 0.0)
+
+
+@pytest.fixture
+def away(drives, tmp_path, monkeypatch):
+    """Return the way to a store of objects with the recordings in `s3://drives/2026`."""
+    monkeypatch.setenv('HOME', str(tmp_path))
+    monkeypatch.setenv('ENGINE_MOUNT_CACHE', str(tmp_path / 'copies'))
+    monkeypatch.delenv('AWS_PROFILE', raising=False)
+    with s3_server() as port:
+        name_s3_store(port, monkeypatch)
+        bucket = Bucket(port)
+        for name in NAMES:
+            bucket.put_folder(drives / name, f'2026/{name}')
+        way = BreakingWay(port, None)
+        name_s3_store(way.port, monkeypatch)
+        yield way
+        way.close()
+
+
+@pytest.fixture
+def limited():
+    """Give what limits the size of files of this process; the limit ends with the test."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def limit(size):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size if size else before[0], before[1]))
+
+    yield limit
+    limit(None)
+
+
+def in_this_process(work, items, **_):
+    """Do what `run_tasks` does, one after the other."""
+    for place, item in enumerate(items):
+        try:
+            yield Done(place, work(item))
+        except StoreAwayError as error:
+            yield Done(place, None, str(error), error)
+
+
+def replayed(place, out, **options):
+    return replay_fleet(FleetOrder([str(place)], CHANGES), out, **options)
+
+
+def at(count, action):
+    """Return what takes the progress of a run and calls `action` once, when `count` recordings are done."""
+
+    def told(progress):
+        if progress.done == count:
+            action()
+
+    return told
+
+
+@pytest.mark.parametrize(
+    ('blow', 'code', 'sentence'),
+    [
+        (signal.SIGKILL, -signal.SIGKILL, ''),
+        (signal.SIGINT, 130, f'interrupted; what was done stands, and {GOES_ON}'),
+    ],
+)
+def test_a_command_that_is_ended_goes_on_where_it_was(drives, whole, tmp_path, blow, code, sentence):
+    ended = command(tmp_path, drives, 'os.getpid()', blow)
+    assert ended.returncode == code
+    assert sentence in ended.stderr
+    gone_on_with(drives, tmp_path, whole, DONE)
+
+
+def test_a_cluster_whose_scheduler_is_killed_leaves_what_was_done(drives, whole, tmp_path):
+    with cluster(tmp_path) as (address, scheduler):
+        ended = command(tmp_path, drives, scheduler, signal.SIGKILL, '--scheduler', address)
+    assert ended.returncode == 1
+    assert f'the scheduler ({address}) was lost with' in ended.stderr
+    assert 'what was done until then stands' in ended.stderr
+    gone_on_with(drives, tmp_path, whole)
+
+
+def gone_on_with(drives, folder, whole, done=None):
+    """Let the command go on without being ended, and hold its table against the uninterrupted one."""
+    again = command(folder, drives, 0, 0, '--json', folder / 'figures.json')
+    assert again.returncode == 0, again.stderr
+    before = json.loads((folder / 'figures.json').read_text())['done_before']
+    assert DONE <= before < len(NAMES)
+    assert done in (None, before)
+    assert (folder / 'result' / 'result.parquet').read_bytes() == whole
+
+
+def test_a_store_that_is_away_for_a_while_is_waited_for(away, whole, tmp_path):
+    def goes():
+        away.away = True
+        threading.Thread(target=comes, daemon=True).start()
+
+    def comes():
+        wait_until(lambda: away.refused >= 3)
+        away.away = False
+
+    outcome = replayed('s3://drives/2026', tmp_path / 'result', workers=1, told=at(DONE, goes))
+    assert away.refused >= 3
+    assert outcome.not_fetched == []
+    assert outcome.result.read_bytes() == whole
+
+
+def test_a_store_that_stays_away_ends_the_run_in_a_sentence(away, whole, tmp_path, inside, monkeypatch):
+    monkeypatch.setattr(remote, 'Patience', lambda: Patience(attempts=2, first=1e-3))
+
+    def goes():
+        away.away = True
+
+    given_up = (
+        rf'given up after {IN_A_ROW} recordings in a row: s3://drives/2026/.* \(2 attempts .*{GOES_ON}$'
+    )
+    with pytest.raises(StoreAwayError, match=given_up):
+        replayed('s3://drives/2026', tmp_path / 'result', told=at(DONE, goes))
+    away.away = False
+    outcome = replayed('s3://drives/2026', tmp_path / 'result')
+    assert outcome.before == DONE
+    assert outcome.result.read_bytes() == whole
+
+
+def test_an_index_whose_store_stays_away_goes_on_where_it_was(away, tmp_path, inside, monkeypatch):
+    monkeypatch.setattr(remote, 'Patience', lambda: Patience(attempts=2, first=1e-3))
+    expected = indexed(['s3://drives/2026'], tmp_path / 'whole').recordings
+
+    def told(done, of):
+        away.away = done >= DONE
+
+    given_up = rf'given up after {IN_A_ROW} recordings in a row: .*{GOES_ON}$'
+    with pytest.raises(StoreAwayError, match=given_up):
+        indexed(['s3://drives/2026'], tmp_path / 'catalogue', told=told)
+    away.away = False
+    again = indexed(['s3://drives/2026'], tmp_path / 'catalogue')
+    assert again.read == len(NAMES) - DONE
+    assert again.recordings.equals(expected)
+
+
+def test_a_scratch_disk_without_room_is_told_and_tried_again(away, whole, tmp_path, inside, limited):
+    limited(SMALLER)
+    outcome = replayed('s3://drives/2026', tmp_path / 'result')
+    assert len(outcome.not_fetched) == len(NAMES)
+    reason = outcome.not_fetched[0]['reason']
+    assert reason.endswith('cannot be written: File too large; ENGINE_MOUNT_CACHE chooses another folder')
+    limited(None)
+    again = replayed('s3://drives/2026', tmp_path / 'result')
+    assert (again.before, again.not_fetched) == (0, [])
+    assert again.result.read_bytes() == whole
+
+
+def test_a_result_without_room_is_told_and_gone_on_with(drives, whole, tmp_path, inside, limited):
+    sentence = rf'00000\d\.parquet cannot be written: File too large; .*{GOES_ON}$'
+    with pytest.raises(WritingError, match=sentence):
+        replayed(drives, tmp_path / 'result', told=at(DONE, lambda: limited(1000)))
+    limited(None)
+    again = replayed(drives, tmp_path / 'result')
+    assert again.before == DONE
+    assert again.result.read_bytes() == whole
+
+
+def test_a_catalogue_without_room_is_told_and_gone_on_with(drives, tmp_path, inside, limited):
+    expected = indexed([drives], tmp_path / 'whole').recordings
+    journal = tmp_path / 'catalogue' / '.unfinished.jsonl'
+
+    def told(done, of):
+        if done == DONE:
+            limited(journal.stat().st_size + 100)
+
+    sentence = rf'unfinished\.jsonl cannot be written: File too large; .*{GOES_ON}$'
+    with pytest.raises(WritingError, match=sentence):
+        indexed([drives], tmp_path / 'catalogue', told=told)
+    limited(None)
+    again = indexed([drives], tmp_path / 'catalogue')
+    assert again.read == len(NAMES) - DONE
+    assert again.recordings.equals(expected)
+
+
+def command(folder, drives, process, blow, *options):
+    """Return what came of the command, in which `process` is ended by `blow` once `DONE` are finished."""
+    script = folder / 'command.py'
+    done = DONE if blow else -1
+    script.write_text(COMMAND.format(done=done, process=process, blow=int(blow)), encoding='utf-8')
+    settings = ['--set', 'highest_current=0.7', '--workers', '1']
+    arguments = ['fleet', 'replay', drives, *settings, '--out', folder / 'result', *options]
+    return subprocess.run(
+        [sys.executable, str(script), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE,
+    )
+
+
+@contextlib.contextmanager
+def cluster(folder):
+    """Give the address of a Dask cluster with one worker, and the number of its scheduler's process."""
+    told = folder / 'scheduler.json'
+    with contextlib.ExitStack() as stack:
+        options = ['--no-dashboard', '--host', '127.0.0.1', '--port', '0', '--scheduler-file', str(told)]
+        scheduler = started(stack, folder, 'scheduler', *options)
+        wait_until(told.exists)
+        started(stack, folder, 'worker', '--no-dashboard', '--scheduler-file', str(told), '--nthreads', '1')
+        yield json.loads(told.read_text())['address'], scheduler.pid
+
+
+def started(stack, folder, kind, *arguments):
+    command = [sys.executable, '-m', 'distributed.cli.dask_' + kind, *arguments]
+    quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
+    process = subprocess.Popen(command, cwd=folder, **quiet)
+    stack.callback(process.wait)
+    stack.callback(process.kill)
+    return process
+
+
+def wait_until(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
