@@ -20,11 +20,11 @@ Examples:
 
 `engine-mount fleet replay CATALOGUE --policy switched_viscous --out result --workers 2`
 
-`engine-mount fleet replay s3://bucket/drives --set lowest_amplitude=0.0002 --out result`
+`engine-mount fleet replay s3://bucket/drives --set continuous_viscous.full_amplitude=0.0006 --out result`
 
-`engine-mount fleet replay drives --set lowest_amplitude=0.0002 --closed-loop --out moved` - and the motion?
+`engine-mount fleet replay drives --set highest_current=2.0 --closed-loop --out moved` - and the motion?
 
-`engine-mount fleet replay catalogue --map rack_2.yaml --set lowest_amplitude=0.0002 --out result` - files of
+`engine-mount fleet replay catalogue --map rack_2.yaml --set highest_current=2.0 --out result` - files of
 others too
 
 An interrupted run goes on with the same command. The table is result.parquet in the folder of the result;
