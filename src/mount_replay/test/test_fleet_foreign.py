@@ -199,6 +199,16 @@ def test_the_commands_of_a_file_of_others_name_its_mapping(drives, said, tmp_pat
     ]
 
 
+def test_the_commands_of_a_row_of_the_catalogue_do_the_same_without_a_change(drives, said, tmp_path, inside):
+    indexed([drives / 'rack'], tmp_path / 'catalogue', said)
+    (one,) = worst(tmp_path / 'catalogue', 'peak_displacement_m')
+    file = drives / 'rack' / 'good.csv'
+    assert one.commands == [
+        f'engine-mount info {file}',
+        f'engine-mount replay {file} --map-file {tmp_path / "rack.yaml"}',
+    ]
+
+
 def test_an_order_with_another_mapping_is_another_order(drives, said, tmp_path, inside):
     assert 'of_others' not in FleetOrder([str(drives)], CHANGES, said=NOTHING_SAID).told()
     told = FleetOrder([str(drives)], CHANGES, said=said).told()

@@ -148,6 +148,18 @@ def test_numbers_are_told_with_three_digits_in_handy_units():
     assert quantity(0.25, 'A') == '0.250 A'
 
 
+def test_figures_stand_side_by_side_and_single_recordings_are_listed_with_the_worst_alone(tmp_path):
+    file = tmp_path / 'page.html'
+    fleet_report(result(), [look(peak_current_a=1.0)], 'peak_current_a', 'Fleet').write_page(file)
+    text = file.read_text(encoding='utf-8')
+    assert text.count('<div class="halves"><section id="peak_current_a">') == 1
+    assert '<pre>engine-mount report a</pre>' in text
+    top = text[text.index('<nav>') : text.index('</nav>')]
+    assert 'href="#worst"' in top
+    assert 'href="#look_1"' not in top
+    assert text.count('href="#look_1"') == 1
+
+
 def test_a_simulated_displacement_is_told_apart_from_a_replayed_one():
     page = fleet_report(result('displacement'), [], 'peak_current_a', 'Fleet')
     assert page.title == 'Fleet Fleet: displacement in a closed loop'
