@@ -110,6 +110,16 @@ def test_the_picture_shows_the_stretch_around_the_largest_difference():
     assert (setpoints.curves[0].x[0], setpoints.curves[0].x[-1]) == pytest.approx((2.001, 4.0))
 
 
+@pytest.mark.parametrize(('at', 'view'), [(0.1, (0.0, 0.8)), (3.0, (2.6, 3.4)), (5.95, (5.199, 5.999))])
+def test_the_picture_shows_nothing_beyond_the_ends_of_the_recording(at, view):
+    time = np.arange(0.0, 5.9995, 0.001)
+    signals = Signals(time, np.sin(time), (np.zeros_like(time), np.where(abs(time - at) < 1e-6, 1.0, 0.0)))
+    row = {'recording': 'a', 'mount': '', 'asked': 'setpoints', 'peak_current_a': 1.0}
+    page = fleet_report(result(), [Look(row, signals=signals)], 'peak_current_a', 'Fleet')
+    chart = next(section.chart for section in page.sections if section.name == 'look_1')
+    assert chart.view == pytest.approx(view)
+
+
 def test_in_a_closed_loop_the_picture_shows_both_motions_over_the_acceleration():
     row = {'peak_current_a': 1.0, 'displacement_difference_largest_m': 5e-5}
     section = fleet_report(result('displacement'), [look(moved=True, **row)], 'peak_current_a', 'Fleet')

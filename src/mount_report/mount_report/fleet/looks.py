@@ -100,9 +100,15 @@ def _chart(name: str, title: str, signals: Signals) -> Chart:
         )
         if is_compared:
             panels.append(_difference_panel(label, unit, time[part], after - before))
-    view = (float(time[place]) - AT_FIRST, float(time[place]) + AT_FIRST)
     begin = 'beginning of the recorded acceleration' if signals.displacements else 'first displacement sample'
-    return Chart(name, title, f'seconds from the {begin}', panels, view=view)
+    return Chart(name, title, f'seconds from the {begin}', panels, view=_view(time, float(time[place])))
+
+
+def _view(time: Array, at: float) -> tuple[float, float]:
+    """Return what is seen at first of the time axis: around `at` (s), and nothing beyond its ends."""
+    begin = min(at - AT_FIRST, float(time[-1]) - 2.0 * AT_FIRST)
+    begin = max(begin, float(time[0]))
+    return begin, min(begin + 2.0 * AT_FIRST, float(time[-1]))
 
 
 def _difference_panel(label: str, unit: str, time: Array, difference: Array) -> Panel:
