@@ -50,11 +50,12 @@ def test_the_requirements_of_tests_pin_what_tests_import():
 def code_of(package: str) -> list[Path]:
     """Return the sources of a package; the plugin for tests is one of them only where it lies."""
     files = [*(SOURCES / package / package).rglob('*.py'), *(SOURCES / package / 'launch').glob('*.py')]
-    return [file for file in files if file.name != 'testing.py']
+    return [file for file in files if not {'testing.py', 'testing'} & set(file.parts)]
 
 
 def own_tests_of(package: str) -> list[Path]:
-    return [*(SOURCES / package / 'test').glob('*.py'), *(SOURCES / package / package).glob('testing.py')]
+    own = SOURCES / package / package
+    return [*(SOURCES / package / 'test').glob('*.py'), *own.glob('testing.py'), *own.glob('testing/*.py')]
 
 
 def imported(files: Sequence[Path]) -> set[str]:

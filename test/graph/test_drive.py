@@ -98,6 +98,21 @@ def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(comman
     assert replayed.agreement.equal
 
 
+def test_lockstep_equals_the_core_run_over_a_measured_road(command):
+    places = np.arange(0.0, 12.0, 0.02)  # m
+    height = 0.01 * np.sin(2.0 * np.pi * places / 1.1) + 0.004 * np.sin(2.0 * np.pi * places / 0.3)
+    road = command.folder / 'road.csv'
+    np.savetxt(road, np.c_[places, height], delimiter=',', header='distance [m],height [m]', comments='')
+    options = ('--road', str(road), '--speed', '20/3.6', '--set', 'mount_sim.timeline.start=2.9')
+    lockstep, core = command.drive('--lockstep', *options), command.drive('--core', *options)
+    assert lockstep.code == core.code == 0, lockstep.output + core.output
+    for topic in DATA_TOPICS:
+        payloads = _payloads(core.folder, topic)
+        assert payloads, topic
+        assert _payloads(lockstep.folder, topic) == payloads, topic
+    assert np.ptp(mount_bags.open(core.folder / 'recording')['sim/truth']['road_height']) > 0.01
+
+
 @pytest.mark.real_time
 def test_real_time_drive_records_every_sample_and_damps_the_gap(drive_in_time, tmp_path):
     figures_file = tmp_path / 'figures.json'

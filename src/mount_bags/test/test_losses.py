@@ -9,11 +9,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from recorded_drive import PERIOD, RECORDED, START, joint_state
 
 import mount_bags
-from mount_bags.audit.answers import Control, Setpoints, Silence, judge_answers
+from mount_bags.audit.answers import NO_TIMES, Control, Setpoints, Silence, judge_answers
 from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
 from mount_bags.audit.report import as_json, sentences
 from mount_bags.bag.writer import BagWriter
+from mount_bags.messages.compact_times import compact
 from mount_ros.messages.cdr import serialised
 from mount_ros.topics import (
     COIL_RIPPLE,
@@ -28,9 +29,10 @@ SAMPLES = START + np.arange(3000) * PERIOD
 NO_FRAMES = 'no frames from the electronics for more than 100 ms; are they powered?'
 
 
-def judged(answered: np.ndarray, *, sent: np.ndarray | None = None, samples=SAMPLES, **control):
+def judged(answered, *, sent=None, samples=SAMPLES, steps=NO_TIMES, handovers=NO_TIMES, inactive=None):
     sent = answered + 300_000 if sent is None else sent
-    return judge_answers(samples, Setpoints(answered, sent), Control(**control))
+    setpoints, control = Setpoints(compact(answered), compact(sent)), (compact(steps), compact(handovers))
+    return judge_answers(compact(samples), setpoints, Control(*control, inactive))
 
 
 # Answers.

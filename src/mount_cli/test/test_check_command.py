@@ -92,8 +92,10 @@ def test_a_worse_controller_fails_by_name(check, options, caught):
     ended, figures = check('worse', *options)
     assert ended.exit_code == 1, ended.output
     assert caught <= failed(figures)
-    first = next(line for line in ended.output.splitlines() if line.split()[:1] in (['ok'], ['fail']))
-    assert first.split()[0] == 'fail'
+    rows = [line.split() for line in ended.output.splitlines()]
+    one, other, first, *_ = [row for row in rows if row[:1] in (['ok'], ['fail'])]
+    assert {one[1], other[1]} == {'gap', 'rack'}  # told when they were done
+    assert first[0] == 'fail'
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Measured roads from the command line: Belgian blocks as OpenCRG, driven by the whole vehicle."""
 
 import json
+import shutil
 import struct
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import yaml
 
 from mount_bags.bag.recording import open_recording
+from mount_bags.run.place import recording_hash
 from mount_bags.run.session import recorded_session
 from mount_cli.command import main
 from mount_control.policy.registry import POLICIES
@@ -99,9 +101,22 @@ def test_a_drive_over_a_road_tells_its_origin_and_rolls_over_its_stones(blocks, 
     )
     session = yaml.safe_load(recorded_session(open_recording(tmp_path / 'run' / 'recording')))
     assert session['scenario'] == 'road'
-    assert session['given']['road.file']['format'] == 'OpenCRG'
-    assert session['given']['road.file']['speed'] == '8.333 m/s (30 km/h)'
-    assert session['parameters']['mount_sim']['road.file'].startswith(str(tmp_path / 'run'))
+    given = session['given']['road.file']
+    assert (given['file'], given['format'], given['speed']) == (
+        'blocks.crg',
+        'OpenCRG',
+        '8.333 m/s (30 km/h)',
+    )
+    assert given['sha256'] == recording_hash(blocks)
+    read = tmp_path / 'run' / given['read']['file']
+    assert session['parameters']['mount_sim']['road.file'] == str(read)
+    assert given['read']['sha256'] == recording_hash(read)
+    shutil.rmtree(tmp_path / 'run' / 'given')  # the recording tells its road, wherever the file is
+    (tmp_path / 'run').rename(tmp_path / 'moved')
+    command('info', tmp_path / 'moved')
+    command('audit', tmp_path / 'moved')
+    command('replay', tmp_path / 'moved', '--out', tmp_path / 'again')  # code 0: the setpoints are equal
+    command('report', tmp_path / 'moved')
 
 
 def test_the_road_behind_a_recorded_acceleration_moves_the_engine_alike(blocks, tmp_path):

@@ -254,6 +254,7 @@ if __name__ == '__main__':
     outcome = replay_fleet(order, Path(sys.argv[2]), workers=2, told=told)
     assert not outcome.not_fetched
     assert killed
+    assert outcome.workers <= 2  # a process that takes the place of another is no further one
 """
 
 

@@ -1,6 +1,7 @@
 """Stores that break, lie, change or are full: what is fetched is whole and right, or nothing is."""
 
 import errno
+import logging
 import subprocess
 import sys
 import threading
@@ -95,6 +96,16 @@ def test_a_store_that_goes_away_in_the_middle_for_ever_leaves_nothing(breaking, 
     with pytest.raises(SourceError, match='4 attempts'):
         RemoteStore(SHORT).hold(uri, copies, tell)
     assert not left_in(copies)
+
+
+def test_a_connection_that_breaks_is_told_by_the_error_alone(breaking, copies, caplog):
+    way, uri = breaking
+    way.bytes_each = 500_000
+    with pytest.raises(SourceError):
+        RemoteStore(replace(SHORT, attempts=1)).fetch(uri, copies)
+    logging.getLogger('asyncio').error('Task exception was never retrieved\nfuture: one of several requests')
+    logging.getLogger('asyncio').error('another fault')
+    assert [record.getMessage() for record in caplog.records] == ['another fault']
 
 
 @pytest.mark.parametrize('seed', range(20))

@@ -7,7 +7,8 @@ import pytest
 
 from mount_bags.signals.signal import SignalError
 from mount_signals.formats.reading import headings, read
-from mount_signals.testing import BEGIN, MAKERS
+from mount_signals.testing import MAKERS
+from mount_signals.testing.made import BEGIN
 
 N = 400
 TIMES = np.arange(N) / 200.0

@@ -10,13 +10,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mount_bags.audit.answers import NO_TIMES, Answers, Control, Setpoints, judge_answers
+from mount_bags.audit.answers import NO_TIMES, Answers, Control, Setpoints, judge_answers, spanned
 from mount_bags.audit.latency import Latency, setpoint_latency
 from mount_bags.audit.node_reports import NodeReport, node_reports
+from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import Recording
 from mount_bags.bag.statement import read_statement
 from mount_bags.container.stored import RECORDER_RECORD
-from mount_bags.messages.series import Times, registered_topic
+from mount_bags.messages.compact_times import CompactTimes, Times, compact, is_in, together
+from mount_bags.messages.series import registered_topic
 from mount_bags.messages.stamps import (
     FARTHEST,
     misdated,
@@ -43,6 +45,7 @@ from mount_ros.topics import (
 AllTimes = Mapping[str, TopicTimes]
 
 CONTROL = 'mount_control'  # the node
+_CURRENT = CURRENT_SETPOINT.names[0]
 
 
 @dataclass(frozen=True)
@@ -145,9 +148,10 @@ def _rate(recording: Recording, found: TopicTimes) -> float:
 
 
 def _redated(found: TopicTimes, rate: float) -> TopicTimes:
-    if found.stamps is None or not rate:
+    if found.stamps is None or not rate or found.stamps.longest_step <= FARTHEST:
         return found
-    return replace(found, stamps=redated(found.stamps, misdated(found.stamps), rate))
+    stamps = found.stamps.whole()
+    return replace(found, stamps=compact(redated(stamps, misdated(stamps), rate)))
 
 
 def _audit_topic(times: AllTimes, as_told: TopicTimes, own_rate: float) -> TopicAudit:
@@ -168,7 +172,7 @@ def _audit_topic(times: AllTimes, as_told: TopicTimes, own_rate: float) -> Topic
     entry = _with_misdated(_from_stamps(found.stamps, topic, rate), as_told.stamps)
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE) and _has_samples(times, name.removesuffix(topic.name)):
         entry = replace(entry, expected=entry.present - (entry.duplicated or 0), lost=0)
-    if topic is CURRENT_SETPOINT:
+    if topic is CURRENT_SETPOINT and found.receive_times is not None:
         return replace(entry, latency=setpoint_latency(found.stamps, found.receive_times))
     return entry
 
@@ -181,7 +185,7 @@ def _own_topic(found: TopicTimes) -> Topic | None:
     return topic if not found.names or set(topic.names) <= set(found.names) else None
 
 
-def _from_stamps(stamps: Times, topic: Topic | None, rate: float) -> TopicAudit:
+def _from_stamps(stamps: CompactTimes, topic: Topic | None, rate: float) -> TopicAudit:
     statistics, jitter = stamp_statistics(stamps, rate), stamp_jitter(stamps, rate)
     return TopicAudit(
         expected=statistics.expected,
@@ -197,9 +201,12 @@ def _from_stamps(stamps: Times, topic: Topic | None, rate: float) -> TopicAudit:
     )
 
 
-def _with_misdated(entry: TopicAudit, stamps: Times | None) -> TopicAudit:
-    wrong = np.zeros(0, bool) if stamps is None else misdated(stamps)
-    if stamps is None or not wrong.any():
+def _with_misdated(entry: TopicAudit, told: CompactTimes | None) -> TopicAudit:
+    if told is None or told.longest_step <= FARTHEST:
+        return entry
+    stamps = told.whole()
+    wrong = misdated(stamps)
+    if not wrong.any():
         return entry
     first = int(np.flatnonzero(wrong)[0])
     most = (
@@ -214,7 +221,7 @@ def _with_misdated(entry: TopicAudit, stamps: Times | None) -> TopicAudit:
 
 
 def _has_samples(times: AllTimes, namespace: str) -> bool:
-    return bool(_stamps_of(times, namespace + DISPLACEMENT.name).size)
+    return len(_stamps_of(times, namespace + DISPLACEMENT.name)) > 0
 
 
 def _lost_samples(
@@ -230,9 +237,9 @@ def _answers(times: AllTimes, namespace: str, inactive: Times | None) -> Answers
     """Return how the samples of a mount were answered, None where its setpoints were not recorded."""
     name = namespace + CURRENT_SETPOINT.name
     stamps = _stamps_of(times, name)
-    if not stamps.size:
+    if not len(stamps) or (sent := times[name].publish_times) is None:
         return None
-    setpoints = Setpoints(stamps, times[name].publish_times)
+    setpoints = Setpoints(stamps, sent)
     control = Control(
         steps=_stamps_of(times, namespace + CONTROL_TRACE.name),
         handovers=_stamps_of(times, namespace + AIR_GAP.name),
@@ -244,17 +251,24 @@ def _answers(times: AllTimes, namespace: str, inactive: Times | None) -> Answers
 def _lost_steps(recording: Recording, times: AllTimes, namespace: str, answers: Answers | None) -> int:
     """Return how many setpoints above 0 A have no trace: 0 A may be the answer to an invalid sample."""
     traced = _stamps_of(times, namespace + CONTROL_TRACE.name)
-    if answers is None or not traced.size:
+    if answers is None or not len(traced):
         return 0
-    setpoints = _stamps_of(times, namespace + CURRENT_SETPOINT.name)
-    untraced = ~np.isin(setpoints, traced)
-    controlled = np.zeros(len(setpoints), bool)
-    for begin, end in answers.spans:
-        controlled |= (setpoints >= begin) & (setpoints <= end)
-    if not (untraced & controlled).any():
+    name = namespace + CURRENT_SETPOINT.name
+    setpoints = _stamps_of(times, name)
+    untraced = NO_TIMES
+    for answered, steps in together([setpoints.ordered(), traced.ordered()]):
+        alone = answered[~is_in(answered, steps)]
+        untraced = np.append(untraced, alone[spanned(alone, answers.spans) >= 0])
+    if not untraced.size:
         return 0
-    currents = recording[namespace + CURRENT_SETPOINT.name]['coil_current']
-    return len(np.unique(setpoints[untraced & controlled & (currents > 0.0)]))
+    places = setpoints.places_of(untraced)
+    stamps, lost, begin = setpoints.at(places), set(), 0
+    for part in column_parts(recording, {name: (_CURRENT,)}):
+        here = (places >= begin) & (places < begin + len(part))
+        above = part.column(_CURRENT)[places[here] - begin] > 0.0
+        lost.update(stamps[here][above].tolist())
+        begin += len(part)
+    return len(lost)
 
 
 def _inactive(reports: Sequence[NodeReport], namespace: str, axis: TimeAxis) -> Times | None:
@@ -270,7 +284,7 @@ def _inactive(reports: Sequence[NodeReport], namespace: str, axis: TimeAxis) -> 
     return axis.stamps_at(logged)
 
 
-def _stamps_of(times: AllTimes, name: str) -> Times:
+def _stamps_of(times: AllTimes, name: str) -> CompactTimes:
     """Return the stamps (ns) of a topic by its full name, none if it is missing or has none."""
     stamps = times[name].stamps if name in times else None
-    return NO_TIMES if stamps is None else stamps
+    return compact(NO_TIMES) if stamps is None else stamps

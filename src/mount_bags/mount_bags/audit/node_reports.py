@@ -1,5 +1,6 @@
 """What the nodes of a recording said of themselves on `/diagnostics`."""
 
+import sys
 from dataclasses import dataclass
 
 from mount_bags.bag.recording import ReadingError, Recording
@@ -7,10 +8,11 @@ from mount_bags.messages.series import SeriesError
 from mount_ros.messages.verdicts import ToldVerdict, verdicts_in
 from mount_ros.topics import DIAGNOSTICS
 
+_AT_ONCE = 256  # messages in memory, chosen
 _ERROR = 2  # diagnostic_msgs/DiagnosticStatus.ERROR
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class NodeReport:
     """One status: when it was logged (ns), of which node below which namespace, and what it said."""
 
@@ -32,11 +34,14 @@ def node_reports(recording: Recording) -> list[NodeReport]:
     if DIAGNOSTICS.name not in recording:
         return []
     try:
-        series = recording[DIAGNOSTICS.name]
-        if series.type != DIAGNOSTICS.type:
+        if recording.topics[recording.resolve(DIAGNOSTICS.name)].type != DIAGNOSTICS.type:
             return []
-        logged = zip(series.receive_times.tolist(), series.messages(), strict=True)
-        reports = [_report(time, told) for time, message in logged for told in verdicts_in(message)]
+        reports = [
+            _report(time, told)
+            for series in recording.parts([DIAGNOSTICS.name], _AT_ONCE)
+            for time, message in zip(series.receive_times.tolist(), series.messages(), strict=True)
+            for told in verdicts_in(message)
+        ]
     except (ReadingError, SeriesError):
         return []
     return sorted(reports, key=lambda report: report.log_time)
@@ -44,5 +49,6 @@ def node_reports(recording: Recording) -> list[NodeReport]:
 
 def _report(log_time: int, told: ToldVerdict) -> NodeReport:
     namespace, _, node = told.node.rpartition('/')
-    state = told.figures.get('state', '')
-    return NodeReport(log_time, namespace.strip('/'), node, told.level, told.sentence, state)
+    texts = (namespace.strip('/'), node, told.sentence, told.figures.get('state', ''))
+    namespace, node, sentence, state = map(sys.intern, texts)  # very many are alike
+    return NodeReport(log_time, namespace, node, told.level, sentence, state)

@@ -6,34 +6,57 @@ from collections.abc import Mapping
 import numpy as np
 
 from mount_bags.audit.audit import TopicAudit
-from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.messages.series import SeriesError
+from mount_bags.bag.column_parts import ColumnPart, column_parts
+from mount_bags.bag.recording import Recording
+from mount_bags.messages.series import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
+
+_CURRENT = CURRENT_SETPOINT.names[0]
+
+
+class PeakCurrent:
+    """The highest setpoint while control was active, found part by part.
+
+    The ramp of an initialisation does not count.
+    """
+
+    def __init__(self, recording: Recording, audits: Mapping[str, TopicAudit]):
+        """Take a recording and its audit."""
+        self._spans = {
+            name: entry.answers.spans
+            for topic, entry in audits.items()
+            if entry.answers is not None
+            and _is_setpoint(recording, name := topic.removesuffix(DISPLACEMENT.name) + CURRENT_SETPOINT.name)
+        }
+        self.value = math.nan
+        """In A, NaN where none is known."""
+
+    @property
+    def columns(self) -> dict[str, tuple[str, ...]]:
+        """Which columns of which topics it needs."""
+        return dict.fromkeys(self._spans, (_CURRENT,))
+
+    def add(self, part: ColumnPart) -> None:
+        """Look at a part of one of these topics."""
+        currents = part.column(_CURRENT)
+        for begin, end in self._spans[part.topic]:
+            inside = currents[(part.stamps >= begin) & (part.stamps <= end)]
+            known = inside[np.isfinite(inside)]
+            if known.size:
+                self.value = float(np.fmax(self.value, known.max()))
 
 
 def peak_current(recording: Recording, audits: Mapping[str, TopicAudit]) -> float:
     """Return the highest setpoint (A) while control was active, NaN where none is known.
 
-    The ramp of an initialisation does not count. `audits` is the audit of `recording`.
+    `audits` is the audit of `recording`. In memory are no more than a part of its setpoints.
     """
-    spans = {
-        name.removesuffix(DISPLACEMENT.name) + CURRENT_SETPOINT.name: entry.answers.spans
-        for name, entry in audits.items()
-        if entry.answers is not None
-    }
-    recording.load_columns({name: ('coil_current',) for name in spans if name in recording})
-    peaks = [_peak(recording, name, of_mount) for name, of_mount in spans.items()]
-    return max((peak for peak in peaks if not math.isnan(peak)), default=math.nan)
+    found = PeakCurrent(recording, audits)
+    for part in column_parts(recording, found.columns):
+        found.add(part)
+    return found.value
 
 
-def _peak(recording: Recording, name: str, spans: tuple[tuple[int, int], ...]) -> float:
-    try:
-        series = recording[name]
-        currents, stamps = series['coil_current'], series.stamps
-    except (ReadingError, SeriesError):
-        return math.nan
-    inside = np.zeros(len(stamps), bool)
-    for begin, end in spans:
-        inside |= (stamps >= begin) & (stamps <= end)
-    known = currents[inside & np.isfinite(currents)]
-    return float(np.max(known)) if len(known) else math.nan
+def _is_setpoint(recording: Recording, name: str) -> bool:
+    topic = recording.topics.get(name)
+    return topic is not None and registered_topic(name, topic.type) is CURRENT_SETPOINT

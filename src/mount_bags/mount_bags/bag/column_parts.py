@@ -5,7 +5,7 @@ only if everything that fixes its layout is as in the first one of its topic; a 
 general way of `Recording.parts`, which gives the same numbers.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,8 @@ from mount_bags.messages.taken import LOG_TIME_PLACE, WORD, Wanted, take
 if TYPE_CHECKING:
     from mount_bags.bag.recording import Recording
 
-_KEPT = 16 * 1024 * 1024  # bytes of the file in memory, chosen
+PART = 1 << 13
+"""Messages of a topic in a part, chosen: where nothing asks for more or fewer."""
 _FLOAT = np.dtype('<f8')
 
 
@@ -36,9 +37,13 @@ class ColumnPart:
     def __len__(self) -> int:
         return len(self.stamps)
 
+    def column(self, name: str) -> Column:
+        """Return a column; NaN where its messages have none of that name."""
+        return self.columns[name] if name in self.columns else np.full(len(self), np.nan)
+
 
 def column_parts(
-    recording: 'Recording', columns: Mapping[str, tuple[str, ...]], size: int
+    recording: 'Recording', columns: Mapping[str, tuple[str, ...]], size: int = PART
 ) -> Iterator[ColumnPart]:
     """Yield columns of topics, {topic: names}, in the order of the files, some `size` messages at a time."""
     wanted = {recording.resolve(topic): names for topic, names in columns.items()}
@@ -65,15 +70,11 @@ class _FileColumns:
     ):
         self._recording, self._file, self._wanted, self._size = recording, file, wanted, size
         self._numbers = {name: recording.numbers_in(file, name) for name in wanted}
-        self._held: dict[frozenset[int], list[str]] = {}
+        self._held: dict[frozenset[int], frozenset[str]] = {}
         self._columns = _Columns(size)
 
     def parts(self) -> Iterator[ColumnPart]:
-        forgotten = 0
-        for chunk in self._file.chunks:
-            if chunk.position - forgotten >= _KEPT:
-                self._file.forget(forgotten, chunk.position)
-                forgotten = chunk.position
+        for chunk in self._file.passing():
             held = self._held_in(chunk)
             if not held:
                 continue
@@ -85,14 +86,14 @@ class _FileColumns:
                 yield from self._columns.flushed(self._size)
         yield from self._columns.flushed()
 
-    def _held_in(self, chunk: Chunk) -> list[str]:
+    def _held_in(self, chunk: Chunk) -> frozenset[str]:
         """Return which of the topics have messages in a chunk."""
         channels = chunk.channels
         assert channels is not None  # of a plain file
         if channels not in self._held:
-            self._held[channels] = [
+            self._held[channels] = frozenset(
                 name for name, numbers in self._numbers.items() if not channels.isdisjoint(numbers)
-            ]
+            )
         return self._held[channels]
 
     def _take(self, chunk: Chunk) -> int:
@@ -109,8 +110,8 @@ class _FileColumns:
             found = contents.messages.of(np.array(numbers, np.int64))
             if not len(found):
                 continue
-            series = self._recording.series_of(name, [found])
-            if len(numbers) == 1 and not self._columns.know([name]):
+            series = self._recording.series_of(name, found)
+            if len(numbers) == 1 and not self._columns.know({name}):
                 picked = _picked(series, self._wanted[name], numbers[0])
                 if picked is not None:
                     self._columns.learn(name, picked)
@@ -142,9 +143,9 @@ class _Columns:
         self._size = size
         self._topics: dict[str, _Picked] = {}
 
-    def know(self, names: list[str]) -> bool:
+    def know(self, names: Set[str]) -> bool:
         """Return whether messages of all these topics can be taken."""
-        return self._topics.keys() >= set(names)
+        return self._topics.keys() >= names
 
     def learn(self, name: str, picked: _Picked) -> None:
         """Take messages of one more topic; nothing must be filled."""

@@ -2,7 +2,7 @@
 
 import copy
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,10 @@ from mount_bags.bag.piece_topics import (
 from mount_bags.container.stored import HEAD, StorageError, StoredFile, StoredMessages
 from mount_bags.messages.columns import ColumnCollector
 from mount_bags.messages.definitions import Definition
-from mount_bags.messages.series import Column, Payloads, Series, Times
-from mount_bags.messages.time_axis import Arrivals, TimeAxis, axis_of
+from mount_bags.messages.series import Column, Payloads, Series, Times, registered_topic
+from mount_bags.messages.time_axis import Arrivals, TimeAxis, anchors, axis_of
 from mount_bags.messages.topic_times import TimesCollector, TopicTimes
-from mount_ros.topics import DISPLACEMENT
+from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 
 class ReadingError(ValueError):
@@ -129,7 +129,7 @@ class Recording:
     def time_axis(self) -> TimeAxis:
         """The time that people are told, read once: where `times` were read before, without messages."""
         if self._time_axis is None:
-            self._time_axis = self._axis_of(self.__getitem__)
+            self._time_axis = self._axis_of(self._arrivals)
         return self._time_axis
 
     def __contains__(self, name: str) -> bool:
@@ -182,18 +182,18 @@ class Recording:
 
         In memory are no more than that of each topic. Raises `ReadingError`.
         """
-        waiting: dict[str, list[StoredMessages]] = {self.resolve(name): [] for name in names}
+        waiting = {self.resolve(name): _Gathered() for name in names}
         counts = dict.fromkeys(waiting, 0)
         for name, block in self._blocks(list(waiting)):
-            waiting[name].append(block)
+            waiting[name].add(block)
             counts[name] += len(block)
-            if sum(map(len, waiting[name])) >= size:
-                yield self.series_of(name, waiting[name])
-                waiting[name] = []
-        for name, blocks in waiting.items():
+            if len(waiting[name]) >= size:
+                yield self._series_of(name, waiting[name])
+                waiting[name] = _Gathered()
+        for name, gathered in waiting.items():
             self._note_damage(name, counts[name])
-            if blocks:
-                yield self.series_of(name, blocks)
+            if len(gathered):
+                yield self._series_of(name, gathered)
 
     def numbers_in(self, file: StoredFile, name: str) -> list[int]:
         """Return by which numbers a file knows the topic with this full name."""
@@ -298,39 +298,72 @@ class Recording:
     # Reading.
 
     def times(self) -> dict[str, TopicTimes]:
-        """Return the times of all topics: one pass through the files, no message is kept."""
-        collectors = {
-            name: TimesCollector(name, topic.type, *self._definitions[name])
-            for name, topic in self.topics.items()
-        }
-        for name, block in self._blocks(list(self.topics)):
-            collectors[name].add(block)
-        found = {name: collector.times() for name, collector in collectors.items()}
-        for name, times in found.items():
-            self._note_damage(name, len(times))
-        self._time_axis = self._time_axis or self._axis_of(found.__getitem__)
+        """Return the times of all topics: one pass through the files, no message is kept.
+
+        Those of sending are kept of setpoints, those of arrival also of what tells the time of the recording.
+        """
+        anchor = next(iter(anchors(self._types)), '')
+        found = self._times_of(self.topics, {anchor} if self._time_axis is None else set())
+        if self._time_axis is None:
+            self._time_axis = self._axis_of(
+                lambda name: found[name] if name == anchor else self._arrivals(name)
+            )
         return found
+
+    def _times_of(self, names: Iterable[str], received: Collection[str]) -> dict[str, TopicTimes]:
+        types = {name: self.topics[name].type for name in names}
+        setpoints = {name for name, kind in types.items() if registered_topic(name, kind) is CURRENT_SETPOINT}
+        collectors = {
+            name: TimesCollector(
+                name,
+                kind,
+                *self._definitions[name],
+                received=name in setpoints or name in received,
+                sent=name in setpoints,
+            )
+            for name, kind in types.items()
+        }
+        for name, block in self._blocks(list(types)):
+            collectors[name].add(block)
+        for name, collector in collectors.items():
+            self._note_damage(name, len(collector))
+        return {name: collectors.pop(name).times() for name in types}
+
+    @property
+    def _types(self) -> dict[str, str]:
+        """The types of the topics that have messages."""
+        return {name: topic.type for name, topic in self.topics.items() if topic.message_count}
+
+    def _arrivals(self, name: str) -> Arrivals:
+        """Return when the samples of a topic were taken and came in."""
+        if name not in self._series:
+            found = self._times_of([name], [name])[name]
+            if found.stamps is not None:
+                return found
+        return self[name]
 
     def _axis_of(self, arrivals: Callable[[str], Arrivals]) -> TimeAxis:
         steps = [step.get(ZERO_KEY) for step in origin(self.information)]
-        types = {name: topic.type for name, topic in self.topics.items() if topic.message_count}
         first = self.time_range[0] if self.time_range else 0
-        return axis_of(types, arrivals, [zero for zero in steps if isinstance(zero, int)], first)
+        return axis_of(self._types, arrivals, [zero for zero in steps if isinstance(zero, int)], first)
 
     def _load(self, names: Sequence[str]) -> dict[str, Series]:
-        blocks: dict[str, list[StoredMessages]] = {name: [] for name in names}
+        found = {name: _Gathered() for name in names}
         for name, block in self._blocks(names) if names else ():
-            blocks[name].append(block)
-        return {name: self._series_of(name, found) for name, found in blocks.items()}
+            found[name].add(block)
+        for name, gathered in found.items():
+            self._note_damage(name, len(gathered))
+        return {name: self._series_of(name, found.pop(name)) for name in names}
 
-    def _series_of(self, name: str, blocks: list[StoredMessages]) -> Series:
-        self._note_damage(name, sum(map(len, blocks)))
-        return self.series_of(name, blocks)
-
-    def series_of(self, name: str, blocks: Sequence[StoredMessages]) -> Series:
+    def series_of(self, name: str, messages: StoredMessages) -> Series:
         """Return messages of the topic with this full name as a series."""
-        head = np.concatenate([block.heads for block in blocks]) if blocks else np.empty(0, HEAD)
-        return self._made(name, Payloads([block.payloads() for block in blocks]), head)
+        gathered = _Gathered()
+        gathered.add(messages)
+        return self._series_of(name, gathered)
+
+    def _series_of(self, name: str, gathered: '_Gathered') -> Series:
+        head = np.concatenate([np.empty(0, HEAD), *gathered.heads])
+        return self._made(name, Payloads(gathered.payloads), head)
 
     def _is_loaded(self, name: str) -> bool:
         return name in self._series and self._series[name].loaded
@@ -395,3 +428,20 @@ class Recording:
                         if name in watched:
                             last[name] = found.message(-1)
                         yield name, found
+
+
+class _Gathered:
+    """Messages of a topic, without those of others that came with them in the blocks of the files."""
+
+    def __init__(self) -> None:
+        self.heads: list[np.ndarray] = []
+        self.payloads: list[np.ndarray | list[bytes]] = []
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, block: StoredMessages) -> None:
+        self.heads.append(block.heads)
+        self.payloads.append(block.payloads())
+        self._count += len(block)

@@ -139,11 +139,14 @@ def indexed_in(content: bytes) -> IndexedChunk | None:
         if offsets % _OFFSET.size:
             return None
         low, high = (content[_INDEXED.size + byte : place : _OFFSET.size] for byte in range(2))
+        channels = frozenset(low)
+        if any(high):
+            channels = frozenset(each[0] for each in _OFFSET.iter_unpack(content[_INDEXED.size : place]))
     except (struct.error, UnicodeDecodeError):
         return None
     # one object for all equal ones: a long recording has very many chunks
     return IndexedChunk(
-        position, length, index_length, packed, size, sys.intern(name), start, end, _channels(low, high)
+        position, length, index_length, packed, size, sys.intern(name), start, end, _same(channels)
     )
 
 
@@ -168,13 +171,8 @@ def indexed_chunk(data: mmap.mmap, index: IndexedChunk) -> Chunk | None:
 
 
 @functools.lru_cache(maxsize=256)
-def _channels(low: bytes, high: bytes) -> frozenset[int]:
-    """Return the channels of these low and high bytes, one object for all equal sets."""
-    return _same(frozenset(first | second << 8 for first, second in zip(low, high, strict=True)))
-
-
-@functools.lru_cache(maxsize=256)
 def _same(channels: frozenset[int]) -> frozenset[int]:
+    """Return one object for all equal sets."""
     return channels
 
 

@@ -33,14 +33,17 @@ from mount_bags.container.chunks import (
 from mount_bags.container.message_compression import plain
 from mount_bags.container.stored import ACCOUNTS, StorageError, StoredMessages, StoredTopic
 from mount_bags.container.summary import (
+    Hash,
     Proof,
+    covered,
     data_proof,
+    hashed,
     parsed,
     parsed_attachment,
     parsed_metadata,
     read_summary,
 )
-from mount_bags.container.whole_files import FileError, forget, mapped
+from mount_bags.container.whole_files import COMPRESSED_SUFFIXES, FileError, forget, mapped
 
 _KEPT = 1 << 24  # bytes of the file in memory while the chunks are looked at, chosen
 _LAST_OPCODE = Opcode.DATA_END
@@ -83,6 +86,7 @@ class McapFile:
         self._data = _opened(path)
         self._summary = read_summary(self._data)
         self._data_proof: Proof | None = None
+        self._crc: int | None = None  # of the data section, once it was taken
         if self._summary.proof is not Proof.SOUND or not self._take_summary():
             self._search()
         self.topics = {number: self._topic(channel) for number, channel in self._channels.items()}
@@ -123,7 +127,7 @@ class McapFile:
         """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
         self.data_proof()
         wanted = np.array(sorted(topics), np.int64)
-        for chunk in self.chunks:
+        for chunk in self.passing():
             if chunk.channels is None or not chunk.channels.isdisjoint(topics):
                 contents = self.contents(chunk)
                 if contents is not None and len(found := contents.messages.of(wanted)):
@@ -171,19 +175,34 @@ class McapFile:
         """
         return unpacked(self._data[chunk.begin : chunk.end], chunk, self._decompressor)
 
-    def forget(self, begin: int, end: int) -> None:
-        """Let the system take back the memory of the bytes from `begin` to `end`, which were read."""
-        forget(self._data, begin, end)
+    def passing(self) -> Iterator[Chunk]:
+        """Yield the chunks; the system may take back the memory of those before, which were read."""
+        forgotten = 0
+        for chunk in self.chunks:
+            if chunk.position - forgotten >= _KEPT:
+                forget(self._data, forgotten, chunk.position)
+                forgotten = chunk.position
+            yield chunk
 
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
         if self._data_proof is None:
-            end = self._summary.begin if self.proven else self._data_end
-            self._data_proof = data_proof(self._data, end)
+            self._data_proof = data_proof(self._data, self._section_end, self._crc)
             if self._data_proof is Proof.WRONG:
                 values = ', and numbers in it may be wrong' if self._unprotected else ''
                 self._warn(f'the checksum of its data section is wrong: some byte is damaged{values}')
         return self._data_proof
+
+    def hashed(self, digest: Hash) -> None:
+        """Let `digest` take all bytes of the file; `data_proof` then needs no pass of its own."""
+        packed = self.path.suffix in COMPRESSED_SUFFIXES  # as a whole: its bytes are others than those read
+        end = 0 if packed else covered(self._section_end)
+        crc = hashed(self.path, digest, end)
+        self._crc = crc if end > 0 else None
+
+    @property
+    def _section_end(self) -> int:
+        return self._summary.begin if self.proven else self._data_end
 
     @property
     def _unprotected(self) -> bool:
@@ -223,7 +242,7 @@ class McapFile:
             index = waiting.pop()
             found.append(indexed_chunk(self._data, index))
             if index.position - forgotten >= _KEPT:
-                self.forget(forgotten, index.position)
+                forget(self._data, forgotten, index.position)
                 forgotten = index.position
         return found
 
@@ -263,7 +282,7 @@ class McapFile:
         self.chunks, self._loose, self._counts, self._times = [], [], {}, None
         loose_channels, loose_schemas = self._walk_all()
         self._channels, self._schemas = {}, {}
-        for chunk in self.chunks:
+        for chunk in self.passing():
             self._take_explored(chunk)
         if not self.chunks or (self.whole and self._summary.proof is not Proof.WRONG):
             # Nothing better is known, or there is no reason to doubt.

@@ -3,12 +3,11 @@
 import re
 from dataclasses import dataclass
 
-import numpy as np
-
+from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import Recording
 from mount_bags.events.event_marks import Mark, read_marks
-from mount_bags.events.switching_changes import switching_places
-from mount_bags.messages.series import Series, SeriesError, registered_topic
+from mount_bags.events.switching_trace import SwitchingTrace
+from mount_bags.messages.series import SeriesError, registered_topic
 from mount_bags.messages.time_axis import TimeAxis
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
@@ -42,7 +41,8 @@ def recorded_events(recording: Recording) -> list[RecordedEvent]:
         for log_time, mark in marks
     ]
     kinds = {event.kind for event in marked}
-    derived = [event for event in _switching(recording) if event.kind not in kinds]
+    untold = {SWITCH_ON, SWITCH_OFF} - kinds
+    derived = [event for event in _switching(recording) if event.kind in untold] if untold else []
     return sorted([*marked, *derived], key=lambda event: event.log_time)
 
 
@@ -84,22 +84,16 @@ def _plain(kind: str) -> str:
 def _switching(recording: Recording) -> list[RecordedEvent]:
     if CONTROL_TRACE.name not in recording:
         return []
+    trace = SwitchingTrace()
     try:
-        trace = recording[CONTROL_TRACE.name]
-        return _changes(trace)
+        for part in column_parts(recording, {CONTROL_TRACE.name: (trace.COLUMN,)}):
+            trace.add(part)
     except SeriesError:
         return []  # no control trace of ours
-
-
-def _changes(trace: Series) -> list[RecordedEvent]:
-    order = np.argsort(trace.receive_times, kind='stable')
-    stamps = trace.stamps[order]
-    seconds = (stamps - stamps[:1]) / 1e9
-    switched = switching_places(seconds, trace['damping_active'][order])
     return [
-        RecordedEvent(int(trace.receive_times[order[place]]), int(stamps[place]), kind)
-        for kind, places in zip((SWITCH_ON, SWITCH_OFF), switched, strict=True)
-        for place in places.tolist()
+        RecordedEvent(log_time, stamp, kind)
+        for kind, switched in zip((SWITCH_ON, SWITCH_OFF), trace.by_arrival(), strict=True)
+        for stamp, log_time in zip(switched.stamps.tolist(), switched.receive_times.tolist(), strict=True)
     ]
 
 

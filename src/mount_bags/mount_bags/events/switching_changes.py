@@ -2,6 +2,7 @@
 
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,13 +58,20 @@ def switching_times(time: Signal, active: Signal) -> tuple[Signal, Signal]:
     return time[on], time[off]
 
 
-def switching_places(time: Signal, active: Signal) -> tuple[Places, Places]:
+class TimeAt(Protocol):
+    """Times in s, or what tells them at places of samples."""
+
+    def __getitem__(self, places: Places, /) -> Signal: ...
+
+
+def switching_places(time: TimeAt, active: Signal | NDArray[np.bool_]) -> tuple[Places, Places]:
     """Return at which samples damping went on and off: where it is active, an opening of any width.
 
     So it counts as on where the coil carries current. A pause shorter than `PAUSE` is none.
     """
-    change = np.diff((active > 0.0).astype(int), prepend=0)
-    on, off = np.flatnonzero(change > 0), np.flatnonzero(change < 0)
+    is_active = active > 0.0
+    before = np.append(False, is_active[:-1])[: len(is_active)]
+    on, off = np.flatnonzero(is_active & ~before), np.flatnonzero(~is_active & before)
     pauses = time[on[1:]] - time[off[: len(on) - 1]] >= PAUSE if len(on) else np.zeros(0, bool)
     return on[np.append(True, pauses)[: len(on)]], off[np.append(pauses, True)[: len(off)]]
 

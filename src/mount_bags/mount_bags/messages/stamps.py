@@ -11,13 +11,14 @@ empty one near it. Only equal stamps, or more samples than places, are samples t
 A stamp far from those of the samples around it is no time of a sample: misdated, and counted as that alone.
 """
 
-import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mount_bags.messages.compact_times import CompactTimes, Times, distinct, is_in, together
 
 _NANOSECONDS = 1_000_000_000
 _LEAST_SAMPLES = 10
@@ -45,44 +46,61 @@ class StampStatistics:
     longest_gap: float
 
 
-def stamp_statistics(stamps: NDArray[np.int64], rate: float) -> StampStatistics:
+def stamp_statistics(stamps: CompactTimes, rate: float) -> StampStatistics:
     """Return the statistics of `stamps` (ns, in the order of arrival) of a topic with `rate` in Hz."""
-    if stamps.size == 0:
+    if not len(stamps):
         return StampStatistics(0, 0, 0, 0, 0, math.nan)
-    ordered = np.sort(stamps)
-    differences = ordered[1:] - ordered[:-1]
-    periods = differences * (rate / _NANOSECONDS)
-    steps = np.rint(periods)
-    if np.any((np.abs(periods - steps) > _JITTER) | ((steps == 0) & (differences > 0))):
-        expected, taken = _places(np.unique(ordered), rate)
-    else:
-        expected, taken = int(steps.sum()) + 1, 1 + int(np.count_nonzero(steps))
-    latest = np.maximum.accumulate(stamps)
+    ordered = stamps.ordered()
+    expected, taken, longest, jittering = 1, 1, 0, False
+    for differences in ordered.steps():
+        periods = differences * (rate / _NANOSECONDS)
+        steps = np.rint(periods)
+        jittering |= bool(np.any((np.abs(periods - steps) > _JITTER) | ((steps == 0) & (differences > 0))))
+        expected, taken = expected + int(steps.sum()), taken + int(np.count_nonzero(steps))
+        longest = max(longest, int(differences.max(initial=0)))
+    if jittering:
+        expected, taken = _places(ordered, rate)
     return StampStatistics(
         expected=expected,
-        present=int(stamps.size),
+        present=len(stamps),
         lost=expected - taken,
-        duplicated=int(stamps.size) - taken,
-        out_of_order=int(np.count_nonzero(stamps[1:] < latest[:-1])),
-        longest_gap=float(differences.max()) / _NANOSECONDS if differences.size else math.nan,
+        duplicated=len(stamps) - taken,
+        out_of_order=0 if stamps.rising else _out_of_order(stamps),
+        longest_gap=longest / _NANOSECONDS if len(stamps) > 1 else math.nan,
     )
 
 
-def misdated(stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _out_of_order(stamps: CompactTimes) -> int:
+    """Return how many stamps are below one before them."""
+    late, latest = 0, stamps.least
+    for block in stamps.blocks():
+        before = np.maximum.accumulate(np.append(latest, block))
+        late += int(np.count_nonzero(block < before[:-1]))
+        latest = before[-1]
+    return late
+
+
+def misdated(stamps: Times) -> NDArray[np.bool_]:
     """Return which of `stamps` (ns, in the order of arrival) cannot be the times of their samples."""
     wrong = np.zeros(len(stamps), bool)
-    if stamps.size < 3 or not (np.abs(np.diff(stamps)) > FARTHEST).any():
+    if stamps.size < 3:
         return wrong
+    steps = np.abs(np.diff(stamps))
+    if not (steps > FARTHEST).any():
+        return wrong
+    # Where no step is so long, none of those around a stamp is too far from it.
+    long = np.flatnonzero(steps > FARTHEST // _AROUND)
+    near = np.unique((long[:, None] + np.arange(1 - _AROUND, _AROUND + 1)).clip(0, len(stamps) - 1))
     edges = np.pad(stamps, _AROUND, mode='reflect' if stamps.size > _AROUND else 'edge')
-    around = np.lib.stride_tricks.sliding_window_view(edges, 2 * _AROUND + 1)
-    wrong = np.abs(stamps - np.sort(around, axis=1)[:, _AROUND]) > FARTHEST
+    around = np.lib.stride_tricks.sliding_window_view(edges, 2 * _AROUND + 1)[near]
+    wrong[near] = np.abs(stamps[near] - np.sort(around, axis=1)[:, _AROUND]) > FARTHEST
     ordered = np.sort(stamps[~wrong])
     borders = np.flatnonzero(np.diff(ordered) > LONGEST_PAUSE) + 1
     longest = max(np.split(ordered, borders), key=len)
     return wrong | (stamps < longest[0]) | (stamps > longest[-1]) if longest.size else wrong
 
 
-def redated(stamps: NDArray[np.int64], wrong: NDArray[np.bool_], rate: float) -> NDArray[np.int64]:
+def redated(stamps: Times, wrong: NDArray[np.bool_], rate: float) -> Times:
     """Return `stamps` with those that are `wrong` set to where `rate` (Hz) puts their samples."""
     if not wrong.any() or wrong.all():
         return stamps
@@ -92,23 +110,32 @@ def redated(stamps: NDArray[np.int64], wrong: NDArray[np.bool_], rate: float) ->
     return stamps[before] + np.rint((places - before) * (_NANOSECONDS / rate)).astype(np.int64)
 
 
-def missing_samples(streams: Sequence[NDArray[np.int64]], rate: float) -> int:
+def missing_samples(streams: Sequence[CompactTimes], rate: float) -> int:
     """Return how many samples are missing in at least one of `streams` that carry their parts.
 
     `streams` are stamps (ns) on one clock, of samples at `rate` in Hz. A stream is whole before its first and
     behind its last stamp; a sample that is missing in several counts once.
     """
-    known = [np.unique(stamps) for stamps in streams if stamps.size]
+    known = [stamps.ordered() for stamps in streams if len(stamps)]
     if not known:
         return 0
-    grid = np.unique(np.concatenate(known))
-    numbers = np.cumsum(np.rint(np.diff(grid, prepend=grid[0]) * (rate / _NANOSECONDS)).astype(np.int64))
-    begins, ends = [], []
-    for stamps in known:
-        own = numbers[np.searchsorted(grid, stamps)]
-        before_hole = np.flatnonzero(np.diff(own) > 1)
-        begins.append(own[before_hole] + 1)
-        ends.append(own[before_hole + 1])
+    last, number = min(stamps.least for stamps in known), 0
+    last_own: list[int | None] = [None for _ in known]
+    begins, ends = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    for pieces in together(known):
+        grid = np.unique(np.concatenate(pieces))
+        steps = np.rint(np.diff(grid, prepend=last) * (rate / _NANOSECONDS)).astype(np.int64)
+        numbers = number + np.cumsum(steps)
+        last, number = int(grid[-1]), int(numbers[-1])
+        for place, stamps in enumerate(pieces):
+            own = numbers[np.searchsorted(grid, stamps)]
+            if (before := last_own[place]) is not None:
+                own = np.append(before, own)
+            if own.size:
+                last_own[place] = int(own[-1])
+            before_hole = np.flatnonzero(np.diff(own) > 1)
+            begins.append(own[before_hole] + 1)
+            ends.append(own[before_hole + 1])
     return _covered(np.concatenate(begins), np.concatenate(ends))
 
 
@@ -120,30 +147,39 @@ def _covered(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> int:
     return int(np.maximum(ends - np.maximum(begins, reached), 0).sum())
 
 
-def _places(stamps: NDArray[np.int64], rate: float) -> tuple[int, int]:
-    """Return how many places the grid under jittering `stamps` (ns, rising) has, and how many are taken."""
-    places, phase, place = [], 0.0, 0
-    for position in ((stamps - stamps[0]) * (rate / _NANOSECONDS)).tolist():
-        place = max(place, round(position - phase))
-        phase += _FOLLOWS * (position - phase - place)
-        places.append(place)
-    first, last, taken = 0, places[-1], set(places)
-    for place in _shared(places):
-        near = sorted(range(place - _NEAR, place + _NEAR + 1), key=lambda one: abs(one - place))
-        inside = [one for one in near if one not in taken and first <= one <= last]
+def _places(stamps: CompactTimes, rate: float) -> tuple[int, int]:
+    """Return how many places the grid under jittering `stamps` (ns, sorted) has, and how many are taken."""
+    places = np.fromiter(_grid(stamps, rate), np.int64)
+    first, last = 0, int(places[-1])
+    shared = places[:-1][places[1:] == places[:-1]]
+    taken = distinct(places)
+    nearest = np.array(sorted(range(-_NEAR, _NEAR + 1), key=abs))
+    empty = ~is_in(shared[:, None] + nearest, taken)
+    added: set[int] = set()
+    for place, is_empty in zip(shared.tolist(), empty, strict=True):
+        near = (place + nearest[is_empty]).tolist()
+        inside = [one for one in near if one not in added and first <= one <= last]
         if inside:
-            taken.add(inside[0])
+            added.add(inside[0])
         elif place - first < _NEAR:  # a late first stamp hides the place before it
             first -= 1
-            taken.add(first)
+            added.add(first)
         elif last - place < _NEAR:
             last += 1
-            taken.add(last)
-    return last - first + 1, len(taken)
+            added.add(last)
+    return last - first + 1, len(taken) + len(added)
 
 
-def _shared(places: list[int]) -> list[int]:
-    return [place for place, following in itertools.pairwise(places) if place == following]
+def _grid(stamps: CompactTimes, rate: float) -> Iterator[int]:
+    """Yield the place of each distinct stamp on a grid that follows them."""
+    phase, place, known = 0.0, 0, stamps.least - 1
+    for block in stamps.blocks():
+        new = distinct(block[block > known])
+        known = int(block[-1])
+        for position in ((new - stamps.least) * (rate / _NANOSECONDS)).tolist():
+            place = max(place, round(position - phase))
+            phase += _FOLLOWS * (position - phase - place)
+            yield place
 
 
 @dataclass(frozen=True)
@@ -154,26 +190,35 @@ class StampJitter:
     worst: float
 
 
-def stamp_jitter(stamps: NDArray[np.int64], rate: float) -> StampJitter:
+def stamp_jitter(stamps: CompactTimes, rate: float) -> StampJitter:
     """Return the jitter of `stamps` (ns) at `rate` in Hz; gaps are no jitter."""
-    steps = np.diff(np.sort(stamps))
-    single = steps[np.rint(steps * (rate / _NANOSECONDS)) == 1]
+    ordered = stamps.ordered()
+    fits = 2.0 * _NANOSECONDS / rate < np.iinfo(np.int32).max
+    single = np.concatenate(
+        [
+            steps[np.rint(steps * (rate / _NANOSECONDS)) == 1].astype(np.int32 if fits else np.int64)
+            for steps in ordered.steps()
+        ]
+        or [np.empty(0, np.int64)]
+    )
     if not single.size:
         return StampJitter(math.nan, math.nan)
-    deviation = (single - np.median(single)) / _NANOSECONDS
-    return StampJitter(float(np.sqrt(np.mean(deviation**2))), float(np.abs(deviation).max()))
+    deviation = single - np.median(single)
+    deviation /= _NANOSECONDS
+    worst = max(float(deviation.max()), -float(deviation.min()))
+    return StampJitter(float(np.sqrt(np.mean(np.square(deviation, out=deviation)))), worst)
 
 
-def regular_rate(stamps: NDArray[np.int64]) -> float | None:
+def regular_rate(stamps: CompactTimes) -> float | None:
     """Return the rate (Hz) of samples without a declared one, None where their stamps (ns) show none.
 
     Regular are at least 10 samples of which nearly none is repeated, where most steps are one period and
     nearly all are within a quarter of a period of whole ones.
     """
-    distinct = np.unique(stamps)
-    if distinct.size < _LEAST_SAMPLES or distinct.size < _MOSTLY * stamps.size:
+    ordered = stamps.ordered()
+    steps = np.concatenate([[0], *(steps[steps > 0] for steps in ordered.steps())])[1:]
+    if steps.size + 1 < _LEAST_SAMPLES or steps.size + 1 < _MOSTLY * len(stamps):
         return None
-    steps = np.diff(distinct)
     period = float(np.median(steps))
     periods = np.rint(steps / period)
     fitting = np.abs(steps - periods * period) <= 0.25 * period

@@ -6,8 +6,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.messages.series import SeriesError, Times, registered_topic
-from mount_bags.messages.stamps import misdated
+from mount_bags.messages.compact_times import CompactTimes, Times, compact
+from mount_bags.messages.series import SeriesError, registered_topic
+from mount_bags.messages.stamps import FARTHEST, misdated
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
 _ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)
@@ -22,16 +23,23 @@ class TimeAxis:
     lock-step the clock of reception knows nothing of the time in the stamps.
     """
 
-    def __init__(self, stamps: Times, received: Times, told: Sequence[int] = ()):
+    def __init__(
+        self, stamps: Times | CompactTimes, received: Times | CompactTimes, told: Sequence[int] = ()
+    ):
         """Take the samples, at least one, as they came in (ns), and zeros that origins tell of."""
-        sound = ~misdated(stamps)
-        stamps, received = stamps[sound], received[sound]
-        order = np.argsort(received, kind='stable')
-        highest = np.maximum.accumulate(stamps[order])
-        # A late sample moves nothing: its stamp is not above those before it.
-        rising = np.flatnonzero(np.diff(highest, prepend=highest[0] - 1) > 0)
-        self._stamps, self._received = highest[rising], received[order][rising]
-        self.zero = min([int(stamps.min()), *told])
+        sound, came = _in_order(compact(stamps), compact(received))
+        kept, kept_arrivals = CompactTimes(), CompactTimes()
+        highest = sound.block(0)[0] - 1
+        for block, arrivals in zip(sound.blocks(), came.blocks(), strict=True):
+            # A late sample moves nothing: its stamp is not above those before it.
+            so_far = np.maximum.accumulate(np.append(highest, block))
+            risen = so_far[1:] > so_far[:-1]
+            kept.add(block[risen])
+            kept_arrivals.add(arrivals[risen])
+            highest = so_far[-1]
+        self._stamp_of = _Relation(kept_arrivals.finished(), kept.finished())
+        self._arrival_of = _Relation(kept, kept_arrivals)
+        self.zero = min([sound.least, *told])
 
     def of_stamps(self, stamps: Times) -> NDArray[np.float64]:
         """Return the times of stamps (ns)."""
@@ -51,7 +59,7 @@ class TimeAxis:
 
     def stamps_at(self, log_times: Times) -> Times:
         """Return the stamps (ns) that samples would have which came in at log times (ns)."""
-        return _between(log_times, self._received, self._stamps)
+        return self._stamp_of.at(log_times)
 
     def of_mark(self, stamp: int, log_time: int) -> float:
         """Return the time of a mark: of its own stamp, unless it has none or one of another clock."""
@@ -61,17 +69,23 @@ class TimeAxis:
 
     def log_time(self, seconds: float) -> int:
         """Return the log time (ns) that belongs to a time."""
-        stamp = np.array([self.zero + round(1e9 * seconds)])
-        return int(_between(stamp, self._stamps, self._received)[0])
+        return int(self._arrival_of.at(np.array([self.zero + round(1e9 * seconds)]))[0])
 
 
 class Arrivals(Protocol):
     """Samples of a topic: when they were taken and when they came in, ns."""
 
     @property
-    def stamps(self) -> Times | None: ...
+    def stamps(self) -> Times | CompactTimes | None: ...
     @property
-    def receive_times(self) -> Times: ...
+    def receive_times(self) -> Times | CompactTimes | None: ...
+
+
+def anchors(types: Mapping[str, str]) -> list[str]:
+    """Return which of the topics {name: type} may tell the time of a recording, the best first."""
+    return [
+        name for topic in _ANCHORS for name, kind in types.items() if registered_topic(name, kind) is topic
+    ]
 
 
 def axis_of(
@@ -81,21 +95,55 @@ def axis_of(
 
     `told` are the zeros (ns) that it inherits, `first` is its first log time (ns).
     """
-    for topic in _ANCHORS:
-        for name in (name for name, kind in types.items() if registered_topic(name, kind) is topic):
-            found = arrivals(name)
-            try:
-                stamps = found.stamps
-            except SeriesError:  # of a foreign topic
-                continue
-            if stamps is not None and stamps.size:
-                return TimeAxis(stamps, found.receive_times, told)
+    for name in anchors(types):
+        found = arrivals(name)
+        try:
+            stamps, received = found.stamps, found.receive_times
+        except SeriesError:  # of a foreign topic
+            continue
+        if stamps is not None and received is not None and len(stamps):
+            return TimeAxis(stamps, received, told)
     only = np.array([first])
     return TimeAxis(only, only, told)
 
 
-def _between(places: Times, known: Times, wanted: Times) -> Times:
-    """Return what belongs to `places`: linear between known places, at the same pace before and behind."""
-    inside = np.rint(np.interp(places - known[0], known - known[0], wanted - wanted[0])).astype(np.int64)
-    before, behind = np.minimum(places - known[0], 0), np.maximum(places - known[-1], 0)
-    return wanted[0] + inside + before + behind
+def _in_order(stamps: CompactTimes, received: CompactTimes) -> tuple[CompactTimes, CompactTimes]:
+    """Return the samples that are not misdated in the order in which they came in."""
+    if stamps.longest_step <= FARTHEST and received.rising:
+        return stamps, received
+    all_stamps, all_received = stamps.whole(), received.whole()
+    sound = ~misdated(all_stamps)
+    all_stamps, all_received = all_stamps[sound], all_received[sound]
+    order = np.argsort(all_received, kind='stable')
+    return compact(all_stamps[order]), compact(all_received[order])
+
+
+class _Relation:
+    """What belongs to a time: linear between known ones, at the same pace before and behind (all in ns)."""
+
+    def __init__(self, known: CompactTimes, wanted: CompactTimes):
+        self._known, self._wanted, self._firsts = known, wanted, known.firsts
+        self._zeros = int(known.block(0)[0]), int(wanted.block(0)[0])
+        self._last = known.highest
+        self._near: tuple[int, Times, Times] | None = None  # the block that was looked at last
+
+    def at(self, times: Times) -> Times:
+        first, zero = self._zeros
+        inside = np.empty(len(times), np.int64)
+        blocks = np.maximum(np.searchsorted(self._firsts, times, side='right') - 1, 0)
+        for number in np.unique(blocks).tolist():
+            known, wanted = self._around(number)
+            here = blocks == number
+            inside[here] = np.rint(np.interp(times[here] - first, known - first, wanted - zero))
+        return zero + inside + np.minimum(times - first, 0) + np.maximum(times - self._last, 0)
+
+    def _around(self, number: int) -> tuple[Times, Times]:
+        """Return the known times of a block and what belongs to them, up to the first of the next."""
+        if self._near is None or self._near[0] != number:
+            following = range(number, min(number + 2, len(self._firsts)))
+            known, wanted = (
+                np.concatenate([each.block(number), *(each.block(one)[:1] for one in following[1:])])
+                for each in (self._known, self._wanted)
+            )
+            self._near = number, known, wanted
+        return self._near[1:]

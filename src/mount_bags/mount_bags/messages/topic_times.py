@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mount_bags.container.stored import StoredMessages
+from mount_bags.messages.compact_times import CompactTimes
 from mount_bags.messages.definitions import Definition
 from mount_bags.messages.series import Payloads, Series, Times
 
@@ -14,52 +15,73 @@ _STAMP_AT, _STAMP_END = 4, 12  # bytes in the message: behind the kind of encodi
 
 @dataclass(frozen=True)
 class TopicTimes:
-    """Times in ns in the order of the recording; `stamps` are None for the reason that `obstacle` tells."""
+    """Times in ns in the order of the recording; `stamps` are None for the reason that `obstacle` tells.
+
+    `receive_times` and `publish_times` are None where nobody needs them.
+    """
 
     topic: str
     type: str
-    stamps: Times | None
-    receive_times: Times
-    publish_times: Times
+    count: int
+    stamps: CompactTimes | None
+    receive_times: CompactTimes | None
+    publish_times: CompactTimes | None
     names: tuple[str, ...] = ()  # of the scalars in the first message of a JointState
     obstacle: str = ''
 
     def __len__(self) -> int:
-        return len(self.receive_times)
+        return self.count
 
 
 class TimesCollector:
     """Collects the times of one topic, block by block."""
 
-    def __init__(self, topic: str, type_name: str, definition: Definition | None, obstacle: str):
+    def __init__(
+        self,
+        topic: str,
+        type_name: str,
+        definition: Definition | None,
+        obstacle: str,
+        *,
+        received: bool,
+        sent: bool,
+    ):
+        """Take the topic and the sentence why there is no definition; keep the times that are asked for."""
         self._topic, self._type, self._definition = topic, type_name, definition
         self._obstacle = obstacle
         if definition is not None and not _begins_with_header(definition):
             self._obstacle = f'{type_name} has no header with a stamp'
-        self._stamps: list[Times] = []
-        self._received: list[Times] = []
-        self._sent: list[Times] = []
+        self._count = 0
+        self._stamps = CompactTimes()
+        self._received = CompactTimes() if received else None
+        self._sent = CompactTimes() if sent else None
         self._first: bytes | None = None
+
+    def __len__(self) -> int:
+        return self._count
 
     def add(self, block: StoredMessages) -> None:
         """Take the times of the messages in `block`."""
         if self._first is None:
             self._first = block.message(0)[0]
-        self._received.append(block.heads['log_time'].copy())
-        self._sent.append(block.heads['publish_time'].copy())
+        self._count += len(block)
+        for times, kept in (('log_time', self._received), ('publish_time', self._sent)):
+            if kept is not None:
+                kept.add(block.heads[times].copy())
         if not self._obstacle:
             stamps = _stamps_in(block)
             if stamps is None:
                 self._obstacle = 'not every message begins with a stamp'
             else:
-                self._stamps.append(stamps)
+                self._stamps.add(stamps)
 
     def times(self) -> TopicTimes:
         """Return what was collected."""
-        empty = np.empty(0, np.int64)
-        stamps = np.concatenate([empty, *self._stamps]) if not self._obstacle else None
-        received, sent = np.concatenate([empty, *self._received]), np.concatenate([empty, *self._sent])
-        return TopicTimes(self._topic, self._type, stamps, received, sent, self._names(), self._obstacle)
+        kept = (None if self._obstacle else self._stamps, self._received, self._sent)
+        stamps, received, sent = (None if times is None else times.finished() for times in kept)
+        return TopicTimes(
+            self._topic, self._type, self._count, stamps, received, sent, self._names(), self._obstacle
+        )
 
     def _names(self) -> tuple[str, ...]:
         if self._first is None or self._obstacle:

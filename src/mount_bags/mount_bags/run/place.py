@@ -1,9 +1,13 @@
 """The recording that a person means: its own folder or file, or the run folder that holds it."""
 
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 
 from mount_bags.bag.recording import ReadingError, Recording, open_recording
+from mount_bags.container.mcap_file import McapFile
+from mount_bags.container.stored import StoredFile
+from mount_bags.container.summary import hashed
 
 
 def open_run(path: Path) -> Recording:
@@ -29,17 +33,19 @@ def recording_place(path: Path) -> Path:
     return inside if inside.is_dir() else path
 
 
-def recording_hash(path: Path) -> str:
+def recording_hash(path: Path, opened: Iterable[StoredFile] = ()) -> str:
     """Return the SHA-256 of a file; of a folder that of its MCAP files, in the order of their names.
 
-    Of a folder without any it is that of all its files.
+    Of a folder without any it is that of all its files. `opened` are files of it that are open: what is to
+    be read through of them for their own checksums is read in the same pass.
     """
+    known = {file.path: file for file in opened if isinstance(file, McapFile)}
     digest = hashlib.sha256()
     files = [part for part in path.rglob('*') if part.is_file()] if path.is_dir() else [path]
     parts = sorted(part for part in files if part.match('*.mcap*')) or sorted(files)
-    block = memoryview(bytearray(1 << 18))
     for part in parts:
-        with part.open('rb', buffering=0) as stream:
-            while count := stream.readinto(block):
-                digest.update(block[:count])
+        if part in known:
+            known[part].hashed(digest)
+        else:
+            hashed(part, digest)
     return digest.hexdigest()

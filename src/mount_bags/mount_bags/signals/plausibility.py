@@ -27,7 +27,8 @@ def check_range(even: EvenSignal, value: float, at: float, low: float, high: flo
 
 def check_size(name: str, values: FloatArray, step_time: float, limit: float, unit: str, remedy: str) -> None:
     """Raise `SignalError` with the largest of `values` (n,), `step_time` s apart, if beyond +- `limit`."""
-    place = int(np.argmax(np.abs(values)))
+    ends = (int(values.argmax()), int(values.argmin()))  # no absolute values: they would be an hour once more
+    place = max(ends, key=lambda each: (abs(values[each]), -each))
     if abs(values[place]) <= limit:
         return
     raise SignalError(

@@ -66,6 +66,12 @@ def _storage(order: BenchOrder, say: Callable[[str], None]) -> Figures:
     return dict(zip(('write', 'load'), storage_figures(), strict=False))  # one without `rosbags`
 
 
+def _fleet(order: BenchOrder, say: Callable[[str], None]) -> Figures:
+    from mount_cli.bench.fleet import fleet_figures
+
+    return fleet_figures()
+
+
 def _graph(order: BenchOrder, say: Callable[[str], None]) -> Figures:
     from mount_cli.bench.chain_runs import Place
     from mount_cli.bench.in_real_time import graph_figures
@@ -90,6 +96,7 @@ def _lockstep(order: BenchOrder, say: Callable[[str], None]) -> Figures:
 GROUPS: dict[str, Callable[[BenchOrder, Callable[[str], None]], Figures]] = {
     'calls': _calls,
     'storage': _storage,
+    'fleet': _fleet,
     'lockstep': _lockstep,
     'graph': _graph,
     'rate': _fast,

@@ -82,7 +82,7 @@ MapFiles = Annotated[
 ]
 Dbc = Annotated[
     Path | None,
-    typer.Option('--dbc', metavar='FILE', help='CAN log: the database by which its frames are decoded'),
+    typer.Option('--dbc', metavar='FILE', help='CAN log, or MDF with raw frames: database that decodes them'),
 ]
 Decimal = Annotated[
     str,

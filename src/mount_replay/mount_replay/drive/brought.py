@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mount_bags.run.place import recording_hash
 from mount_bringup.graph.nodes import SIM
 
 FOLDER = 'given'
@@ -37,6 +38,15 @@ def written(
     return settings
 
 
-def provenance(brought: Sequence[Brought]) -> dict[str, Any]:
-    """Return what the session tells: {'given': {parameter: provenance}}, {} where nothing was brought."""
-    return {'given': {each.parameter: dict(each.told) for each in brought}} if brought else {}
+def provenance(brought: Sequence[Brought], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what the session tells: {'given': {parameter: provenance}}, {} where nothing was brought.
+
+    `parameters` are those with the paths of the written files. As paths last no longer than the folder stays
+    where it is, name and hash of what the simulator read are told besides.
+    """
+    given = {}
+    for each in brought:
+        file = Path(parameters[SIM.name][each.parameter])
+        read = {'file': f'{FOLDER}/{file.name}', 'sha256': recording_hash(file)}
+        given[each.parameter] = {**each.told, 'read': read}
+    return {'given': given} if given else {}

@@ -247,7 +247,7 @@ def _grouping(order: DriveOrder) -> Grouping:
 def _session(order: DriveOrder, parameters: Parameters) -> str:
     told = told_parameters(parameters)
     content = {'scenario': order.scenario, 'mode': order.mode, 'parameters': told}
-    return session_text(new_session({**content, **provenance(order.brought)}))
+    return session_text(new_session({**content, **provenance(order.brought, order.parameters)}))
 
 
 def told_parameters(parameters: Parameters) -> dict[str, dict[str, Any]]:

@@ -21,8 +21,8 @@ class StoreWatch:
         self._in_a_row += 1
         if self._in_a_row == IN_A_ROW:
             raise StoreAwayError(
-                f'the store was given up after {IN_A_ROW} recordings in a row: {done.error}; what was done '
-                'stands, and the same command goes on where it stopped'
+                f'the store was given up after {IN_A_ROW} recordings in a row (what was done stands, and the '
+                f'same command goes on where it stopped): {done.error}'
             )
 
 

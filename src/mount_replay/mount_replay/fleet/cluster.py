@@ -32,8 +32,10 @@ def connected(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator
     """
     with _quiet():
         if scheduler == LOCAL:
-            count = min(workers or len(os.sched_getaffinity(0)), tasks)
-            with _processes(count, memory) as cluster, _ended(_client(cluster)) as client:
+            with (
+                _processes(processes_for(workers, tasks), memory) as cluster,
+                _ended(_client(cluster)) as client,
+            ):
                 yield client
             return
         try:
@@ -42,6 +44,11 @@ def connected(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator
             raise SchedulerLostError(f'{scheduler}: no Dask scheduler answers there ({error})') from None
         with _ended(context) as client:
             yield client
+
+
+def processes_for(workers: int, tasks: int) -> int:
+    """Return how many processes of this machine work at a time; `workers` 0 is one for each core."""
+    return min(workers or len(os.sched_getaffinity(0)), tasks)
 
 
 def _client(where: Any) -> 'Client':

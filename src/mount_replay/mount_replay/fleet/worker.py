@@ -6,7 +6,7 @@ import os
 from distributed import Nanny, Worker
 
 _NICENESS = 10  # chosen: who works at the machine comes first
-_LEAVE = 0.5  # s, chosen: so long a process may take to leave by itself before it is killed
+_LEAVE = 0.05  # s, chosen: so long a process may take to leave by itself before it is killed
 
 
 class Process(Nanny):

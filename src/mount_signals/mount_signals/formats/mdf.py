@@ -10,12 +10,13 @@ import numpy as np
 from mount_bags.signals.signal import SignalError
 from mount_signals.extras import required
 from mount_signals.formats.broken import reading
+from mount_signals.formats.can.frames import DecodedFrames
+from mount_signals.formats.can.in_mdf import FRAME, OTHER_FRAMES, frames_in_mdf
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
 
 _SECOND = 1_000_000_000  # ns
 _FRAGMENT = 1 << 22  # B read at once, chosen: an hour at 1 kHz is read within 0.3 GB, and not slower
-_RAW_FRAMES = 'CAN_DataFrame'
 _DATED = 100_000_000  # s since 1970, chosen: an earlier start is a clock that was not set
 
 
@@ -30,20 +31,23 @@ class Mdf:
         _check_head(path)
         with reading(path, 'MDF file'):
             # by a stream: a path would be mapped whole into memory
-            self._file = asammdf.MDF(path.open('rb'), raise_on_multiple_occurrences=False)
+            # frames are decoded by the user's database, by one within the file only where there is none
+            self._file = asammdf.MDF(
+                path.open('rb'),
+                raise_on_multiple_occurrences=False,
+                process_bus_logging=stated.dbc is None,
+            )
             self._file.configure(read_fragment_size=_FRAGMENT)
             self.format = f'MDF {self._file.version}'
             places = list(_places(self._file))
             self._begin = _begin(self._file)
-        self._raw = any(channel.name.startswith(_RAW_FRAMES) for _, _, channel in places)
-        places = [one for one in places if not one[2].name.startswith(_RAW_FRAMES)]
-        if not places:
-            frames = (
-                'raw CAN frames only; decode them by the tool that recorded them, or log BLF'
-                if self._raw
-                else ''
+        raw = any(channel.name == FRAME for _, _, channel in places)
+        places = [one for one in places if not one[2].name.startswith((FRAME, *OTHER_FRAMES))]
+        if not places and not (raw and stated.dbc):
+            frames = 'raw CAN frames; name the database that decodes them with --dbc, as .dbc or .kcd'
+            raise SignalError(
+                f'{path} holds {frames if raw else "no channels; needed are signals over time"}'
             )
-            raise SignalError(f'{path} holds {frames or "no channels"}; needed are signals over time')
         counts = Counter(channel.name for _, _, channel in places)
         full = {
             (group, index): channel.name
@@ -52,18 +56,35 @@ class Mdf:
             for group, index, channel in places
         }
         self._places = [(group, index) for group, index, _ in places]
-        self.headings: Sequence[Heading] = unique([
+        own = [
             Heading(
                 full[group, index], channel.name, channel.unit or _unit_of_conversion(channel), 0, timed=True,
             )
             for group, index, channel in places
-        ])  # fmt: skip
+        ]  # fmt: skip
+        self._frames = self._decoded(stated.dbc) if raw and stated.dbc is not None else None
+        self._decoded_headings = [] if self._frames is None else self._frames.settle()
+        if raw and self._frames is None:
+            self.notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
+        self.headings: Sequence[Heading] = unique([*own, *self._decoded_headings])
 
     def load(self, chosen: Sequence[Heading]) -> list[MeasuredColumn]:
         """Return the chosen channels with their conversions; invalid samples are NaN."""
         times: dict[int, TimeBase] = {}
+        own = [heading for heading in chosen if heading.number < len(self._places)]
         with reading(self._path, 'MDF file'):
-            return [self._column(heading, times) for heading in chosen]
+            found = {heading.number: self._column(heading, times) for heading in own}
+        if self._frames is not None:
+            decoded = [heading for heading in chosen if heading not in own]
+            places = [self._decoded_headings[heading.number - len(self._places)] for heading in decoded]
+            for heading, column in zip(decoded, self._frames.load(places), strict=True):
+                found[heading.number] = heading.measured(column.values, column.time)
+            self.notes += self._frames.notes
+        return [found[heading.number] for heading in chosen]
+
+    def _decoded(self, dbc: Path) -> DecodedFrames:
+        self.reader = 'asammdf, cantools'
+        return frames_in_mdf(self._file, self._path, dbc, self._begin)
 
     def _column(self, heading: Heading, times: dict[int, TimeBase]) -> MeasuredColumn:
         group, index = self._places[heading.number]

@@ -72,7 +72,7 @@ def _opened(path: Path, stated: Stated) -> Content:
 
 def _opener(path: Path) -> Opener:
     """Return what opens a file, by its first bytes, and by its suffix where these do not tell."""
-    from mount_signals.formats import can_log
+    from mount_signals.formats.can import log
     from mount_signals.formats.text.table import TextTable
     from mount_signals.formats.trees import arrays, json_file
 
@@ -88,8 +88,8 @@ def _opener(path: Path) -> Opener:
         return binary
     if is_recording(path):
         return _bag
-    if can_log.is_can_log(path):
-        return can_log.CanLog
+    if log.is_can_log(path):
+        return log.CanLog
     by_suffix: dict[str, Opener] = {
         '.json': json_file.open_json, '.jsonl': json_file.open_json, '.ndjson': json_file.open_json,
         '.npy': arrays.open_npy, '.npz': arrays.open_npz, '.parquet': _parquet, '.xlsx': _excel,

@@ -5,9 +5,9 @@ from dataclasses import asdict
 from pathlib import PurePosixPath
 from typing import Any
 
-from mount_signals.formats.measured import Measured
+from mount_signals.formats.measured import Measured, Provenance
 from mount_signals.sources.uris import is_uri, shown
-from mount_signals.units.columns import place
+from mount_signals.units.columns import name_of
 from mount_signals.units.mapping import Mapping
 from mount_signals.units.signals import ChosenSignal
 
@@ -19,8 +19,12 @@ SCENARIO = 'imported'
 
 def told_source(measured: Measured) -> Told:
     """Return what a session says of a file: its name, URI where it has one, hash, size, format, reader."""
-    came = measured.provenance
-    told: Told = {'file': place(measured)}
+    return told_provenance(measured.provenance)
+
+
+def told_provenance(came: Provenance) -> Told:
+    """Return the same of what a file was, without its content."""
+    told: Told = {'file': name_of(came.uri)}
     if is_uri(came.uri) and not came.uri.startswith('file:'):
         told['uri'] = shown(came.uri)
     told |= {'sha256': came.sha256, 'bytes': came.size, 'format': came.format, 'reader': came.reader}

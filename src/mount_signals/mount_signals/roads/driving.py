@@ -12,6 +12,7 @@ import numpy as np
 from mount_bags.signals.even_grid import EvenSignal
 from mount_bags.signals.resampling import resampled
 from mount_models.road import RandomRoad
+from mount_signals.importing.provenance import told_provenance
 from mount_signals.roads.iso8608 import unevenness
 from mount_signals.roads.long_waves import LONGEST_WAVE, without_long_waves
 from mount_signals.roads.profile import FloatArray, ProfileError, RoadProfile
@@ -147,12 +148,8 @@ def _places(speed: Speed, length: float, step: float, duration: float) -> FloatA
 
 def _told(profile: RoadProfile, speed: Speed, contact: float, *, repeat: bool) -> dict[str, object]:
     found = unevenness(profile)
-    source = profile.provenance
     return {
-        'uri': source.uri,
-        'sha256': source.sha256,
-        'size': source.size,
-        'format': source.format,
+        **told_provenance(profile.provenance),
         'length_m': round(profile.length, 3),
         'spacing_m': round(profile.spacing, 6),
         'iso_8608': f'{found.letter}, Gd {1e6 * found.roughness:.3g}e-6 m^3, waviness {found.waviness:.2f}',

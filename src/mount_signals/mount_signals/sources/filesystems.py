@@ -1,6 +1,7 @@
 """The file systems of fsspec behind the schemes, with this project's limits of time and trust."""
 
 import importlib
+import logging
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
@@ -11,6 +12,7 @@ _CONNECT = 10.0  # s, chosen: within it a server answers, or the connection coun
 _SILENCE = 30.0  # s, chosen: without a byte for so long, it counts as broken
 _SSH = ('sftp', 'ssh')
 _HTTP = ('http', 'https')
+_OF_A_BROKEN_CONNECTION = ('Task exception was never retrieved', 'socket.send() raised exception')
 
 
 def filesystem(uri: str) -> tuple[Any, str]:
@@ -23,6 +25,7 @@ def filesystem(uri: str) -> tuple[Any, str]:
     scheme = scheme_of(checked(uri))
     what = f'reading {shown(uri)}'
     fsspec = required('fsspec', what)
+    logging.getLogger('asyncio').addFilter(_is_told_by_no_error)
     if scheme == 's3':
         required('s3fs', what)
     elif scheme == 'gs':
@@ -73,6 +76,14 @@ def _ssh(scheme: str, uri: str, fsspec: Any) -> tuple[Any, str]:
         options['username'] = unquote(parts.username)
     path = uri.partition('://')[2].partition('/')[2]
     return importlib.import_module('sshfs').SSHFileSystem(**options), f'/{path.rstrip("/")}'
+
+
+def _is_told_by_no_error(record: logging.LogRecord) -> bool:
+    """Return whether what asyncio logs is more than what a connection that broke raises as well.
+
+    A file is read in parallel: the first error is raised, those of the other requests nothing takes up.
+    """
+    return not record.getMessage().startswith(_OF_A_BROKEN_CONNECTION)
 
 
 def _options(scheme: str, fsspec: Any) -> dict[str, Any]:

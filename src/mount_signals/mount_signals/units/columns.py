@@ -95,4 +95,9 @@ def known(measured: Measured) -> str:
 
 def place(measured: Measured) -> str:
     """Return the name of the file, for sentences."""
-    return measured.provenance.uri.rstrip('/').rpartition('/')[2] or measured.provenance.uri
+    return name_of(measured.provenance.uri)
+
+
+def name_of(uri: str) -> str:
+    """Return the last part of a path or URI."""
+    return uri.rstrip('/').rpartition('/')[2] or uri

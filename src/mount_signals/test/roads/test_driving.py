@@ -135,7 +135,7 @@ def test_a_short_road_is_refused_unless_it_is_driven_forth_and_back():
 
 def test_provenance_and_class_go_into_the_session(tmp_path):
     over = wheel_height(wave(), speed_of('20'))
-    assert over.told['uri'] == 'folder/made.csv'
+    assert over.told['file'] == 'made.csv'
     assert over.told['sha256'] == 'aa'
     assert over.told['speed'] == '20 m/s (72 km/h)'
     file = over.write(tmp_path / 'given')

@@ -78,7 +78,7 @@ def replay(
     if json_file is not None:
         write_json(figures, json_file)
     for row in outcome.not_fetched[:_TOLD]:
-        note(console, f'{row["recording"]}: {row["reason"]}; the same command tries it again')
+        note(console, f'{row["recording"]} (the same command tries it again): {row["reason"]}')
     if (others := len(outcome.not_fetched) - _TOLD) > 0:
         note(console, f'{others} more, whose rows tell the reason; the same command tries them again')
     if outcome.not_fetched:

@@ -1,15 +1,21 @@
-"""Ctrl-C amid the work on a fleet: what was done stands."""
+"""Work on a fleet that is ended in the middle: what was done stands."""
 
 import contextlib
 from collections.abc import Iterator
 
 from mount_bringup.graph.errors import Interrupted
 
+_GOES_ON = 'the same command goes on where it stopped'
+
 
 @contextlib.contextmanager
 def resumable() -> Iterator[None]:
-    """Raise `Interrupted` for Ctrl-C, with the sentence that says how the work goes on."""
+    """Say how the work goes on after Ctrl-C (`Interrupted`) and a lost cluster (`SchedulerLostError`)."""
+    from mount_replay.fleet.cluster import SchedulerLostError
+
     try:
         yield
     except KeyboardInterrupt:
-        raise Interrupted('what was done stands, and the same command goes on where it stopped') from None
+        raise Interrupted(f'what was done stands, and {_GOES_ON}') from None
+    except SchedulerLostError as error:
+        raise SchedulerLostError(f'{error}; with this cluster or another one {_GOES_ON}') from None

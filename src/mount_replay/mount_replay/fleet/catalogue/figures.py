@@ -5,24 +5,21 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_bags.audit.audit import TopicAudit, audit
 from mount_bags.audit.losses import losses
-from mount_bags.audit.peak_current import peak_current
+from mount_bags.audit.peak_current import PeakCurrent
+from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import Recording
-from mount_bags.events.switching_changes import switching_places
-from mount_bags.messages.series import Series
 from mount_bags.run.session import recorded_sample_rate
-from mount_replay.fleet.catalogue.columns import BANDS, band_name
-from mount_replay.fleet.catalogue.in_bands import in_bands
+from mount_replay.fleet.catalogue.motion import Motion
+from mount_replay.fleet.catalogue.trace import Trace
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 Figures = dict[str, Any]
 
 OF_FRICTION = ('switched_on', 'damping_s', 'peak_current_a', 'pad_energy_j')
 """What control did to the friction: nothing in a mount without pads or with an open coil driver."""
-_TRACED = ('damping_active', 'velocity', 'friction_coefficient', 'normal_force')
 
 
 def lost_figures(part: Recording) -> tuple[Figures, dict[str, TopicAudit]]:
@@ -49,7 +46,7 @@ def lost_figures(part: Recording) -> tuple[Figures, dict[str, TopicAudit]]:
 def state_figures(part: Recording, audits: Mapping[str, TopicAudit]) -> Figures:
     """Return gaps, temperature, switching, currents and motion, as far as they were recorded."""
     figures: Figures = {}
-    if _has(part, AIR_GAP.name):
+    if _count(part, AIR_GAP.name):
         gap = part[AIR_GAP.name]
         for column, name in (
             ('rest_gap_m', 'rest_gap'),
@@ -57,51 +54,24 @@ def state_figures(part: Recording, audits: Mapping[str, TopicAudit]) -> Figures:
             ('offset_current_a', 'offset_current'),
         ):
             figures[column] = float(gap[name][-1])
-    if _has(part, COIL_TEMPERATURE.name):
+    if _count(part, COIL_TEMPERATURE.name):
         figures['coil_temperature_degc'] = _highest(part[COIL_TEMPERATURE.name]['temperature'])
-    figures['peak_current_a'] = peak_current(part, audits)
-    if _has(part, CONTROL_TRACE.name):
-        part.load_columns({CONTROL_TRACE.name: _TRACED})
-        figures |= _of_trace(part[CONTROL_TRACE.name], 1.0 / recorded_sample_rate(part))
-    if _has(part, DISPLACEMENT.name):
-        part.load_columns({DISPLACEMENT.name: DISPLACEMENT.names})
-        series = part[DISPLACEMENT.name]
-        stamps, first = np.unique(series.stamps, return_index=True)
-        figures |= displacement_figures(stamps, series['mount'][first], recorded_sample_rate(part))
-    return figures
+    peak, trace, motion = PeakCurrent(part, audits), Trace(), Motion(_count(part, DISPLACEMENT.name))
+    columns, takers = dict(peak.columns), dict.fromkeys(peak.columns, peak.add)
+    for topic, taker in ((CONTROL_TRACE, trace), (DISPLACEMENT, motion)):
+        if _count(part, topic.name):
+            name = part.resolve(topic.name)
+            columns[name], takers[name] = taker.COLUMNS, taker.add
+    for found in column_parts(part, columns):
+        takers[found.topic](found)
+    rate = recorded_sample_rate(part)
+    figures['peak_current_a'] = peak.value
+    return figures | trace.figures(1.0 / rate) | motion.figures(rate)
 
 
-def _of_trace(trace: Series, sample_time: float) -> Figures:
-    """Return the switching, and the work of |mu N v| by which the pads wear, mu N being Eq (9)'s friction."""
-    order = np.argsort(trace.stamps, kind='stable')
-    seconds = (trace.stamps[order] - trace.stamps[order[:1]]) * 1e-9
-    active = trace['damping_active'][order]
-    on, _ = switching_places(seconds, active)
-    power = np.abs(trace['friction_coefficient'] * trace['normal_force'] * trace['velocity'])
-    return {
-        'switched_on': len(on),
-        'damping_s': sample_time * int(np.count_nonzero(active > 0.0)),
-        'pad_energy_j': sample_time * float(np.nansum(power)),
-    }
-
-
-def displacement_figures(stamps: NDArray[np.int64], values: NDArray[np.float64], rate: float) -> Figures:
-    """Return the size of a displacement (m) with rising `stamps` (ns), also in bands; `rate` in Hz."""
-    known = values[np.isfinite(values)]
-    if not known.size:
-        return {}
-    figures: Figures = {
-        'peak_displacement_m': float(np.abs(known).max()),
-        'rms_displacement_m': float(np.std(known)),
-    }
-    seconds = (stamps - stamps[0]) * 1e-9
-    for band, found in zip(BANDS, in_bands(seconds, values, rate, BANDS), strict=True):
-        figures |= {band_name('peak', band): found.peak, band_name('rms', band): found.rms}
-    return figures
-
-
-def _has(part: Recording, name: str) -> bool:
-    return name in part and part.topics[part.resolve(name)].message_count > 0
+def _count(part: Recording, name: str) -> int:
+    """Return how many messages there are of a topic."""
+    return part.topics[part.resolve(name)].message_count if name in part else 0
 
 
 def _highest(values: np.ndarray) -> float:

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from mount_bags.messages.compact_times import compact
 from mount_bags.signals.signal import SECOND, Signal
 from mount_models.sampling import SAMPLE_RATE
 from mount_replay.fleet.catalogue.columns import FOREIGN
-from mount_replay.fleet.catalogue.figures import Figures, displacement_figures
+from mount_replay.fleet.catalogue.figures import Figures
+from mount_replay.fleet.catalogue.motion import motion_figures
 from mount_replay.fleet.catalogue.places import Place
 from mount_replay.fleet.catalogue.rows import Row, Rows, named, place_of, reason_of, unreadable
 from mount_replay.fleet.foreign import ACCELERATION, Mapped, Said, columns_in, mapped_in
@@ -78,4 +80,4 @@ def _of(signals: Mapping[str, Signal]) -> Figures:
     values = channels[0].values
     if ACCELERATION in signals:
         return {'rms_acceleration_m_s2': float(np.std(values))}
-    return {'samples': values.size, **displacement_figures(channels[0].stamps, values, SAMPLE_RATE)}
+    return {'samples': values.size, **motion_figures(compact(channels[0].stamps), values, SAMPLE_RATE)}

@@ -1,11 +1,13 @@
 """What a signal is in bands of frequency: filtered piece by piece, so that its length costs no memory."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mount_bags.messages.compact_times import CompactTimes
 
 FloatArray = NDArray[np.float64]
 
@@ -21,29 +23,69 @@ class InBand(NamedTuple):
 
 
 def in_bands(
-    time: FloatArray, values: FloatArray, rate: float, bands: Sequence[tuple[float, float]]
+    stamps: CompactTimes, values: FloatArray, rate: float, bands: Sequence[tuple[float, float]]
 ) -> list[InBand]:
     """Return peak and rms of a signal (n,) in each band (Hz), NaN where it is too short for one.
 
-    `time` (s) rises. The signal is taken at even steps of `rate` (Hz), unknown and missing samples on a
+    The stamps (ns) rise. The signal is taken at even steps of `rate` (Hz), unknown and missing samples on a
     straight line between their neighbours, less its first value; it passes a causal Butterworth band-pass.
     """
-    from scipy import signal
-
     known = np.isfinite(values)
-    if not known.all():
-        time, values = time[known], values[known]
-    count = math.floor((time[-1] - time[0]) * rate + 0.5) + 1 if len(time) > 1 else 0
-    found = []
-    for low, high in bands:
-        if count < rate / low:  # less than one period of its lowest frequency
-            found.append(InBand(math.nan, math.nan))
-            continue
-        sections = signal.butter(_ORDER, (low, high), 'bandpass', fs=rate, output='sos')
-        state, peak, square = np.zeros((len(sections), 2)), 0.0, 0.0
-        for begin in range(0, count, _PIECE):
-            grid = time[0] + np.arange(begin, min(begin + _PIECE, count)) / rate
-            passed, state = signal.sosfilt(sections, np.interp(grid, time, values) - values[0], zi=state)
-            peak, square = max(peak, float(np.abs(passed).max())), square + float(np.sum(passed**2))
-        found.append(InBand(peak, math.sqrt(square / count)))
-    return found
+    ends = np.array([0, np.argmax(known), len(known) - 1 - np.argmax(known[::-1])])
+    times = stamps.at(ends)
+    first, last = ((times[1:] - times[0]) * 1e-9).tolist()
+    count = math.floor((last - first) * rate + 0.5) + 1 if last > first else 0
+    passes = [_Pass(band, rate) if count >= rate / band[0] else None for band in bands]
+    if any(passes):
+        for moved in _evenly(_samples(stamps, values), first, rate, count):
+            for each in passes:
+                if each is not None:
+                    each.take(moved - values[ends[1]])
+    # less than one period of its lowest frequency is too short
+    return [InBand(math.nan, math.nan) if each is None else each.found(count) for each in passes]
+
+
+class _Pass:
+    """A band-pass, and what came through it."""
+
+    def __init__(self, band: tuple[float, float], rate: float):
+        from scipy import signal
+
+        self._sections = signal.butter(_ORDER, band, 'bandpass', fs=rate, output='sos')
+        self._state, self._peak, self._square = np.zeros((len(self._sections), 2)), 0.0, 0.0
+
+    def take(self, values: FloatArray) -> None:
+        from scipy import signal
+
+        passed, self._state = signal.sosfilt(self._sections, values, zi=self._state)
+        self._peak = max(self._peak, float(np.abs(passed).max()))
+        self._square += float(np.sum(passed**2))
+
+    def found(self, count: int) -> InBand:
+        return InBand(self._peak, math.sqrt(self._square / count))
+
+
+def _samples(stamps: CompactTimes, values: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield times (s from the first stamp) and values of the samples that are known."""
+    begin, zero = 0, stamps.block(0)[0]
+    for block in stamps.blocks():
+        piece = values[begin : begin + len(block)]
+        begin += len(block)
+        known = np.isfinite(piece)
+        yield ((block - zero) * 1e-9)[known], piece[known]
+
+
+def _evenly(
+    samples: Iterator[tuple[FloatArray, FloatArray]], first: float, rate: float, count: int
+) -> Iterator[FloatArray]:
+    """Yield `count` values at even steps from the time `first` (s) on."""
+    time, values = np.empty(0), np.empty(0)
+    for begin in range(0, count, _PIECE):
+        grid = first + np.arange(begin, min(begin + _PIECE, count)) / rate
+        behind = max(int(np.searchsorted(time, grid[0], side='right')) - 1, 0)
+        times, pieces = [time[behind:]], [values[behind:]]
+        while not (times[-1].size and times[-1][-1] > grid[-1]) and (found := next(samples, None)):
+            times.append(found[0])
+            pieces.append(found[1])
+        time, values = np.concatenate(times), np.concatenate(pieces)
+        yield np.interp(grid, time, values)

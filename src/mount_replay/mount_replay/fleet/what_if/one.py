@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.place import open_run, recording_hash, recording_place
+from mount_bags.bag.recording import Recording, open_recording
+from mount_bags.run.place import recording_hash, recording_place
 from mount_bags.run.versions import versions
 from mount_replay.fleet.catalogue.places import Place
 from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
@@ -82,20 +82,21 @@ def _foreign_row(asked: Place, path: Path, changes: Changes, closed_loop: bool, 
         mapped = mapped_in(path, said)
         row |= mapped.told
         with as_recording(mapped, closed_loop=closed_loop) as place:
-            row |= _figures(open_run(place), changes, closed_loop) | {'recorded_with': ''}
+            row |= _figures(open_recording(place), changes, closed_loop) | {'recorded_with': ''}
     except ValueError as error:
         row['reason'] = _told(error, asked, path)
     return row
 
 
 def _rows(asked: Place, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
-    whole = {'sha256': recording_hash(recording_place(path))}
+    place = recording_place(path)
     try:
-        mounts = open_run(path).by_mount()
+        opened = open_recording(place)
     except ValueError as error:
-        return [{**whole, 'mount': '', 'reason': _told(error, asked, path)}]
+        return [{'sha256': recording_hash(place), 'mount': '', 'reason': _told(error, asked, path)}]
+    whole = {'sha256': recording_hash(place, opened.files)}
     rows = []
-    for recording in mounts:
+    for recording in opened.by_mount():
         row = {**whole, 'mount': recording.mount}
         try:
             row |= _figures(recording, changes, closed_loop)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mount_bags.run.versions import versions
 from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.places import Place, root_of
-from mount_replay.fleet.cluster import LOCAL
+from mount_replay.fleet.cluster import LOCAL, processes_for
 from mount_replay.fleet.foreign import NOTHING_SAID, Said
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.fleet.what_if.asked import recordings_asked
@@ -69,7 +69,10 @@ class Advance:
 
 @dataclass(frozen=True)
 class FleetOutcome:
-    """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs."""
+    """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs.
+
+    `starting`: until the first recording was done, in which processes start and load libraries and laws.
+    """
 
     table: 'pyarrow.Table'
     result: Path
@@ -77,6 +80,7 @@ class FleetOutcome:
     before: int
     failed: int
     wall: float
+    starting: float
     busy: float
     replayed: float
     workers: int
@@ -89,6 +93,7 @@ class FleetOutcome:
             'failed': self.failed,
             'done_before': self.before,
             'wall_s': self.wall,
+            'starting_s': self.starting,
             'processor_s': self.busy,
             'replayed_s': self.replayed,
             'real_time_factor_per_core': self.replayed / (self.wall * self.workers) if self.workers else None,
@@ -127,9 +132,10 @@ def replay_fleet(
         before=len(asked) - len(left),
         failed=len({row['recording'] for row in table.to_pylist() if row['reason']}),
         wall=time.monotonic() - begin,
+        starting=run.starting,
         busy=run.busy,
         replayed=run.replayed,
-        workers=len(run.workers),
+        workers=run.at_a_time,
         not_fetched=run.not_fetched,
     )
 
@@ -153,8 +159,10 @@ class _Run:
         self._recordings = 0
         self.not_fetched: list[Row] = []
         """Rows of what could not be read this time: the same order tries it again."""
-        self.busy = self.replayed = 0.0
-        self.workers: set[str] = set()
+        self.starting = self.busy = self.replayed = 0.0
+        self._processes: set[str] = set()
+        self.at_a_time = 0
+        """How many workers there were."""
 
     def through(self, scheduler: str, workers: int) -> None:
         """Replay all that is left; what is done is written, whatever ends this."""
@@ -165,9 +173,11 @@ class _Run:
             for count, done in enumerate(
                 run_tasks(work, self._left, scheduler=scheduler, workers=workers), 1
             ):
+                now = time.monotonic()
+                if count == 1:
+                    self.starting = now - begin
                 self._take(self._left[done.place], done)
                 watch.take(done)
-                now = time.monotonic()
                 if now - written >= _WRITTEN_AFTER or self._recordings >= _WRITTEN_TOGETHER:
                     self._write()
                     written = now
@@ -176,6 +186,9 @@ class _Run:
                 )
         finally:
             self._write()
+        self.at_a_time = len(self._processes)
+        if scheduler == LOCAL:  # where one was lost, another one took its place
+            self.at_a_time = min(self.at_a_time, processes_for(workers, len(self._left)))
 
     def _take(self, asked: Place, done: Done[Replayed]) -> None:
         replayed = done.result
@@ -189,7 +202,7 @@ class _Run:
             row |= told_of(self._order.changes, self._order.closed_loop)
             replayed = Replayed((row,), False, 0.0, '')
         self.busy += replayed.busy
-        self.workers |= {replayed.worker} - {''}
+        self._processes |= {replayed.worker} - {''}
         self.replayed += max((row.get('duration_s') or 0.0 for row in replayed.rows), default=0.0)
         self._failed += any(row['reason'] for row in replayed.rows)
         if not replayed.fetched:

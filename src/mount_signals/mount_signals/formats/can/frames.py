@@ -1,4 +1,4 @@
-"""CAN logs (BLF, ASC, TRC, candump) decoded by a user's database: a column for each signal."""
+"""Frames of CAN buses by message, decoded by a user's database: a column for each signal."""
 
 from array import array
 from collections import Counter
@@ -11,9 +11,10 @@ import numpy as np
 
 from mount_bags.signals.signal import SignalError
 from mount_signals.formats.broken import reading
-from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
 
+EXTENDED = 0x80000000
+"""Set in the keys of extended identifiers."""
 _SECOND = 1_000_000_000  # ns
 _DATED = 1e8  # s, chosen: no recording is three years long, so that later times count from 1970
 _NAMED = 5  # unknown identifiers in a note, chosen
@@ -27,44 +28,49 @@ class _Frames:
     lengths: array = field(default_factory=lambda: array('H'))
     payloads: bytearray = field(default_factory=bytearray)
 
-    def add(self, time: float, data: bytes) -> None:
-        """Take a frame."""
-        self.times.append(time)
-        self.lengths.append(len(data))
-        self.payloads += data
 
+class DecodedFrames:
+    """Frames as they are read, then each message of the database that occurs as `Message.Signal`.
 
-class CanLog:
-    """A log of CAN frames, each message of the database that occurs as `Message.Signal`."""
+    `begin` (ns since 1970, or 0) is when times begin that do not count from 1970 themselves.
+    """
 
-    def __init__(self, path: Path, stated: Stated):
-        from mount_driver.can_library import can
-
-        self.format, self.reader, self.notes = f'CAN log {path.suffix.lower()}', 'python-can, cantools', []
-        self._path = path
-        if stated.dbc is None:
-            raise SignalError(
-                f'{path} holds CAN frames; name the database that decodes them with --dbc (.dbc, .arxml, '
-                '.kcd)'
-            )
-        self._database = _database(stated.dbc)
+    def __init__(self, path: Path, dbc: Path, begin: int = 0):
+        self._path, self._dbc, self._zero = path, dbc, begin
+        self._database = _database(dbc)
         self._frames: dict[tuple[str, int], _Frames] = {}
-        self._unknown: Counter[str] = Counter()
-        other = 0
-        arguments = {'relative_timestamp': False} if path.suffix.lower() == '.asc' else {}
-        with reading(path, 'CAN log'), can.LogReader(str(path), **arguments) as reader:
-            for frame in reader:
-                if frame.is_error_frame or frame.is_remote_frame:
-                    other += 1
-                else:
-                    self._take(frame)
-        if other:
-            self.notes.append(f'{other} error and remote frames are left out')
-        self._tell_unknown(stated.dbc)
+        self._unknown: Counter[int] = Counter()
+        self.notes: list[str] = []
+
+    def take(self, channel: str, key: int, time: float, data: bytes) -> None:
+        """Take a frame: bus, identifier (see `EXTENDED`), time (s) and payload."""
+        if key not in self._database:
+            self._unknown[key] += 1
+            return
+        frames = self._frames.setdefault((channel, key), _Frames())
+        frames.times.append(time)
+        frames.lengths.append(len(data))
+        frames.payloads += data
+
+    def take_many(
+        self, channel: str, key: int, times: np.ndarray, lengths: np.ndarray, payloads: bytes
+    ) -> None:
+        """Take frames of one message at once: times (n,) in s, sizes (n,), bytes in a row."""
+        if key not in self._database:
+            self._unknown[key] += times.size
+            return
+        frames = self._frames.setdefault((channel, key), _Frames())
+        frames.times.frombytes(np.asarray(times, np.float64).tobytes())
+        frames.lengths.frombytes(np.asarray(lengths, np.uint16).tobytes())
+        frames.payloads += payloads
+
+    def settle(self) -> Sequence[Heading]:
+        """Return which signals there are, after the last frame; raises `SignalError` where there are none."""
+        self._tell_unknown(self._dbc)
         self._signals = self._found_signals()
-        self.headings: Sequence[Heading] = unique([one.heading for one in self._signals])
         self._dated = all(frames.times[0] > _DATED for frames in self._frames.values())
         self._begin = min((frames.times[0] for frames in self._frames.values()), default=0.0)
+        return unique([one.heading for one in self._signals])
 
     def load(self, chosen: Sequence[Heading]) -> list[MeasuredColumn]:
         """Return the chosen signals at the times of their frames; frames that do not decode are counted."""
@@ -86,14 +92,6 @@ class CanLog:
             found.append(heading.measured(values[present], shared[place]))
         return found
 
-    def _take(self, frame: Any) -> None:
-        key = frame.arbitration_id | (0x80000000 if frame.is_extended_id else 0)
-        if key not in self._database:
-            self._unknown[f'0x{frame.arbitration_id:X}'] += 1
-            return
-        channel = '' if frame.channel is None else str(frame.channel)
-        self._frames.setdefault((channel, key), _Frames()).add(frame.timestamp, bytes(frame.data))
-
     def _tell_unknown(self, dbc: Path) -> None:
         if not self._frames:
             raise SignalError(
@@ -107,7 +105,9 @@ class CanLog:
             )
 
     def _told_unknown(self) -> str:
-        return ', '.join(f'{name} ({count})' for name, count in self._unknown.most_common(_NAMED))
+        return ', '.join(
+            f'0x{key & ~EXTENDED:X} ({count})' for key, count in self._unknown.most_common(_NAMED)
+        )
 
     def _found_signals(self) -> list['_Signal']:
         channels = Counter(key for _, key in self._frames)
@@ -145,7 +145,7 @@ class CanLog:
     def _time(self, times: np.ndarray, signal: '_Signal') -> TimeBase:
         told = f'times of the frames of {signal.heading.name.rpartition(".")[0]}'
         if not self._dated:
-            return TimeBase(times.copy(), 0, told)
+            return TimeBase(times.copy(), self._zero, told)
         return TimeBase(times - self._begin, round(self._begin * _SECOND), told)
 
 
@@ -156,20 +156,6 @@ class _Signal:
     heading: Heading
 
 
-def is_can_log(path: Path) -> bool:
-    """Return whether a text file is a log of CAN frames: ASC and candump share their suffixes with tables."""
-    suffix = path.suffix.lower()
-    if suffix in ('.blf', '.trc'):
-        return True
-    if suffix not in ('.asc', '.log'):
-        return False
-    with path.open('rb') as file:
-        head = file.read(4096).decode('latin-1')
-    if suffix == '.asc':
-        return any(line.startswith(('date ', 'base hex', 'base dec')) for line in head.splitlines())
-    return any(line.startswith('(') and '#' in line for line in head.splitlines()[:5])
-
-
 def _database(dbc: Path) -> dict[int, Any]:
     """Return the messages of a database by identifier, bit 31 set in extended ones."""
     from mount_driver.can_library import cantools
@@ -177,4 +163,4 @@ def _database(dbc: Path) -> dict[int, Any]:
     with reading(dbc, 'database of CAN messages', 'give a .dbc, .arxml, .kcd or .sym file'):
         database = cantools.database.load_file(str(dbc), strict=False)
         messages = database.messages
-    return {one.frame_id | (0x80000000 if one.is_extended_frame else 0): one for one in messages}
+    return {one.frame_id | (EXTENDED if one.is_extended_frame else 0): one for one in messages}

@@ -1,0 +1,59 @@
+"""What the supervisor makes of what the nodes tell on `/diagnostics`."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from mount_bringup.graph.errors import GraphError
+from mount_bringup.graph.nodes import CONTROL, DRIVER, SIMULATED
+from mount_bringup.graph.verdicts import Verdicts
+
+
+@pytest.fixture
+def verdicts():
+    """The verdicts of a graph in the namespace `car`."""
+    return Verdicts(SIMULATED, '/car')
+
+
+def tell(verdicts, name, sentence='', **figures):
+    values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
+    status = DiagnosticStatus(name=name, level=DiagnosticStatus.ERROR, message=sentence, values=values)
+    verdicts.take(DiagnosticArray(status=[status]))
+
+
+def test_what_a_node_calls_fatal_ends_the_graph_with_its_sentence(verdicts):
+    tell(verdicts, 'car/mount_driver', 'coil switched off', fatal=False)
+    verdicts.check_fatal()
+    tell(verdicts, 'car/mount_driver', 'coil switched off: over_current', fatal=True)
+    with pytest.raises(GraphError, match=r'^mount_driver: coil switched off: over_current$'):
+        verdicts.check_fatal()
+
+
+@pytest.mark.parametrize(
+    'name', ['mount_driver', 'bus/mount_driver', 'car/left/mount_driver', 'car/gearbox_driver']
+)
+def test_nodes_of_others_end_no_graph(verdicts, name):
+    tell(verdicts, name, 'broken', fatal=True, needs_initialisation=True)
+    verdicts.check_fatal()
+    assert verdicts.needing_initialisation() == ''
+
+
+def test_who_asks_for_an_initialisation_is_named_until_it_is_forgotten(verdicts):
+    tell(verdicts, 'car/mount_driver', 'counters jumped', needs_initialisation=True)
+    assert verdicts.needing_initialisation() == 'mount_driver: counters jumped'
+    verdicts.forget(DRIVER)
+    assert verdicts.needing_initialisation() == ''
+
+
+@pytest.mark.parametrize(
+    ('driver', 'control', 'silent'), [(7, 6, CONTROL), (6, 6, DRIVER), ('none', 7, DRIVER), (7, 7, None)]
+)
+def test_the_first_node_that_has_not_handled_the_waiting_sample_does_not_answer(
+    verdicts, driver, control, silent
+):
+    tell(verdicts, 'car/mount_driver', last_stamp=driver)
+    tell(verdicts, 'car/mount_control', last_stamp=control)
+    tell(verdicts, 'car/mount_sim', 'sample 3 was not answered', fatal=True, waiting_stamp=7)
+    with pytest.raises(GraphError) as caught:
+        verdicts.check_fatal()
+    blamed = f'; {silent.name} does not answer' if silent else ''
+    assert str(caught.value) == f'mount_sim: sample 3 was not answered{blamed}'

@@ -1,0 +1,84 @@
+"""What a recorded second costs in `fleet replay`, reading from local disk included, and where it goes."""
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+from mount_bags.bag.column_parts import column_parts
+from mount_bags.bag.recording import open_recording
+from mount_bags.run.place import recording_hash
+from mount_cli.bench.comparison import Comparison
+from mount_replay.fleet.catalogue.places import Place, places
+from mount_replay.fleet.example.fleet import make_one, whole_fleet
+from mount_replay.fleet.example.variations import VARIATIONS
+from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
+from mount_replay.fleet.what_if.one import replay_one
+from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
+
+_RECORDINGS = 3  # chosen: the plain ones of the first drives; all topics of the simulator are in them
+_SECONDS = 20.0  # s, chosen: of each excitation
+_ROUNDS = 7
+_CHANGE = {'mount_control': {'highest_current': 2.0}}
+_COLUMNS = {
+    DISPLACEMENT.name: DISPLACEMENT.names,
+    CURRENT_SETPOINT.name: CURRENT_SETPOINT.names,
+    CONTROL_TRACE.name: ('displacement', 'bridged_samples', 'velocity', 'friction_deflection'),
+}
+
+
+def fleet_figures(seconds: float = _SECONDS, rounds: int = _ROUNDS) -> dict[str, Comparison]:
+    """Return the processor time (s) for a recorded second: of all beside real time, of the stages beside all.
+
+    `seconds` is the length of the excitations. A second counts where the controller was at work, as in the
+    figures of `fleet replay`; what a process does once, such as to load the compiled laws, does not.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        for order in islice(whole_fleet(Path(folder)), 0, _RECORDINGS * len(VARIATIONS), len(VARIATIONS)):
+            make_one(replace(order, seconds=seconds))
+        found = list(places([folder]).values())
+        recorded = sum(row['duration_s'] for place in found for row in replay_one(place, _CHANGE).rows)
+        times = [_stages(found) for _ in range(rounds)]
+    whole, *stages = (statistics.median(each) / recorded for each in zip(*times, strict=True))
+    figures = {'fleet': Comparison('a recorded second in fleet replay', whole, 'real time', 1.0)}
+    for (name, what), stage in zip(_STAGES.items(), stages, strict=True):
+        figures[f'fleet_{name}'] = Comparison(f'of it {what}', stage, 'all of it', whole)
+    return figures
+
+
+_STAGES = {
+    'open': 'to open it and take its checksums',
+    'beside': 'what it says beside its samples',
+    'columns': 'its columns out of the chunks',
+    'control': 'two controllers, and figures',
+}
+
+
+def _stages(found: Sequence[Place]) -> tuple[float, ...]:
+    """Return the processor time (s) of all replays, and of each of `_STAGES`."""
+    whole = sum(_time(partial(replay_one, place, _CHANGE)) for place in found)
+    stages = [_stages_of_one(Path(place.uri)) for place in found]
+    return whole, *(sum(each) for each in zip(*stages, strict=True))
+
+
+def _stages_of_one(path: Path) -> tuple[float, ...]:
+    def opened() -> None:
+        recording_hash(path, open_recording(path).files)
+
+    recording = open_recording(path)
+    recording_hash(path, recording.files)
+    beside = _time(lambda: recorded_in(recording))
+    recorded = recorded_in(recording)
+    columns = _time(lambda: sum(len(part) for part in column_parts(recording, _COLUMNS)))
+    compared = _time(lambda: compared_setpoints(recorded, _CHANGE))
+    return _time(opened), beside, columns, compared - columns
+
+
+def _time(call: Callable[[], object]) -> float:
+    begin = time.process_time()
+    call()
+    return time.process_time() - begin

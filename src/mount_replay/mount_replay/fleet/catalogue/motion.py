@@ -1,0 +1,70 @@
+"""What the displacement of a recording was, collected part by part."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mount_bags.bag.column_parts import ColumnPart
+from mount_bags.messages.compact_times import BLOCK, CompactTimes, compact
+from mount_bags.messages.stamps import FARTHEST, misdated
+from mount_replay.fleet.catalogue.columns import BANDS, band_name
+from mount_replay.fleet.catalogue.in_bands import FloatArray, in_bands
+from mount_ros.topics import DISPLACEMENT
+
+
+class Motion:
+    """Stamps and displacement of all samples: some 10 bytes each."""
+
+    COLUMNS = DISPLACEMENT.names
+
+    def __init__(self, expected: int = 0):
+        """Make room for the samples that are expected; more may come."""
+        self._stamps = CompactTimes()
+        self._values = np.empty(expected)
+        self._count = 0
+
+    def add(self, part: ColumnPart) -> None:
+        """Take a part of the topic."""
+        begin, self._count = self._count, self._count + len(part)
+        if self._count > len(self._values):
+            self._values = np.concatenate([self._values[:begin], np.empty(self._count)])
+        self._values[begin : self._count] = part.column(DISPLACEMENT.names[0])
+        self._stamps.add(part.stamps)
+
+    def figures(self, rate: float) -> dict[str, Any]:
+        """Return peak and rms, of the whole displacement and in bands, {} where none is known."""
+        return motion_figures(*self._by_stamps(), rate)
+
+    def _by_stamps(self) -> tuple[CompactTimes, FloatArray]:
+        """Return the samples in the order of their stamps, of several with the same stamp the first.
+
+        Those that are misdated are left out: between them and the others there is nothing to look at.
+        """
+        stamps, values = self._stamps.finished(), self._values[: self._count]
+        if stamps.longest_step > FARTHEST:
+            told = stamps.whole()
+            sound = ~misdated(told)
+            stamps, values = compact(told[sound]), values[sound]
+        if all(bool((steps > 0).all()) for steps in stamps.steps()):
+            return stamps, values
+        found, first = np.unique(stamps.whole(), return_index=True)
+        return compact(found), values[first]
+
+
+def motion_figures(stamps: CompactTimes, values: FloatArray, rate: float) -> dict[str, Any]:
+    """Return peak and rms of displacements (m) with rising stamps, as a whole and in bands; `rate` in Hz."""
+    pieces = [values[begin : begin + BLOCK] for begin in range(0, len(values), BLOCK)]
+    known = [piece[np.isfinite(piece)] for piece in pieces]
+    count = sum(map(len, known))
+    if not count:
+        return {}
+    mean = math.fsum(float(piece.sum()) for piece in known) / count
+    square = math.fsum(float(np.square(piece - mean).sum()) for piece in known)
+    figures: dict[str, Any] = {
+        'peak_displacement_m': max(float(np.abs(piece).max()) for piece in known if piece.size),
+        'rms_displacement_m': math.sqrt(square / count),
+    }
+    for band, found in zip(BANDS, in_bands(stamps, values, rate, BANDS), strict=True):
+        figures |= {band_name('peak', band): found.peak, band_name('rms', band): found.rms}
+    return figures
