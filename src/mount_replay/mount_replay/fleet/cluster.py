@@ -147,6 +147,8 @@ def _quiet() -> Iterator[None]:
     """Keep Dask's log to itself: what a user needs to know comes with the results."""
     import distributed  # noqa: F401  # it sets its levels when it is loaded
 
+    # It is never heard: at exit it tells of processes that were killed a moment ago.
+    logging.getLogger('distributed.process').setLevel(logging.CRITICAL)
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
