@@ -1,11 +1,15 @@
 """Every format in every command, each cell a file by a writer that is not of this project."""
 
+import json
+
 import numpy as np
 import pytest
+import yaml
 from command import done
 
 import mount_bags
 from mount_bags.run.session import recorded_session, session_content
+from mount_replay import fleet
 from mount_signals.testing import MAKERS
 
 TIMES = np.arange(400) / 200.0  # s: 200 Hz, as vehicles record
@@ -69,6 +73,36 @@ def test_import(made, tmp_path):
     assert recording['displacement']['mount'][::5][40:360] == pytest.approx(TRAVEL[40:360], abs=2e-6)
     acceleration = recording['sim/chassis_acceleration']['linear_acceleration.z']
     assert acceleration[::5][40:360] == pytest.approx(SHAKING[40:360] + GRAVITY, abs=2e-4)
+
+
+@each_format
+def test_fleet_index(made, tmp_path):
+    files = tmp_path / 'drives'
+    files.mkdir()
+    for part in tmp_path.glob('drive*'):
+        if part != files and part.suffix != '.dbc':
+            part.rename(files / part.name)
+    choices = {'displacement': 'travel', 'acceleration': 'az'}
+    columns = {
+        name: {'column': made.names[own]} | ({} if made.units else {'unit': UNITS[own]})
+        for name, own in choices.items()
+    }
+    rate = {} if made.stated.rate is None else {'time': {'rate': made.stated.rate}}
+    (tmp_path / 'system.yaml').write_text(yaml.safe_dump({'columns': columns} | rate), encoding='utf-8')
+    dbc = [] if made.stated.dbc is None else ['--dbc', made.stated.dbc]
+    order = ['--map', tmp_path / 'system.yaml', *dbc, '--out', tmp_path / 'catalogue', '--workers', 1]
+    done('fleet', 'index', files, *order)
+    (row,) = fleet.query(tmp_path / 'catalogue', 'select * from recordings').to_pylist()
+    assert (row['kind'], row['reason']) == ('foreign', '')
+    assert json.loads(row['mapped']) == {name: made.names[own] for name, own in choices.items()}
+    units = json.loads(row['columns'])
+    if made.units:
+        assert sorted(unit for unit in units.values() if unit in UNITS.values()) == ['g', 'mm']
+    assert row['rate_hz'] == pytest.approx(200.0)
+    assert row['duration_s'] == pytest.approx(TIMES[-1])
+    assert row['rms_displacement_m'] == pytest.approx(TRAVEL.std(), rel=0.01)
+    assert row['rms_3_14_hz_m'] == pytest.approx(TRAVEL.std(), rel=0.15)
+    assert row['rms_acceleration_m_s2'] == pytest.approx(SHAKING.std(), rel=0.02)
 
 
 def test_what_was_imported_goes_through_the_other_commands(tmp_path):

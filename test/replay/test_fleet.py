@@ -5,6 +5,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
@@ -19,6 +20,7 @@ from served_stores import Bucket, know_host, name_s3_store, s3_server, sftp_stor
 
 SETTINGS = {'continuous_viscous.full_amplitude': 0.0006}
 RECORDINGS = 12
+OF_THE_PLACE = ('uri', 'fingerprint')
 
 
 @pytest.fixture(scope='module')
@@ -58,6 +60,12 @@ def table_of(folder):
     return (folder / 'result' / 'result.parquet').read_bytes()
 
 
+def catalogue_of(folder):
+    """Return both tables of a catalogue without what tells where the recordings lie."""
+    tables = [pq.read_table(folder / 'catalogue' / f'{name}.parquet') for name in ('recordings', 'events')]
+    return [table.drop([name for name in OF_THE_PLACE if name in table.schema.names]) for table in tables]
+
+
 def run(*arguments):
     ended = CliRunner().invoke(app, ['fleet', *map(str, arguments)], catch_exceptions=False)
     assert ended.exit_code == 0, ended.output
@@ -90,6 +98,7 @@ def test_a_store_of_objects_gives_the_bytes_of_the_disk(drives, local, tmp_path,
                 bucket.put(f'2026/{file.relative_to(drives)}', file.read_bytes())
         folder = asked('s3://drives/2026', tmp_path, workers=2)
         assert table_of(folder) == table_of(local)
+        assert catalogue_of(folder) == catalogue_of(local)
         worst = run('worst', folder / 'result', '--by', 'setpoint_difference_rms_a', '--count', 1)
         assert 'engine-mount report s3://drives/2026/' in worst
 
@@ -102,6 +111,7 @@ def test_an_sftp_server_gives_the_bytes_of_the_disk(drives, local, tmp_path, hom
         know_host(home, port)
         folder = asked(f'sftp://127.0.0.1:{port}/drives', tmp_path, workers=2)
         assert table_of(folder) == table_of(local)
+        assert catalogue_of(folder) == catalogue_of(local)
 
 
 def test_the_commands_ask_and_report(local):

@@ -164,6 +164,7 @@ def gone_on_with(drives, folder, whole, done=None):
     """Let the command go on without being ended, and hold its table against the uninterrupted one."""
     again = command(folder, drives, 0, 0, '--json', folder / 'figures.json')
     assert again.returncode == 0, again.stderr
+    assert 'distributed' not in again.stdout + again.stderr
     before = json.loads((folder / 'figures.json').read_text())['done_before']
     assert DONE <= before < len(NAMES)
     assert done in (None, before)

@@ -25,6 +25,7 @@ from mount_ros.testing import wait_until
         ('mount_recorder', 1, True, 'mount_recorder ended with code 1'),
         (SUPERVISOR, 0, False, ''),
         (SUPERVISOR, 1, False, 'mount_supervisor ended with code 1, for the reason that it has told'),
+        (SUPERVISOR, -9, False, 'mount_supervisor ended with code -9'),
     ],
 )
 def test_a_process_that_ends_unasked_or_badly_is_a_fault_with_its_name(name, code, asked, error):

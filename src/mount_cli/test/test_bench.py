@@ -8,7 +8,7 @@ import time
 import pytest
 from typer.testing import CliRunner
 
-from mount_cli.bench import bench
+from mount_cli.bench import bench, fleet
 from mount_cli.bench.chain_runs import Place, relay_in_turn
 from mount_cli.bench.comparison import Comparison
 from mount_cli.bench.processes import children, memory, processor_time
@@ -41,6 +41,15 @@ def test_only_the_groups_asked_for_are_measured_and_written(tmp_path, monkeypatc
 def test_an_unknown_group_is_refused_with_the_known_ones():
     with pytest.raises(ValueError, match="'graphs' is no group of bench; known are calls, storage"):
         bench.print_bench(bench.BenchOrder(only=('graphs',)), None)
+
+
+def test_the_stages_of_a_replayed_second_stand_beside_all_of_it(monkeypatch):
+    monkeypatch.setattr(fleet, '_RECORDINGS', 1)
+    figures = fleet.fleet_figures(seconds=4.0, rounds=1)
+    whole = figures.pop('fleet')
+    assert (whole.other_name, whole.other) == ('real time', 1.0)
+    assert set(figures) == {'fleet_open', 'fleet_beside', 'fleet_columns', 'fleet_control'}
+    assert all(stage.other == whole.ours > 0.0 for stage in figures.values())
 
 
 def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain):

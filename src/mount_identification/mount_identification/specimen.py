@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from mount_identification.actuator.fit import ForceLawFit
-from mount_identification.coil.gap_calibration import CurveFit, GapCalibration
+from mount_identification.coil.curve_fit import CurveFit
+from mount_identification.coil.gap_calibration import GapCalibration
 from mount_identification.friction.found import Identification, chosen_fit
 from mount_identification.friction.recording import IdentificationError
 from mount_identification.rack.columns import RackRecordingError

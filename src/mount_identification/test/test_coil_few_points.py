@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 
 from mount_identification.coil.few_points import InductanceTable, TableError, levels_of_all
-from mount_identification.coil.gap_calibration import (
-    RippleRecording,
-    calibrate_gap_curves,
-    in_steps,
-    measured_point,
-)
+from mount_identification.coil.gap_calibration import calibrate_gap_curves
+from mount_identification.coil.gap_point import RippleRecording, in_steps, measured_point
 from mount_identification.coil.inductance import GapOrder, calibrate_inductance
 from mount_identification.coil.unique_region import unique_region
 from mount_identification.rack.columns import RackRecordingError

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from mount_identification.coil.gap_calibration import GapPoint, calibrate_gap_curves
+from mount_identification.coil.gap_calibration import calibrate_gap_curves
+from mount_identification.coil.gap_point import GapPoint
 from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.gap import (
     GapCurvesRefusedError,

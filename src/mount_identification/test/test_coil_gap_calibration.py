@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mount_identification.coil.gap_calibration import RippleRecording, calibrate_gap_curves, measured_point
+from mount_identification.coil.gap_calibration import calibrate_gap_curves
+from mount_identification.coil.gap_point import RippleRecording, measured_point
 from mount_identification.coil.temperature_fit import (
     gap_reluctance,
     measured_compensation,

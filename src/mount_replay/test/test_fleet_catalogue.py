@@ -21,7 +21,8 @@ from mount_replay.fleet.catalogue.in_bands import in_bands
 from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.journal import Journal
 from mount_replay.fleet.catalogue.places import places
-from mount_replay.fleet.catalogue.rows import read_place, rows_of
+from mount_replay.fleet.catalogue.reading import read_place
+from mount_replay.fleet.catalogue.rows import rows_of
 from mount_replay.fleet.catalogue.stored import CatalogueError, read_catalogue
 from mount_replay.fleet.columns import schema_of
 from mount_replay.fleet.runner import Done
@@ -271,6 +272,7 @@ def test_every_column_has_a_meaning_and_what_has_a_unit_says_it():
     assert {band_name('peak', band) for band in BANDS} <= set(names)
     assert all(column.meaning for column in (*RECORDINGS, *EVENTS))
     units = {'_m': 'm', '_s': 's', '_a': 'A', '_j': 'J', '_degc': 'degC', '_bytes': 'B', '_ns': 'ns'}
+    units |= {'_hz': 'Hz', '_s2': 'm/s^2'}
     for column in (*RECORDINGS, *EVENTS):
         suffix = column.name[column.name.rfind('_') :]
         assert column.unit == units.get(suffix, ''), column.name

@@ -1,6 +1,7 @@
 """The example fleet is what it says, and the same bytes each time."""
 
 import hashlib
+from dataclasses import replace
 
 import pytest
 
@@ -17,6 +18,7 @@ from mount_replay.fleet.example.fleet import (
     settings_of,
     whole_fleet,
 )
+from mount_replay.fleet.example.variations import VARIATIONS
 
 
 def order_named(folder, name):
@@ -36,6 +38,15 @@ def test_the_whole_fleet_can_be_driven_and_each_recording_has_a_folder_of_its_ow
     assert len({order.folder for order in orders}) == len(orders) == WHOLE_FLEET
     for order in orders:
         preflight(settings_of(order), core=True)
+
+
+def test_longer_drives_can_be_driven_and_a_sweep_ends_at_its_last_frequency(tmp_path):
+    for order in (order for order in whole_fleet(tmp_path) if order.variation is VARIATIONS[0]):
+        longer = replace(order, seconds=40.0)
+        length = preflight(settings_of(longer), core=True).duration
+        assert length == pytest.approx(
+            {'sweep': 18.0, 'sweep_switched': 46.0 / 3.0}.get(order.drive.name, 40.0), abs=1e-3
+        )
 
 
 def test_the_same_order_makes_the_same_bytes(tmp_path):

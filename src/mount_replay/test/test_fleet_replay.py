@@ -8,13 +8,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mount_bags.run.place import open_run
 from mount_bags.run.session import session_text
+from mount_bringup.sample_rate import with_sample_rate
 from mount_replay.fleet.runner import Done
 from mount_replay.fleet.what_if import compared, one, run
 from mount_replay.fleet.what_if.asked import AskedError, recordings_asked
+from mount_replay.fleet.what_if.closed_loop import both_motions, compared_motion
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
 from mount_replay.fleet.what_if.result import ResultError
 from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
@@ -83,6 +86,25 @@ def test_the_changed_level_shows_in_the_row_and_the_replay_as_recorded_is_what_w
     assert row['setpoints_differing'] > 0
     assert row['setpoint_difference_largest_a'] == pytest.approx(0.7 - row['peak_current_a'], abs=0.05)
     assert 0.0 < row['pad_energy_changed_j'] < row['pad_energy_j']
+
+
+def test_a_closed_loop_tells_how_both_motions_differ_at_whatever_rate(tmp_path):
+    sim = {'scenario': 'motorway', 'timeline.duration': 2.0}
+    parameters = with_sample_rate({'mount_sim': sim}, 500.0)
+    record_core(tmp_path / 'recording', parameters, session_text({'parameters': parameters}))
+    recorded = recorded_in(open_run(tmp_path / 'recording'))
+    row = compared_motion(recorded, CHANGES)
+    assert row['samples'] == 500.0 * row['duration_s']
+    first, other = both_motions(recorded, CHANGES)
+    assert row['peak_displacement_m'] == np.abs(first.displacement).max()
+    assert row['peak_displacement_changed_m'] == np.abs(other.displacement).max()
+    difference = other.displacement - first.displacement
+    place = int(np.argmax(np.abs(difference)))
+    assert row['displacement_difference_largest_m'] == difference[place] != 0.0
+    assert row['displacement_difference_largest_at_s'] == pytest.approx(first.time[place])
+    assert row['displacement_difference_rms_m'] == pytest.approx(np.sqrt(np.mean(difference**2)))
+    assert np.diff(first.time) == pytest.approx(0.002)
+    assert np.array_equal(first.acceleration, other.acceleration)
 
 
 def test_without_an_effect_nothing_differs():

@@ -1,14 +1,17 @@
 """Files of others as recordings: joined, cut at gaps, and read back by this project's reader."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
 
 import mount_bags
 from mount_bags.bag.recording import open_recording
+from mount_bags.edit.cut import cut
 from mount_bags.run.session import recorded_session, session_content
 from mount_bags.signals.signal import SignalError
+from mount_signals.formats.reading import read
 from mount_signals.importing.importing import ImportOrder, import_recording
 from mount_signals.units.mapping import ColumnChoice, Mapping, MappingError, TimeChoice
 
@@ -72,6 +75,29 @@ def test_the_session_tells_where_it_came_from(tmp_path):
     assert told['imported']['columns']['displacement']['factor'] == 1e-3
     assert told['imported']['topics']['/measured/valve'] == 'valve in Pa'
     assert recording['measured/valve']['valve'] == pytest.approx(1e5 * (2.0 + SHAKING))
+
+
+def test_units_stand_in_the_channels_where_any_reader_finds_them(tmp_path):
+    from mcap.reader import make_reader
+    from rosbags.highlevel import AnyReader
+
+    file = table(tmp_path / 'drive.csv', {'t': TIMES, 'x [mm]': 1e3 * TRAVEL, 'Kraft [kN]': 2.0 + SHAKING})
+    names = {'displacement': ColumnChoice('x'), 'force': ColumnChoice('Kraft')}
+    imported(tmp_path, file, mapping=Mapping(names))
+    cut(open_recording(tmp_path / 'out'), tmp_path / 'piece', 0.5, 1.5)
+    for place in (tmp_path / 'out', tmp_path / 'piece'):
+        with next(place.glob('*.mcap')).open('rb') as stream:
+            channels = make_reader(stream).get_summary().channels.values()
+        told = {channel.topic: channel.metadata.get('units') for channel in channels}
+        assert json.loads(told['/measured/force']) == {'force': 'N'}
+        assert told['/displacement'] is None  # the registry tells it
+        with AnyReader([place]) as reader:
+            force = [link for link in reader.connections if link.topic == '/measured/force']
+            found = [reader.deserialize(raw, link.msgtype) for link, _, raw in reader.messages(force)]
+        series = open_recording(place)['measured/force']
+        assert series['force'].tolist() == [message.position[0] for message in found]
+        assert series.unit('force') == 'N'
+        assert read(str(place), ['/measured/force.force']).column('/measured/force.force').unit == 'N'
 
 
 def test_a_gap_parts_the_recording_and_is_told(tmp_path):

@@ -32,6 +32,7 @@ class TopicInformation:
     serialization_format: str = 'cdr'
     offered_qos: tuple[OfferedQos, ...] = ()
     type_hash: str = ''
+    units: Mapping[str, str] = field(default_factory=dict)  # by field, where the channel tells them
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """One file of a recording, from its creation to its summary."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import yaml
@@ -9,6 +9,7 @@ import yaml
 from mount_bags.bag.metadata import NO_TIME, FileInformation
 from mount_bags.bag.offered_qos import OfferedQos, qos_text
 from mount_bags.bag.schemas import schema_text
+from mount_bags.bag.told_units import units_text
 from mount_bags.container.record_file import RecordFile
 from mount_bags.container.stored import PIECE_RECORD
 from mount_bags.container.writer import ChunkedMcap
@@ -33,6 +34,7 @@ class BagTopic:
     latched: bool
     channel: int = 0  # the same in all pieces; 0 until the first message: only then is its publisher known
     offered_qos: tuple[OfferedQos, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)  # by field
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,7 @@ class Piece:
     def declare(self, topic: BagTopic) -> int:
         """Declare a topic and return the number of its channel."""
         details = {'offered_qos_profiles': qos_text(topic.offered_qos), 'topic_type_hash': topic.type_hash}
+        details |= units_text(topic.units)
         return self.container.add_channel(topic.name, MESSAGE_ENCODING, topic.schema, details)
 
     def repeat(self, repetitions: Iterable[Repetition], time: int) -> None:

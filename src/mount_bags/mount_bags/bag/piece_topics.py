@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from mount_bags.bag.metadata import BagInformation, TopicInformation
 from mount_bags.bag.offered_qos import OfferedQos, QosError, read_qos
+from mount_bags.bag.told_units import units_in
 from mount_bags.container.stored import PIECE_RECORD, StoredFile, StoredTopic
 from mount_bags.messages.definitions import Definition, DefinitionError, installed_definition, text_definition
 from mount_models.plain_yaml import YamlError, plain_yaml
@@ -101,6 +102,7 @@ def _information(topic: StoredTopic, known: TopicInformation | None) -> TopicInf
         serialization_format=topic.encoding,
         offered_qos=offers or (known.offered_qos if known else ()),
         type_hash=topic.details.get('topic_type_hash', '') or (known.type_hash if known else ''),
+        units=units_in(topic.details) or (known.units if known else {}),
     )
 
 

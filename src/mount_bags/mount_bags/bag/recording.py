@@ -404,6 +404,7 @@ class Recording:
             definition=definition,
             obstacle='' if definition else sentence,
             zero=self.time_range[0] if self.time_range else 0,
+            units=self.topics[name].units,
         )
 
     def _note_damage(self, name: str, present: int) -> None:

@@ -112,11 +112,13 @@ class BagWriter:
         offered_qos: Sequence[OfferedQos] | Offers = (),
         *,
         latched: bool = False,
+        units: Mapping[str, str] | None = None,
     ) -> None:
         """Announce a topic by its full name; raises `SchemaError` if its type is not installed.
 
         `offered_qos` may be a function: it is asked at the first message, when publishers are known.
-        The last message of a `latched` topic is repeated at the head of each file.
+        The last message of a `latched` topic is repeated at the head of each file. `units` are those of the
+        fields, of a topic that no registry knows.
         """
         if name in self._topics:
             raise RecordingError(f'topic {name} is already part of the recording {self.folder}')
@@ -124,7 +126,8 @@ class BagWriter:
             self._types[type_name] = self._piece.declare_type(type_name)
         offers = offered_qos if callable(offered_qos) else _constantly(tuple(offered_qos))
         number = self._types[type_name]
-        self._topics[name] = BagTopic(name, type_name, offers, number, type_hash(type_name), latched)
+        topic = BagTopic(name, type_name, offers, number, type_hash(type_name), latched, units=units or {})
+        self._topics[name] = topic
 
     def write(self, topic: str, raw: bytes, receive_time: int, publish_time: int | None = None) -> None:
         """Add one serialised message; times in ns, the publish time is the receive time where unknown.

@@ -9,7 +9,7 @@ import mmap
 import re
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
@@ -52,6 +52,9 @@ _LARGEST = 1 << 32  # bytes; more is a damaged length
 _MAGICS = {b'\x28\xb5\x2f\xfd': 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
 
 
+_NONE: Mapping[int, int] = {}  # one for all chunks: a long recording has very many
+
+
 @dataclass(slots=True)
 class Chunk:
     """One chunk of a file; positions in bytes, times in ns."""
@@ -66,7 +69,7 @@ class Chunk:
     end_time: int
     index_length: int = 0  # bytes of the message indexes behind it, as a sound summary tells them
     channels: frozenset[int] | None = None  # those with messages, None where no reliable source tells
-    counts: dict[int, int] = field(default_factory=dict)  # messages by channel, once explored
+    counts: Mapping[int, int] = field(default_factory=lambda: _NONE)  # messages by channel, once explored
     declarations: tuple[tuple[int, bytes], ...] = ()  # of schemas and channels, once explored
     explored: bool = False
 

@@ -85,10 +85,12 @@ class Series:
         stamps: Times | None = None,
         obstacle: str = '',
         zero: int = 0,
+        units: Mapping[str, str] | None = None,
     ):
         """Take messages with their `definition`, or the sentence why there is none.
 
-        Without both the installed type tells the fields. `zero` (ns) is where `time` begins. A function in
+        Without both the installed type tells the fields. `zero` (ns) is where `time` begins; `units` are
+        those that the recording tells of fields that no registry knows. A function in
         place of `payloads` is asked where something else than `columns` and `stamps`, read before, is wanted.
         """
         self.topic = topic
@@ -102,6 +104,7 @@ class Series:
         self._known_definition = definition
         self._obstacle = obstacle
         self._zero = zero
+        self._told_units = dict(units or {})
 
     def __len__(self) -> int:
         return len(self._heads.received)
@@ -207,8 +210,8 @@ class Series:
         return self._joint_column(name, 'velocity')
 
     def unit(self, name: str) -> str:
-        """Return the unit of `series[name]`, empty where the registry does not know it."""
-        return self.registered.unit(name) if self.registered else ''
+        """Return the unit of `series[name]`, empty where neither registry nor recording tell it."""
+        return self.registered.unit(name) if self.registered else self._told_units.get(name, '')
 
     def derivative_unit(self, name: str) -> str:
         """Return the unit of `series.derivative(name)`, empty where the registry does not know it."""

@@ -131,7 +131,7 @@ def exit_error(name: str, code: int, asked: bool) -> str:
         return ''
     if asked and code == -signal.SIGINT:
         return ''  # it was told before it could listen
-    reason = ', for the reason that it has told' if name == SUPERVISOR else ''
+    reason = ', for the reason that it has told' if name == SUPERVISOR and code > 0 else ''
     return f'{name} ended with code {code}{reason}'
 
 

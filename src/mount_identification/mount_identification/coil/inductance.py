@@ -8,14 +8,8 @@ import numpy as np
 
 from mount_bags.run.screen import Table
 from mount_identification.coil.few_points import levels_of_all
-from mount_identification.coil.gap_calibration import (
-    GapCalibration,
-    GapPoint,
-    RippleRecording,
-    calibrate_gap_curves,
-    in_steps,
-    measured_point,
-)
+from mount_identification.coil.gap_calibration import GapCalibration, calibrate_gap_curves
+from mount_identification.coil.gap_point import GapPoint, RippleRecording, in_steps, measured_point
 from mount_identification.coil.temperature_fit import measured_compensation, stated_compensation
 from mount_identification.coil.temperature_left import COEFFICIENT_ERROR, measured, predicted
 from mount_identification.coil.unique_region import UniqueRegion, unique_region, warnings

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from mount_identification.coil.gap_calibration import GapPoint
+from mount_identification.coil.gap_point import GapPoint
 from mount_models.actuator.law import ForceLaw, checked_force
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, ScaledPolynomial, evaluate
 from mount_models.coil.resistance import COPPER_COEFFICIENT

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_identification.coil.gap_calibration import GapPoint
+from mount_identification.coil.gap_point import GapPoint
 from mount_models.coil.gap import GapCurves, evaluate
 from mount_models.coil.temperature import (
     TemperatureCompensation,

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_identification.coil.few_points import MOST_POINTS, InductanceTable
-from mount_identification.coil.gap_calibration import RippleRecording
+from mount_identification.coil.gap_point import RippleRecording
 
 FloatArray = npt.NDArray[np.float64]
 Interval = tuple[float, float]

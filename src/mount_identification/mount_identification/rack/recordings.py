@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run, recording_hash
 from mount_identification.actuator.points import gap_groups
-from mount_identification.coil.gap_calibration import RippleRecording
+from mount_identification.coil.gap_point import RippleRecording
 from mount_identification.rack.columns import (
     CURRENT,
     CURRENT_RATE,

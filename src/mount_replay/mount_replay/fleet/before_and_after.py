@@ -1,36 +1,59 @@
-"""One recording of a fleet as signals: its setpoints as recorded and with the change."""
+"""One recording of a fleet as signals: as recorded and with the change."""
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.run.place import open_mount
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
+from mount_replay.fleet.what_if.closed_loop import both_motions
+from mount_replay.fleet.what_if.compared import recorded_in
 from mount_replay.given.taken import ReplayError
 from mount_replay.replay import ReplayOrder, ReplayOutcome, replay_without_output
 from mount_signals.sources.stores import local_copy
 
 Column = NDArray[np.float64]
+Changes = Mapping[str, Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
 class BeforeAndAfter:
-    """Signals (n,) of the runs of the controller: time (s), displacement (m), setpoints (A)."""
+    """Signals (n,) over `time` (s); pairs are as recorded and with the change.
+
+    `given` is what both controllers were given: the recorded displacement (m), to which they answered the
+    `setpoints` (A). In a closed loop it is the recorded acceleration of the chassis (m/s^2), over which the
+    mount moved by `displacements` (m), else None.
+    """
 
     time: Column
-    displacement: Column
-    before: Column
-    after: Column
+    given: Column
+    setpoints: tuple[Column, Column]
+    displacements: tuple[Column, Column] | None = None
 
 
-def before_and_after(uri: str, changes: Mapping[str, Mapping[str, Any]], mount: str = '') -> BeforeAndAfter:
-    """Return the signals of the recording at `uri`, replayed without and with {node: {parameter: value}}.
+def before_and_after(
+    uri: str, changes: Changes, mount: str = '', *, closed_loop: bool = False, said: Said = NOTHING_SAID
+) -> BeforeAndAfter:
+    """Return the signals of the recording at `uri` without and with {node: {parameter: value}}.
 
-    Time counts from its first displacement sample. `mount` is which of several mounts. Raises a `ValueError`
-    or `OSError` with the reason where it cannot be replayed.
+    Time counts from its first displacement sample, in a closed loop from the beginning of its acceleration.
+    `mount` is which of several mounts, `said` what is said of files of others. Raises a `ValueError`
+    or `OSError` with the reason where there are none.
     """
-    with local_copy(uri) as path:
+    with local_copy(uri) as copy, _as_recording(copy, said, closed_loop) as path:
+        if closed_loop:
+            first, other = both_motions(recorded_in(open_mount(path, mount)), changes)
+            return BeforeAndAfter(
+                first.time,
+                first.acceleration,
+                (first.setpoint, other.setpoint),
+                (first.displacement, other.displacement),
+            )
         before = replay_without_output(ReplayOrder(path, mount=mount))
         after = replay_without_output(ReplayOrder(path, changes=changes, mount=mount))
     runs = before.given.controls
@@ -40,9 +63,17 @@ def before_and_after(uri: str, changes: Mapping[str, Mapping[str, Any]], mount: 
     return BeforeAndAfter(
         (stamps - before.given.zero) * 1e-9,
         np.concatenate([run.displacement for run in runs]),
-        _setpoints(before),
-        _setpoints(after),
+        (_setpoints(before), _setpoints(after)),
     )
+
+
+@contextlib.contextmanager
+def _as_recording(path: Path, said: Said, closed_loop: bool) -> Iterator[Path]:
+    if is_of_others(path, said):
+        with as_recording(mapped_in(path, said), closed_loop=closed_loop) as made:
+            yield made
+    else:
+        yield path
 
 
 def _setpoints(outcome: ReplayOutcome) -> Column:

@@ -118,6 +118,7 @@ def _configuration(scratch: str) -> dict[str, Any]:
         'distributed.worker.http.routes': [],
         'distributed.scheduler.allowed-failures': 0,  # the runner counts them
         'distributed.scheduler.worker-saturation': 1.0,
+        'distributed.worker.profile.enabled': False,  # its samples cost some per cent, and nothing reads them
         'distributed.worker.multiprocessing-method': 'spawn',  # this process may hold threads of middleware
         # Nothing is kept at a worker, so there is nothing to spill; a worker that is too large is replaced.
         'distributed.worker.memory.target': False,
@@ -147,6 +148,8 @@ def _quiet() -> Iterator[None]:
     """Keep Dask's log to itself: what a user needs to know comes with the results."""
     import distributed  # noqa: F401  # it sets its levels when it is loaded
 
+    # It is never heard: at exit it tells of processes that were killed a moment ago.
+    logging.getLogger('distributed.process').setLevel(logging.CRITICAL)
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

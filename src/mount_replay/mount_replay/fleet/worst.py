@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mount_replay.fleet.catalogue.columns import FOREIGN
+from mount_replay.fleet.foreign import Said, said_in
 from mount_replay.fleet.questions import QueryError, query, tables_of
 from mount_replay.fleet.what_if.asked import AskedError, recordings_asked
+from mount_replay.fleet.what_if.columns import DISPLACEMENT
 from mount_replay.fleet.what_if.result import ORDER
 from mount_signals.sources.source import SourceError
 
@@ -24,6 +27,7 @@ class Worst:
     row: Mapping[str, Any]
     value: float
     uri: str
+    dbc: str = ''  # of CAN logs of others
 
     @property
     def changes(self) -> dict[str, dict[str, Any]]:
@@ -36,17 +40,37 @@ class Worst:
         """The commands that open it: its page, and of a result the replay with the change."""
         place, mount = shlex.quote(self.uri), self.row.get('mount')
         of_mount = ['--mount', mount] if mount else []
+        settings = [
+            f'--set {shlex.quote(f"{node}.{name}={value_text(value)}")}'
+            for node, values in self.changes.items()
+            for name, value in values.items()
+        ]
+        if self.row.get('mapped') or self.row.get('kind') == FOREIGN:
+            return self._commands_of_others(place, settings)
         found = [f'engine-mount report {place}']
-        if self.changes and self.row.get('asked') != 'displacement':
-            settings = [
-                f'--set {shlex.quote(f"{node}.{name}={value_text(value)}")}'
-                for node, values in self.changes.items()
-                for name, value in values.items()
-            ]
+        if self.changes and self.row.get('asked') != DISPLACEMENT:
             found.append(' '.join(['engine-mount replay', place, *of_mount, *settings]))
         else:
             found.append(f'engine-mount view {place}')
         return found
+
+    def _commands_of_others(self, place: str, settings: list[str]) -> list[str]:
+        """Return the commands that tell the columns of a file of others, and take it as the row did."""
+        dbc = [f'--dbc {shlex.quote(self.dbc)}'] if self.dbc else []
+        found = [' '.join(['engine-mount info', place, *dbc])]
+        columns: dict[str, str] = json.loads(self.row.get('mapped') or '{}')
+        file = self.row.get('mapping_file')
+        said = [*([f'--map-file {shlex.quote(file)}'] if file else []), *dbc]
+        if self.row.get('asked') == DISPLACEMENT:
+            named = [] if file else [f'--column {shlex.quote(columns["acceleration"])}']
+            command = ['engine-mount drive --core --scenario recorded --file', place]
+        elif any(name.endswith('displacement') for name in columns):
+            motion = {name: column for name, column in columns.items() if name.endswith('displacement')}
+            named = [] if file else [f'--map {shlex.quote(f"{one}={motion[one]}")}' for one in motion]
+            command = ['engine-mount replay', place]
+        else:
+            return found
+        return [*found, ' '.join([*command, *named, *said, *settings])]
 
 
 def value_text(value: Any) -> str:
@@ -72,11 +96,10 @@ def worst(
         f'select * from {name} where "{by}" is not null and not isnan("{by}"::double) '
         f'order by {order}, recording, mount limit {int(count)}',
     ).to_pylist()
-    places = places_of(folder) if name == 'result' else {}
-    return [
-        Worst(row, float(row[by]), row.get('uri') or places.get(row['recording'], row['recording']))
-        for row in rows
-    ]
+    if name != 'result':
+        return [Worst(row, float(row[by]), row['uri']) for row in rows]
+    places, dbc = places_of(folder), _of_others(folder).get('dbc') or ''
+    return [Worst(row, float(row[by]), places.get(row['recording'], row['recording']), dbc) for row in rows]
 
 
 def places_of(folder: str | os.PathLike[str]) -> dict[str, str]:
@@ -84,14 +107,35 @@ def places_of(folder: str | os.PathLike[str]) -> dict[str, str]:
 
     Raises `QueryError` where nothing of it is there any more.
     """
-    order = json.loads((Path(folder) / ORDER).read_text(encoding='utf-8'))
+    others = bool(_of_others(folder).get('mapping_files'))
     try:
-        return {asked.recording: asked.uri for asked in recordings_asked(order['asked_for'])}
+        found = recordings_asked(_order_of(folder)['asked_for'], others=others)
     except (AskedError, SourceError) as error:
         raise QueryError(
             f'where the recordings of {folder} lie is not known: {error}; what was moved is found by a '
             'link where it was'
         ) from None
+    return {asked.recording: asked.uri for asked in found}
+
+
+def said_of(folder: str | os.PathLike[str]) -> Said:
+    """Return what the order of a result says of files of others, from the files that it names.
+
+    Raises a `ValueError` or `OSError` where one is not there any more.
+    """
+    told = _of_others(folder)
+    dbc = told.get('dbc')
+    return said_in([Path(file) for file in told.get('mapping_files', ())], Path(dbc) if dbc else None)
+
+
+def _of_others(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    told: dict[str, Any] = _order_of(folder).get('of_others', {})
+    return told
+
+
+def _order_of(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    order: dict[str, Any] = json.loads((Path(folder) / ORDER).read_text(encoding='utf-8'))
+    return order
 
 
 def _check_column(schema: Any, table: str, by: str) -> None:

@@ -29,6 +29,7 @@ from mount_ros import topics
 from mount_ros.messages.event import ParametersChanged
 from mount_ros.messages.force_table import ForceTable
 from mount_ros.topics import Topic
+from mount_signals.importing.provenance import SCENARIO
 
 _INPUTS = (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.COIL_TEMPERATURE)
 _READ = (
@@ -199,7 +200,10 @@ def session_of(recording: Recording, notes: Notes) -> dict[str, Any]:
 
 
 def parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str, Any]]:
-    """Return the recorded parameters of the nodes that replay, those that the nodes still know."""
+    """Return the recorded parameters of the nodes that replay, those that the nodes still know.
+
+    Where no controller was at work, as in what was imported, they are the defaults.
+    """
     known = defaults_of_nodes()
     recorded = session_parameters(session)
     found: dict[str, dict[str, Any]] = {}
@@ -209,7 +213,8 @@ def parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str, 
         new = [name for name in known[node] if name not in found[node] and name not in _TAKEN_AS_BEFORE]
         if new and found[node] and len(new) < len(known[node]) // 2:
             notes.append(f'{node}: {", ".join(new)} is not in the session; the default is taken')
-    return checked_settings(with_recorded_policy(found) if session else found)
+    was_controlled = bool(session) and session.get('scenario') != SCENARIO
+    return checked_settings(with_recorded_policy(found) if was_controlled else found)
 
 
 def recorded_parameters(recording: Recording, notes: Notes) -> dict[str, dict[str, Any]]:

@@ -31,8 +31,8 @@ from mount_replay.given.taken import (
 )
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
-STRETCH = 60_000
-"""Samples, chosen: one minute, some 40 MB with what is made of it."""
+STRETCH = 30_000
+"""Samples, chosen: half a minute, some 20 MB with what is made of it."""
 _READ_AT_ONCE = 8192  # messages of a topic, chosen
 
 

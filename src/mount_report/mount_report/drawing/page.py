@@ -3,7 +3,8 @@
 import html
 import importlib.resources
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import groupby
 
 from mount_report.drawing.detail import NUMBERS, browser_chart, budget_of
 from mount_report.sections.section import Cell, Finding, Link, Section, Table
@@ -22,8 +23,12 @@ def page(title: str, sections: Sequence[Section], numbers: int = NUMBERS) -> str
     """Return the HTML of a report; its long curves have at most `numbers` numbers together."""
     charts = [section.chart for section in sections if section.chart]
     budget = budget_of(charts, numbers)
-    body = ''.join(_section(section, budget) for section in sections)
-    links = ''.join(f'<a href="#{section.name}">{html.escape(section.title)}</a>' for section in sections)
+    body = ''.join(
+        _side_by_side(group, budget) if half else ''.join(_section(section, budget) for section in group)
+        for half, group in groupby(sections, key=lambda section: section.half)
+    )
+    listed = [section for section in sections if section.is_listed]
+    links = ''.join(f'<a href="#{section.name}">{html.escape(section.title)}</a>' for section in listed)
     code = ''.join(_asset(part) for part in _PARTS)
     script = f'<script>{code}</script>\n' if charts else ''
     hint = f'<p class="hint">{_HINT}</p>\n' if charts else ''
@@ -42,11 +47,17 @@ def _asset(name: str) -> str:
     return (importlib.resources.files('mount_report.drawing') / 'browser' / name).read_text(encoding='utf-8')
 
 
+def _side_by_side(sections: Iterable[Section], budget: int) -> str:
+    return f'<div class="halves">{"".join(_section(section, budget) for section in sections)}</div>\n'
+
+
 def _section(section: Section, budget: int) -> str:
     parts = [f'<section id="{section.name}">\n<h2>{html.escape(section.title)}</h2>\n']
     if section.findings:
         parts.append(f'<ul class="verdict">{"".join(map(_finding, section.findings))}</ul>\n')
     parts += [f'<p>{html.escape(sentence)}</p>\n' for sentence in section.words]
+    if section.commands:
+        parts.append(f'<pre>{html.escape(chr(10).join(section.commands))}</pre>\n')
     if section.chart is not None:
         figure = json.dumps(browser_chart(section.chart, budget), allow_nan=False, separators=(',', ':'))
         safe = figure.replace('<', '\\u003c')  # no text of a recording ends the script

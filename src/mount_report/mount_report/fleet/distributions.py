@@ -1,5 +1,6 @@
 """How a figure is spread over a fleet, before and after the change."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -8,6 +9,7 @@ import numpy as np
 
 from mount_report.drawing.chart import DASHED, Array, Chart, Curve, Panel
 from mount_report.drawing.style import COLOURS
+from mount_report.fleet.readable import handy_unit, number
 from mount_report.sections.section import Section, Table
 
 if TYPE_CHECKING:
@@ -16,10 +18,10 @@ if TYPE_CHECKING:
 CHANGED = '_changed'
 """In the name of a column: the same figure with the change."""
 
-_BINS = 30  # chosen
+_MOST_BINS = 30  # chosen
 _QUANTILES = (('smallest', 0.0), ('median', 0.5), ('90 %', 0.9), ('99 %', 0.99), ('largest', 1.0))
-_READABLE = {'m': (1e3, 'mm')}
-"""{unit: factor and unit in which it is drawn}."""
+_OF_ONE_SIDE = re.compile(r',?( simulated)? as recorded( \(--closed-loop\))?')
+"""What the meaning of a column says that stands for both sides here."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,17 @@ class Pair:
     before: Array
     after: Array
     whole: bool = False  # it counts something
+
+    @property
+    def title(self) -> str:
+        """Its name in words, without its unit."""
+        stem, _, unit = self.name.rpartition('_')
+        return (stem if unit == self.unit.lower() else self.name).replace('_', ' ')
+
+    @property
+    def told(self) -> str:
+        """What it means, of both sides."""
+        return _OF_ONE_SIDE.sub('', self.meaning)
 
     @property
     def moved(self) -> bool:
@@ -62,24 +75,35 @@ def pairs_of(result: 'pyarrow.Table') -> list[Pair]:
 
 def spread(pair: Pair) -> Section:
     """Return the section about one figure: how many rows have which value, and quantiles."""
-    factor, unit = _READABLE.get(pair.unit, (1.0, pair.unit))
+    factor, unit = handy_unit(pair.unit, [*pair.before, *pair.after])
     before, after = factor * pair.before, factor * pair.after
-    label = f'{pair.name} ({unit})' if unit else pair.name
+    label = f'{pair.title} ({unit})' if unit else pair.title
     low, high = float(min(before.min(), after.min())), float(max(before.max(), after.max()))
-    edges = _edges(low, high, pair.whole)
+    edges = _edges(low, high, len(before), pair.whole)
     panels = [
-        Panel('rows', _curves(*_bars(before, edges), *_bars(after, edges))),
-        Panel('share with at most this', _curves(*_shares(before, edges), *_shares(after, edges)), share=0.8),
+        Panel('number of rows', _curves(*_bars(before, edges), *_bars(after, edges))),
+        Panel(
+            'share of rows at or below', _curves(*_shares(before, edges), *_shares(after, edges)), share=0.8
+        ),
     ]
-    title = f'{pair.meaning[:1].upper()}{pair.meaning[1:]} ({pair.name})'
+    title = f'{pair.title[:1].upper()}{pair.title[1:]}'
     chart = Chart(pair.name, title, label, panels, limits=(float(edges[0]), float(edges[-1])))
     rows = [
-        (word, *(f'{np.quantile(values, share):.4g}' for values in (before, after)))
+        (word, *(_told(float(np.quantile(values, share)), pair.whole) for values in (before, after)))
         for word, share in _QUANTILES
     ]
-    table = Table((unit or 'value', 'as recorded', 'changed'), rows, title='Quantiles', folded=True)
-    words = [f'{np.count_nonzero(before != after)} of {len(before)} rows have another value.']
-    return Section(pair.name, title, words, chart, [table])
+    head = (f'value ({unit})' if unit else 'value', 'as recorded', 'changed')
+    moved = int(np.count_nonzero(before != after))
+    words = [
+        f'{pair.told[:1].upper()}{pair.told[1:]}, in the column {pair.name}. '
+        f'{moved} of {len(before)} rows have another value with the change.'
+    ]
+    table = Table(head, rows, title='Quantiles', folded=True)
+    return Section(pair.name, title, words, chart, [table], half=True)
+
+
+def _told(value: float, whole: bool) -> str:
+    return f'{value:g}' if whole else number(value)
 
 
 def _changed_name(name: str, names: Sequence[str]) -> str | None:
@@ -98,7 +122,7 @@ def _curves(before_x: Array, before_y: Array, after_x: Array, after_y: Array) ->
 
 def _bars(values: Array, edges: Array) -> tuple[Array, Array]:
     counts = np.histogram(values, edges)[0].astype(np.float64)
-    return edges, np.append(counts, counts[-1])
+    return edges, np.append(counts, 0.0)
 
 
 def _shares(values: Array, edges: Array) -> tuple[Array, Array]:
@@ -107,9 +131,13 @@ def _shares(values: Array, edges: Array) -> tuple[Array, Array]:
     return np.concatenate([edges[:1], known, edges[-1:]]), np.append(shares, 1.0)
 
 
-def _edges(low: float, high: float, whole: bool) -> Array:
-    """Return the limits of the bins; of what is counted, each bin holds so many whole numbers."""
+def _edges(low: float, high: float, count: int, whole: bool) -> Array:
+    """Return the limits of the bins; of what is counted, each bin holds so many whole numbers.
+
+    Of `count` values 2 count^(1/3) bins (Rice's rule), so that few values make no comb.
+    """
+    bins = min(_MOST_BINS, max(1, round(2.0 * np.cbrt(count))))
     if whole or high == low:
-        step = max(1.0, np.ceil((high - low) / _BINS))
+        step = max(1.0, np.ceil((high - low) / bins))
         return np.arange(low - 0.5, high + 0.5 + step, step)
-    return np.linspace(low, high, _BINS + 1)
+    return np.linspace(low, high, bins + 1)

@@ -4,69 +4,83 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from mount_report.fleet.distributions import pairs_of, spread
+from mount_report.fleet.distributions import Pair, pairs_of, spread
 from mount_report.fleet.looks import Look, look_section
+from mount_report.fleet.readable import length_of_time, quantity
+from mount_report.fleet.worst_table import worst_section
 from mount_report.report import Report
 from mount_report.sections.section import BAD, GOOD, LOOK, UNKNOWN, Finding, Link, Section, Table
 
 if TYPE_CHECKING:
     import pyarrow
 
+SETPOINTS, DISPLACEMENT = 'setpoints', 'displacement'
+"""What a result answers, in its column `asked`."""
+
 _ASKED = {
-    'setpoints': (
-        'Which setpoints the changed controller would have given to the recorded displacements. The '
+    SETPOINTS: (
+        'setpoints for the recorded displacement',
+        'Asked: which setpoints the changed controller would have given to the recorded displacement. The '
         'displacement itself answers the controller that was at work when it was recorded; what the change '
-        'would have done to the motion is another question: engine-mount fleet replay --closed-loop.'
+        'would have done to the motion is another question: engine-mount fleet replay --closed-loop.',
     ),
-    'displacement': (
-        'How engine and mount would have moved: both are simulated anew over the recorded acceleration of '
-        'the chassis, once with the controller as recorded and once with the change. What the real mount did '
-        'is not in these figures.'
+    DISPLACEMENT: (
+        'displacement in a closed loop',
+        'Asked: how engine and mount would have moved. Both motions are simulated over the recorded '
+        'acceleration of the chassis, once with the controller as recorded and once with the change. What '
+        'the real mount did is not in these figures.',
     ),
 }
+_OF_MOTION = ('displacement', 'mount_force')  # in names of figures: what is looked for in a closed loop
 _LISTED = 20  # recordings that are named beside their reason, chosen
 
 
-def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, title: str) -> Report:
+def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, name: str) -> Report:
     """Return the page about `result`, the table of `engine-mount fleet replay`.
 
-    `looks` are the worst recordings by the column `by`, the worst first.
+    `looks` are the worst recordings by the column `by`, the worst first; `name` is that of the fleet.
     """
-    pairs = [pair for pair in pairs_of(result) if pair.moved]
-    sections = [
-        _overview(result),
-        _worst(looks, by),
-        *(spread(pair) for pair in pairs),
-        *(look_section(number, look, by) for number, look in enumerate(looks, 1)),
-        _failures(result),
-    ]
-    return Report(title, sections)
-
-
-def _overview(result: 'pyarrow.Table') -> Section:
     rows = result.to_pylist()
     asked = {row['asked'] for row in rows}
-    words = [_ASKED[each] for each in sorted(asked) if each in _ASKED]
+    question = next((told for each, (told, _) in _ASKED.items() if asked == {each}), 'several questions')
+    sections = [
+        _overview(rows, asked),
+        worst_section(looks, by, result.schema),
+        *map(spread, _ordered(pairs_of(result))),
+        *(look_section(number, look) for number, look in enumerate(looks, 1)),
+        _failures(rows),
+    ]
+    return Report(f'Fleet {name}: {question}', sections)
+
+
+def _ordered(pairs: Sequence[Pair]) -> list[Pair]:
+    """Return the figures that the change moved, the motion first."""
+    moved = [pair for pair in pairs if pair.moved]
+    return sorted(moved, key=lambda pair: not any(word in pair.name for word in _OF_MOTION))
+
+
+def _overview(rows: Sequence[dict], asked: set[str]) -> Section:
+    words = [_ASKED[each][1] for each in sorted(asked) if each in _ASKED]
     changes = json.loads(next((row['changes'] for row in rows if row.get('changes')), '{}'))
     table = Table(
-        ('parameter', 'value'),
+        ('parameter', 'changed to'),
         [
             (f'{node}.{name}', json.dumps(value))
             for node, values in changes.items()
             for name, value in values.items()
         ],
-        title='Changed',
     )
-    findings = [_recordings(rows), _differing(rows), _trusted(rows)]
+    checked = _motion(rows) if asked == {DISPLACEMENT} else _trusted(rows)
+    done = 'simulated' if asked == {DISPLACEMENT} else 'replayed'
+    findings = [_recordings(rows, done), _differing(rows), checked]
     return Section('overview', 'Overview', words, findings=findings, tables=[table] if table.rows else [])
 
 
-def _recordings(rows: Sequence[dict]) -> Finding:
+def _recordings(rows: Sequence[dict], done: str) -> Finding:
     names = {row['recording'] for row in rows}
     failed = {row['recording'] for row in rows if row['reason']}
-    seconds = sum(row['duration_s'] or 0.0 for row in rows)
-    length = f'{seconds / 3600.0:.1f} h' if seconds >= 3600.0 else f'{seconds:.0f} s'
-    text = [f'{len(names)} recordings, {length} of them replayed;']
+    length = length_of_time(sum(row['duration_s'] or 0.0 for row in rows))
+    text = [f'{len(names)} recordings, {length} of them {done};']
     if not failed:
         return Finding('Recordings', GOOD, [*text, 'none failed'])
     return Finding('Recordings', LOOK, [*text, Link(f'{len(failed)} failed', 'failures')])
@@ -79,7 +93,7 @@ def _differing(rows: Sequence[dict]) -> Finding:
         bool(row['switchings_appeared'] or row['switchings_vanished'] or row['switchings_moved'])
         for row in done
     )
-    text = [f'{differing} of {len(done)} have other setpoints, {switched} are damped at other times;']
+    text = [f'{differing} of {len(done)} rows have other setpoints, {switched} are damped at other times;']
     return Finding('Difference', LOOK if differing else GOOD, [*text, Link('the worst', 'worst')])
 
 
@@ -91,42 +105,50 @@ def _trusted(rows: Sequence[dict]) -> Finding:
     if not told:
         return Finding(what, UNKNOWN, ['nothing was recorded to compare it with'])
     if not others:
-        return Finding(what, GOOD, [f'gives the recorded setpoints of all {len(told)}'])
+        return Finding(what, GOOD, [f'gives the recorded setpoints of all {len(told)} rows'])
     largest = max(row['as_recorded_largest_a'] or 0.0 for row in others)
     return Finding(
         what,
         BAD,
         [
-            f'does not give the recorded setpoints of {len(others)} of {len(told)}, '
-            f'by up to {largest:.3g} A: '
+            f'does not give the recorded setpoints of {len(others)} of {len(told)} rows, '
+            f'by up to {quantity(largest, "A")}: '
             'they were recorded with other parameters, another version, or losses'
         ],
     )
 
 
-def _worst(looks: Sequence[Look], by: str) -> Section:
-    title = 'Worst'
-    if not looks:
-        return Section('worst', title, [f'No row has a number in the column {by}.'])
-    rows = [
-        (str(number), Link(look.recording, f'look_{number}'), look.value)
-        for number, look in enumerate(looks, 1)
-    ]
-    return Section('worst', title, tables=[Table(('', 'recording', by), rows)])
+def _motion(rows: Sequence[dict]) -> Finding:
+    """Tell in how many drives the change makes the largest displacement larger, and where most."""
+    grown = {
+        ' '.join(filter(None, (row['recording'], row['mount']))): after - before
+        for row in rows
+        if (before := row.get('peak_displacement_m')) is not None
+        and (after := row.get('peak_displacement_changed_m')) is not None
+    }
+    what = 'Largest displacement'
+    if not grown:
+        return Finding(what, UNKNOWN, ['no drive could be simulated'])
+    larger, smaller = (sum(sign * by > 0.0 for by in grown.values()) for sign in (1.0, -1.0))
+    text = f'larger in {larger}, smaller in {smaller} of {len(grown)} rows'
+    if not larger:
+        return Finding(what, GOOD, [text])
+    most = max(grown, key=lambda name: grown[name])
+    return Finding(what, LOOK, [f'{text}; grows most in {most}: {quantity(grown[most], "m", signed=True)}'])
 
 
-def _failures(result: 'pyarrow.Table') -> Section:
-    failed = [row for row in result.to_pylist() if row['reason']]
+def _failures(rows: Sequence[dict]) -> Section:
+    failed = [row for row in rows if row['reason']]
     if not failed:
         return Section('failures', 'Failed', ['Nothing failed.'])
     reasons: dict[str, list[str]] = {}
     for row in failed:
         reasons.setdefault(row['reason'].replace(row['recording'], '...'), []).append(_named(row))
-    rows = [
-        (reason, str(len(names)), _listed(names))
+    told = [
+        (str(len(names)), reason, _listed(names))
         for reason, names in sorted(reasons.items(), key=lambda item: -len(item[1]))
     ]
-    return Section('failures', 'Failed', tables=[Table(('reason', 'rows', 'recordings'), rows)])
+    return Section('failures', 'Failed', tables=[Table(('rows', 'reason', 'recordings'), told)])
 
 
 def _named(row: dict) -> str:

@@ -43,9 +43,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page: findings, sentences, a chart, tables, in this order.
+    """A part of the page: findings, sentences, commands, a chart, tables, in this order.
 
-    `name` is that of its anchor.
+    `name` is that of its anchor. Neighbours that are `half` stand side by side where the page is wide.
     """
 
     name: str
@@ -54,3 +54,6 @@ class Section:
     chart: Chart | None = None
     tables: Sequence[Table] = ()
     findings: Sequence[Finding] = ()
+    commands: Sequence[str] = ()  # of the shell, shown as they are typed
+    half: bool = False
+    is_listed: bool = True  # at the top of the page

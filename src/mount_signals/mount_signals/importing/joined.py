@@ -9,7 +9,8 @@ import numpy as np
 from mount_bags.signals.signal import SECOND, Signal, SignalError
 
 Signals = dict[str, Signal]
-_DATED = 500_000_000 * SECOND  # ns, 1985: what begins later counts from 1970, and no clock of its own
+DATED = 500_000_000 * SECOND
+"""ns, 1985: what begins later counts from 1970, and is no clock of its own."""
 
 
 def joined(files: Sequence[tuple[str, Signals]]) -> tuple[Signals, list[str]]:
@@ -37,7 +38,7 @@ def joined(files: Sequence[tuple[str, Signals]]) -> tuple[Signals, list[str]]:
 
 
 def _dated(signals: Signals) -> bool:
-    return all(signal.begin > _DATED for signal in signals.values())
+    return all(signal.begin > DATED for signal in signals.values())
 
 
 def _continued(quantity: str, parts: list[tuple[str, Signal]]) -> Signal:

@@ -40,7 +40,7 @@ def read_files(files: Sequence[str], mapping: Mapping, stated: Stated | None = N
     stated = stated_with(mapping, stated)
     there = {file: headings(file, stated) for file in files}
     if not mapping.columns and not mapping.others:
-        mapping = _told_by_titles(there, mapping)
+        mapping = told_by_titles(there, mapping)
     found = {file: _of_file(mapping, file, own, alone=len(files) == 1) for file, own in there.items()}
     wanted = {*mapping.columns, *mapping.others}
     missing = wanted - {name for own in found.values() for name in (*own.columns, *own.others)}
@@ -69,9 +69,13 @@ def _of_file(mapping: Mapping, file: str, there: Sequence[Heading], *, alone: bo
         else choice
         for name, choice in mapping.columns.items()
     }
-    if alone:
-        return replace(mapping, columns=rested)
-    columns = {name: choice for name, choice in rested.items() if _has(there, choice, file)}
+    mapping = replace(mapping, columns=rested)
+    return mapping if alone else part_in(mapping, there, file)
+
+
+def part_in(mapping: Mapping, there: Sequence[Heading], file: str) -> Mapping:
+    """Return what of `mapping` is among the columns `there` of a file."""
+    columns = {name: choice for name, choice in mapping.columns.items() if _has(there, choice, file)}
     others = {name: choice for name, choice in mapping.others.items() if _has(there, choice, file)}
     return replace(mapping, columns=columns, others=others)
 
@@ -84,8 +88,11 @@ def _has(there: Sequence[Heading], choice: ColumnChoice, file: str) -> bool:
     return True
 
 
-def _told_by_titles(there: dict[str, tuple[Heading, ...]], mapping: Mapping) -> Mapping:
-    """Return a mapping of the columns whose title tells the quantity and whose header tells the unit."""
+def told_by_titles(there: dict[str, tuple[Heading, ...]], mapping: Mapping) -> Mapping:
+    """Return a mapping of the columns whose title tells the quantity and whose header tells the unit.
+
+    `there` are the columns of files by their names. Raises `MappingError` where there are none.
+    """
     columns: dict[str, ColumnChoice] = {}
     for own in there.values():
         for heading in own:

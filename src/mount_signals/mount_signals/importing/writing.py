@@ -12,7 +12,7 @@ from mount_bags.bag.writer import BagWriter
 from mount_bags.run.session import session_message, session_text
 from mount_bags.signals.signal import FloatArray
 from mount_ros.topics import SESSION
-from mount_signals.importing.topics import RecordedAs
+from mount_signals.importing.topics import PREFIX, RecordedAs
 
 Times = NDArray[np.int64]
 _BLOCK = 20_000_000_000  # ns, chosen: 20 s at 1 kHz are 7 MB of messages for each topic
@@ -41,7 +41,10 @@ def write_channels(
     try:
         writer.add_topic(f'/{SESSION.name}', SESSION.type, latched=True)
         for channel in channels:
-            writer.add_topic(f'/{channel.place.topic.name}', channel.place.topic.type)
+            place = channel.place
+            # of topics that every command takes the registry tells the unit
+            units = {place.field: channel.unit} if place.topic.name.startswith(PREFIX) else None
+            writer.add_topic(f'/{place.topic.name}', place.topic.type, units=units)
         writer.write(f'/{SESSION.name}', session_message(session_text(session)), begin)
         for first in range(begin, end + 1, _BLOCK):
             _write_block(writer, channels, first, first + _BLOCK)

@@ -27,7 +27,10 @@ def example(
     recordings: Annotated[
         int, typer.Option(metavar='NUMBER', help='how many of the fleet, spread over it')
     ] = 200,
-    seconds: Annotated[float, typer.Option(metavar='S', help='length of the excitation of each drive')] = 4.0,
+    seconds: Annotated[
+        float,
+        typer.Option(metavar='S', help='length of the excitation of each drive, a sweep at most its own'),
+    ] = 4.0,
     workers: Annotated[int, typer.Option(min=0, metavar='NUMBER', help='processes; 0: one on each core')] = 0,
 ) -> None:
     """Make recordings of short simulated drives, a few of them damaged, to try a fleet on."""

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mount_cli.commands.fleet.resuming import resumable
-from mount_cli.commands.options import JsonFile, Scheduler, Workers
+from mount_cli.commands.options import Dbc, JsonFile, MapFiles, Scheduler, Workers
 from mount_cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when the catalogue is written, also where recordings are damaged, which their rows
@@ -17,6 +17,8 @@ Examples:
 `engine-mount fleet index drives --out catalogue` - all recordings below a folder
 
 `engine-mount fleet index s3://bucket/drives sftp://host/data/drives --out catalogue` - in stores
+
+`engine-mount fleet index drives --map rack_2.yaml --map car.yaml --out catalogue` - files of others too
 
 `engine-mount fleet index drives --out catalogue --scheduler tcp://10.0.0.5:8786` - read by a Dask cluster,
 whose workers must reach the same places
@@ -29,6 +31,8 @@ the same command goes on where it stopped.
 def index(
     uris: Annotated[list[str], typer.Argument(metavar='URI...', help='folders or recordings, paths or URIs')],
     out: Annotated[Path, typer.Option(metavar='CATALOGUE', help='folder to make or to bring up to date')],
+    map_files: MapFiles = None,
+    dbc: Dbc = None,
     scheduler: Scheduler = 'local',
     workers: Workers = 0,
     memory: Annotated[
@@ -42,6 +46,7 @@ def index(
 
     from mount_cli.screen import TerminalScreen
     from mount_replay.fleet.catalogue.index import indexed
+    from mount_replay.fleet.foreign import said_in
     from mount_report.json_file import write_json
 
     console, began = terminal(), monotonic()
@@ -49,6 +54,7 @@ def index(
         found = indexed(
             uris,
             out,
+            said_in(map_files or [], dbc),
             scheduler=scheduler,
             workers=workers,
             memory=memory * 1_000_000,

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from mount_cli.commands.fleet.resuming import resumable
-from mount_cli.commands.options import JsonFile, Scheduler, Workers
+from mount_cli.commands.options import Dbc, JsonFile, MapFiles, Scheduler, Workers
 from mount_cli.commands.other_than_recorded import OtherThanRecorded, changes_of
 from mount_cli.completion.values import named
 from mount_cli.terminal import note, terminal
@@ -20,9 +20,12 @@ Examples:
 
 `engine-mount fleet replay CATALOGUE --policy switched_viscous --out result --workers 2`
 
-`engine-mount fleet replay s3://bucket/drives --set lowest_amplitude=0.0002 --out result`
+`engine-mount fleet replay s3://bucket/drives --set continuous_viscous.full_amplitude=0.0006 --out result`
 
-`engine-mount fleet replay drives --set lowest_amplitude=0.0002 --closed-loop --out moved` - and the motion?
+`engine-mount fleet replay drives --set highest_current=2.0 --closed-loop --out moved` - and the motion?
+
+`engine-mount fleet replay catalogue --map rack_2.yaml --set highest_current=2.0 --out result` - files of
+others too
 
 An interrupted run goes on with the same command. The table is result.parquet in the folder of the result;
 setpoints are compared for the recorded displacement, with --closed-loop the displacement is simulated anew.
@@ -47,12 +50,15 @@ def replay(
         bool,
         typer.Option('--closed-loop', help='simulate engine and mount anew over recorded accelerations'),
     ] = False,
+    map_files: MapFiles = None,
+    dbc: Dbc = None,
     scheduler: Scheduler = 'local',
     workers: Workers = 0,
     json_file: JsonFile = None,
 ) -> None:
     """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
     from mount_cli.screen import TerminalScreen
+    from mount_replay.fleet.foreign import said_in
     from mount_replay.fleet.what_if.run import Advance, FleetOrder, replay_fleet
     from mount_report.json_file import write_json
 
@@ -60,7 +66,7 @@ def replay(
     if not changes:
         raise typer.BadParameter('say what is to be other than recorded, with --set or --policy')
     console = terminal()
-    order = FleetOrder(places, changes, closed_loop)
+    order = FleetOrder(places, changes, closed_loop, said_in(map_files or [], dbc))
     with resumable(), TerminalScreen(console).bar('replaying') as show:
 
         def told(progress: Advance) -> None:

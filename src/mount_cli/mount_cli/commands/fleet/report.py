@@ -21,7 +21,7 @@ Examples:
 `engine-mount fleet report result --by pad_energy_changed_j --count 5 --out energy.html`
 """
 
-_BY = {'setpoints': 'setpoint_difference_largest_a', 'displacement': 'peak_displacement_changed_m'}
+_BY = {'setpoints': 'setpoint_difference_largest_a', 'displacement': 'displacement_difference_largest_m'}
 """By which column the worst are chosen, by what was asked."""
 
 
@@ -55,24 +55,29 @@ def report(
     with TerminalScreen(console).bar('replaying the worst', transient=True) as show:
         for place, one in enumerate(found):
             show(place / len(found), detail=one.row['recording'])
-            looks.append(_look(one, by))
+            looks.append(_look(one, result))
     for look in looks:
         if look.reason:
-            note(console, f'{look.recording}: no picture: {look.reason}')
+            note(console, f'{look.name}: no picture: {look.reason}')
     file = out or result / 'report.html'
     file.parent.mkdir(parents=True, exist_ok=True)
-    fleet_report(table, looks, by, f'Fleet {result.absolute().name}').write_page(file)
+    fleet_report(table, looks, by, result.absolute().name).write_page(file)
     console.print(f'report     {file}', soft_wrap=True)
 
 
-def _look(one: 'Worst', by: str) -> 'Look':
+def _look(one: 'Worst', result: Path) -> 'Look':
     from mount_replay.fleet.before_and_after import before_and_after
-    from mount_report.fleet.looks import Look
+    from mount_replay.fleet.worst import said_of
+    from mount_report.fleet.looks import Look, Signals
 
-    named = ' '.join(filter(None, (one.row['recording'], one.row['mount'])))
-    value = f'{one.value:.4g}'
     try:
-        signals = before_and_after(one.uri, one.changes, one.row['mount'] or '')
+        found = before_and_after(
+            one.uri,
+            one.changes,
+            one.row['mount'] or '',
+            closed_loop=one.row['asked'] == 'displacement',
+            said=said_of(result),
+        )
     except (ValueError, OSError) as error:
-        return Look(named, value, one.commands, reason=str(error))
-    return Look(named, value, one.commands, signals.time, signals.displacement, signals.before, signals.after)
+        return Look(one.row, one.commands, reason=str(error))
+    return Look(one.row, one.commands, Signals(found.time, found.given, found.setpoints, found.displacements))

@@ -5,8 +5,8 @@ from mount_replay.fleet.columns import COUNT, FLAG, NUMBER, TEXT, TIME, Column
 
 BANDS = (BELOW_ISOLATION, *ISOLATION_BANDS)
 
-DRIVE, REPLAY, OTHER, UNREADABLE = 'drive', 'replay', 'other', 'unreadable'
-"""Kinds of a recording; `other` holds no displacement of a mount."""
+DRIVE, REPLAY, FOREIGN, OTHER, UNREADABLE = 'drive', 'replay', 'foreign', 'other', 'unreadable'
+"""Kinds of a recording; `foreign` is a file of others, `other` holds no displacement of a mount."""
 
 _PLACE = (
     Column('uri', TEXT, '', 'where the recording lies: its folder, or its file'),
@@ -14,7 +14,12 @@ _PLACE = (
     Column('mount', TEXT, '', 'which of several mounts the row tells of; empty where there is one'),
 )
 _WHAT = (
-    Column('kind', TEXT, '', 'drive, replay, other (no displacement of a mount) or unreadable'),
+    Column(
+        'kind',
+        TEXT,
+        '',
+        'drive, replay, foreign (a file of others), other (no displacement of a mount) or unreadable',
+    ),
     Column('reason', TEXT, '', 'why nothing, or not all, of it can be read or told; empty where all can'),
     Column('whole', FLAG, '', 'whether nothing of the files is known to be damaged or missing'),
     Column('size_bytes', COUNT, 'B', 'size of its files'),
@@ -25,11 +30,28 @@ _WHAT = (
     Column('policy', TEXT, '', 'parameter mount_control.policy of the session'),
     Column('started', TIME, '', 'when it began (UTC), by its session, else by its first message'),
     Column('duration_s', NUMBER, 's', 'length: of the displacement by its rate, else of all messages'),
-    Column('distance_m', NUMBER, 'm', 'speed of the car times duration, where the session tells a speed'),
+    Column(
+        'distance_m',
+        NUMBER,
+        'm',
+        'speed of the car times duration, where the session, or a column of a file of others, tells a speed',
+    ),
     Column('version', TEXT, '', 'version of this project by which it was made'),
     Column('versions', TEXT, '', 'all versions by which it was made, JSON'),
     Column('parameters', TEXT, '', 'parameters that are not at their default, JSON {node.parameter: value}'),
     Column('messages', COUNT, '', 'messages in its files, of all mounts'),
+)
+_OF_OTHERS = (
+    Column('columns', TEXT, '', 'columns of a file of others, JSON {column: unit that its header tells}'),
+    Column('mapping_file', TEXT, '', 'mapping file by which it was read; empty: by titles and units'),
+    Column('mapped', TEXT, '', 'what of it was taken, JSON {quantity: column}'),
+    Column('rate_hz', NUMBER, 'Hz', 'samples per second of what was taken'),
+    Column(
+        'rms_acceleration_m_s2',
+        NUMBER,
+        'm/s^2',
+        'rms of the acceleration of the chassis in a file of others, about its mean',
+    ),
 )
 _LOST = (
     Column('samples', COUNT, '', 'samples from the first to the last displacement, lost ones included'),
@@ -85,7 +107,7 @@ _IN_BANDS = tuple(
     for band in BANDS
 )
 
-RECORDINGS = (*_PLACE, *_WHAT, *_LOST, *_STATE, *_IN_BANDS)
+RECORDINGS = (*_PLACE, *_WHAT, *_LOST, *_STATE, *_IN_BANDS, *_OF_OTHERS)
 """A row for each mount of each recording."""
 
 EVENTS = (

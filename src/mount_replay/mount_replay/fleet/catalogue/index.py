@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,10 @@ from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.columns import UNREADABLE
 from mount_replay.fleet.catalogue.journal import Journal
 from mount_replay.fleet.catalogue.places import Place, below, places
-from mount_replay.fleet.catalogue.rows import Row, Rows, read_place, unreadable
+from mount_replay.fleet.catalogue.reading import fingerprint_of, read_place
+from mount_replay.fleet.catalogue.rows import Row, Rows, unreadable
 from mount_replay.fleet.catalogue.stored import read_rows, write_catalogue
+from mount_replay.fleet.foreign import NOTHING_SAID, Said
 from mount_replay.fleet.runner import run_tasks
 
 if TYPE_CHECKING:
@@ -34,6 +37,7 @@ class Indexed:
 def indexed(
     uris: Iterable[str | os.PathLike[str]],
     out: str | os.PathLike[str],
+    said: Said = NOTHING_SAID,
     *,
     scheduler: str = 'local',
     workers: int = 0,
@@ -44,23 +48,28 @@ def indexed(
 
     Recordings whose files have the same sizes, times and etags are not read again; those that are no more
     below `uris` leave the catalogue, those that lie elsewhere stay. Stopped by whatever, the same order goes
-    on where it stopped. `told` takes how many are done, of how many; `scheduler`, `workers` and `memory` are
-    those of `run_tasks`. Rows depend on the recordings alone. Raises `SourceError`, `SchedulerLostError`,
-    and `OSError` where `out` cannot be written.
+    on where it stopped. With mappings `said` of files of others these are rows too; without any only those
+    that are named themselves. `told` takes how many are done, of how many; `scheduler`, `workers` and
+    `memory` are those of `run_tasks`. Rows depend on the recordings, and `said`, alone. Raises
+    `SourceError`, `SchedulerLostError`, and `OSError` where `out` cannot be written.
     """
     roots = [os.fspath(uri) for uri in uris]
-    found = places(roots)
+    found = places(roots, others=said.is_known)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     kept = read_rows(folder)
     with Journal(folder) as journal:
         known = {
-            uri: rows for uri, rows in (kept | journal.rows).items() if _is_current(rows, found.get(uri))
+            uri: rows
+            for uri, rows in (kept | journal.rows).items()
+            if _is_current(rows, found.get(uri), said.mark)
         }
         waiting = [place for uri, place in found.items() if uri not in known]
         told(0, len(waiting))
         watch = StoreWatch()
-        tasks = run_tasks(read_place, waiting, scheduler=scheduler, workers=workers, memory=memory)
+        tasks = run_tasks(
+            partial(read_place, said=said), waiting, scheduler=scheduler, workers=workers, memory=memory
+        )
         for count, done in enumerate(tasks, 1):
             place = waiting[done.place]
             rows = done.result or unreadable(place, reason_of(done), fingerprint='')
@@ -80,9 +89,10 @@ def indexed(
     )
 
 
-def _is_current(rows: Rows, place: Place | None) -> bool:
+def _is_current(rows: Rows, place: Place | None, mark: str) -> bool:
     """Return whether rows tell of the files as they are now; what could not be fetched is tried again."""
-    return place is not None and rows.recordings[0]['fingerprint'] == place.fingerprint
+    row = rows.recordings[0]
+    return place is not None and row['fingerprint'] == fingerprint_of(place, row['kind'], mark)
 
 
 def _is_unreadable(rows: list[Row]) -> bool:

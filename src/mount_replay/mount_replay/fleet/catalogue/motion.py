@@ -35,19 +35,7 @@ class Motion:
 
     def figures(self, rate: float) -> dict[str, Any]:
         """Return peak and rms, of the whole displacement and in bands, {} where none is known."""
-        stamps, values = self._by_stamps()
-        count = sum(map(len, _known(values)))
-        if not count:
-            return {}
-        mean = math.fsum(float(piece.sum()) for piece in _known(values)) / count
-        square = math.fsum(float(np.square(piece - mean).sum()) for piece in _known(values))
-        figures: dict[str, Any] = {
-            'peak_displacement_m': max(float(np.abs(piece).max(initial=0.0)) for piece in _known(values)),
-            'rms_displacement_m': math.sqrt(square / count),
-        }
-        for band, found in zip(BANDS, in_bands(stamps, values, rate, BANDS), strict=True):
-            figures |= {band_name('peak', band): found.peak, band_name('rms', band): found.rms}
-        return figures
+        return motion_figures(*self._by_stamps(), rate)
 
     def _by_stamps(self) -> tuple[CompactTimes, FloatArray]:
         """Return the samples in the order of their stamps, of several with the same stamp the first.
@@ -63,6 +51,22 @@ class Motion:
             return stamps, values
         found, first = np.unique(stamps.whole(), return_index=True)
         return compact(found), values[first]
+
+
+def motion_figures(stamps: CompactTimes, values: FloatArray, rate: float) -> dict[str, Any]:
+    """Return peak and rms of displacements (m) with rising stamps, as a whole and in bands; `rate` in Hz."""
+    count = sum(map(len, _known(values)))
+    if not count:
+        return {}
+    mean = math.fsum(float(piece.sum()) for piece in _known(values)) / count
+    square = math.fsum(float(np.square(piece - mean).sum()) for piece in _known(values))
+    figures: dict[str, Any] = {
+        'peak_displacement_m': max(float(np.abs(piece).max(initial=0.0)) for piece in _known(values)),
+        'rms_displacement_m': math.sqrt(square / count),
+    }
+    for band, found in zip(BANDS, in_bands(stamps, values, rate, BANDS), strict=True):
+        figures |= {band_name('peak', band): found.peak, band_name('rms', band): found.rms}
+    return figures
 
 
 def _known(values: FloatArray) -> Iterator[FloatArray]:

@@ -1,7 +1,7 @@
 """One recording as rows of a catalogue: whatever is wrong with it is told in its row."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC
 from pathlib import Path
@@ -20,8 +20,6 @@ from mount_bringup.recorded_mount import simulated_mounts
 from mount_replay.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
 from mount_replay.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures
 from mount_replay.fleet.catalogue.places import Place
-from mount_signals.sources.source import StoreAwayError
-from mount_signals.sources.stores import local_copy
 from mount_sim.plant.mounts import without_friction
 
 Row = dict[str, Any]
@@ -37,25 +35,10 @@ class Rows:
     events: list[Row] = field(default_factory=list)
 
 
-def read_place(place: Place) -> Rows:
-    """Return the rows of the recording at `place`; never raises for what is wrong with a recording.
-
-    What could not be fetched has no fingerprint, so that it is tried again next time. Raises
-    `StoreAwayError` where the store does not answer.
-    """
-    try:
-        with local_copy(place.uri) as path:
-            return rows_of(path, place)
-    except StoreAwayError:
-        raise
-    except OSError as error:
-        return unreadable(place, str(error), fingerprint='')
-
-
 def unreadable(place: Place, reason: str, fingerprint: str) -> Rows:
     """Return the row of a recording of which nothing can be told."""
-    row = {**_place_of(place), 'kind': UNREADABLE, 'reason': reason[:_LONGEST], 'mount': ''}
-    return Rows([row | {'fingerprint': fingerprint, 'size_bytes': place.size}])
+    row = {**place_of(place), 'kind': UNREADABLE, 'reason': reason[:_LONGEST], 'mount': ''}
+    return Rows([row | {'fingerprint': fingerprint}])
 
 
 def rows_of(path: Path, place: Place) -> Rows:
@@ -63,24 +46,24 @@ def rows_of(path: Path, place: Place) -> Rows:
     try:
         recording = open_run(path)
     except ReadingError as error:
-        return unreadable(place, _named(str(error), path, place), place.fingerprint)
+        return unreadable(place, named(str(error), path, place), place.fingerprint)
     rows = Rows()
     for part in recording.by_mount():
         reasons: list[str] = []
-        row = {**_place_of(place), 'mount': part.mount, 'messages': recording.message_count}
+        row = {**place_of(place), 'mount': part.mount, 'messages': recording.message_count}
         content = told_session(part)
         row |= _session_figures(part, content, reasons)
         for figures in _guarded(part, reasons, rows.events, row):
             row |= figures
         if _is_without_friction(session_parameters(content)):
             row |= dict.fromkeys(OF_FRICTION)
-        reasons = list(dict.fromkeys([*recording.warnings, *reasons]))
-        told = _named('; '.join(reasons), path, place)[:_LONGEST]
+        told = reason_of([*recording.warnings, *reasons], path, place)
         rows.recordings.append(row | {'whole': recording.whole, 'reason': told})
     return rows
 
 
-def _place_of(place: Place) -> Row:
+def place_of(place: Place) -> Row:
+    """Return what a row tells of the place of its recording."""
     return {
         'uri': place.uri,
         'recording': place.recording,
@@ -89,7 +72,12 @@ def _place_of(place: Place) -> Row:
     }
 
 
-def _named(text: str, path: Path, place: Place) -> str:
+def reason_of(reasons: Sequence[str], path: Path, place: Place) -> str:
+    """Return what is wrong with the recording at `path`, each reason once, as its row tells it."""
+    return named('; '.join(dict.fromkeys(reasons)), path, place)[:_LONGEST]
+
+
+def named(text: str, path: Path, place: Place) -> str:
     """Return a sentence with the name of the recording instead of where its local copy lay."""
     return text.replace(str(path), place.recording)
 

@@ -1,6 +1,7 @@
 """Makes the example fleet: the same bytes each time on the same installation."""
 
 import hashlib
+import math
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -26,6 +27,7 @@ from mount_replay.fleet.example.damages import DAMAGES
 from mount_replay.fleet.example.variations import DRIVES, VARIATIONS, Drive, Variation
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.loop.recording import record_car, record_core
+from mount_sim.excitation.scenario import SweepScenario
 
 WHOLE_FLEET = len(DRIVES) * len(VARIATIONS)
 FEWEST = len(DAMAGES) + 1
@@ -62,7 +64,7 @@ def make_example(
     """Make so many recordings below the new folder `folder` and return each as it is done.
 
     One of each kind of damage is among them, the others are spread over drives and variations. `seconds` is
-    the length of the excitation. Raises `ExampleError`.
+    the length of the excitation, of a sweep at most its own. Raises `ExampleError`.
     """
     if not FEWEST <= recordings <= WHOLE_FLEET:
         raise ExampleError(f'the example fleet has {FEWEST} to {WHOLE_FLEET} recordings, not {recordings}')
@@ -116,13 +118,23 @@ def settings_of(order: Ordered) -> dict[str, dict[str, Any]]:
     """Return the parameters of the nodes of a drive."""
     drive, variation = order.drive, order.variation
     switched = drive.control.get('policy') == 'switched_viscous'
-    timeline = {'timeline.start': START, 'timeline.duration': order.seconds}
+    timeline = {'timeline.start': START, 'timeline.duration': min(order.seconds, _longest(drive))}
     seed = {'seed': 10 * (order.number // len(VARIATIONS)) + int(variation.sim.get('seed', 1))}
     control = {**drive.control, **(variation.switched if switched else variation.control)}
     settings: dict[str, dict[str, Any]] = {'mount_sim': {**drive.sim, **timeline, **variation.sim, **seed}}
     if control and not variation.own_control:
         settings['mount_control'] = control
     return with_control_of_mount(with_sample_rate(checked_settings(settings), variation.sample_rate))
+
+
+def _longest(drive: Drive) -> float:
+    """Return how long a drive can be (s): a sweep ends at its last frequency."""
+    if drive.sim['scenario'] != 'sweep':
+        return math.inf
+    sweep = SweepScenario()._replace(
+        first_frequency=drive.sim['sweep.first_frequency'], rate=drive.sim['sweep.rate']
+    )
+    return (sweep.last_frequency - sweep.first_frequency) / sweep.rate
 
 
 def _driven(order: Ordered, folder: Path) -> Path:

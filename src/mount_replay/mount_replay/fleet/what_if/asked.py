@@ -17,17 +17,19 @@ class AskedError(ValueError):
     """An order means no recording, or one name means two; the text says which."""
 
 
-def recordings_asked(places: Sequence[str]) -> list[Place]:
+def recordings_asked(places: Sequence[str], *, others: bool = False) -> list[Place]:
     """Return the recordings of catalogues and below URIs or paths, by their names; raises a `ValueError`.
 
-    A catalogue is a table with the columns `uri`, `recording`, `size_bytes` and `fingerprint`, a Parquet file
-    or the folder of `engine-mount fleet index`; it tells of files as they were when it was made. Raises
-    `SourceError` where a place cannot be listed.
+    With `others` files of others below URIs or paths are meant too, of a catalogue always. A catalogue is a
+    table with the columns `uri`, `recording`, `size_bytes` and `fingerprint`, a Parquet file or the folder of
+    `engine-mount fleet index`; it tells of files as they were when it was made. Raises `SourceError` where a
+    place cannot be listed.
     """
     found: dict[str, Place] = {}
     for place in places:
         table = _catalogue(place)
-        for asked in _of_catalogue(table) if table is not None else listed([place]).values():
+        below = listed([place], others=others).values() if table is None else _of_catalogue(table)
+        for asked in below:
             other = found.setdefault(asked.recording, asked)
             if other.uri != asked.uri:
                 raise AskedError(

@@ -6,7 +6,8 @@ engine on a simulated mount, once with each controller, and these two are compar
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from mount_bags.bag.recording import Recording
 from mount_bags.run.session import session_parameters
 from mount_bags.signals.even_grid import evenly_spaced
 from mount_bags.signals.signal import signal_of
+from mount_bringup.chosen import control_parameters
+from mount_bringup.sample_rate import with_sample_rate
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.policy.contract import Policy, trace_dtype
 from mount_control.sample_watch import SampleCounts
@@ -43,6 +46,9 @@ Times = NDArray[np.int64]
 Column = NDArray[np.float64]
 
 _VERTICAL = 'linear_acceleration.z'
+_COMPARED = ('setpoint', 'displacement')
+"""What is kept of a drive so that another one can be compared with it, sample by sample."""
+_PICTURED = (*_COMPARED, 'stamp', 'chassis_acceleration')
 _OWN = ('scenario', 'faults', 'mounts', 'timeline.duration')  # parameters of the drive that was recorded
 _MOTION = record_type([(name, 'f8') for name in ('count', 'square', 'peak', 'force_peak')])
 
@@ -54,12 +60,7 @@ def compared_motion(recorded: Recorded, changes: Parameters) -> dict[str, Any]:
     is initialised. Engine, mount and electronics are those of the session, or the defaults. Raises a
     `ValueError` with the reason where there are none.
     """
-    after = _with_plant(recorded, changed_parameters(recorded, changes))
-    before = _with_plant(recorded, recorded.parameters)
-    sim = with_flattened(SimParameters(), before['mount_sim'])
-    excitation = _shaken(recorded.recording, sim.timeline.start)
-    first = _driven(before, excitation, None)
-    other = _driven(after, excitation, first)
+    sim, first, other = _both(recorded, changes, _COMPARED, ())
     sample_time = 1.0 / sim.sample_rate
     return {
         'duration_s': first.answers.samples * sample_time,
@@ -73,7 +74,46 @@ def compared_motion(recorded: Recorded, changes: Parameters) -> dict[str, Any]:
         ),
         **first.motion(),
         **other.motion('_changed'),
+        **other.moved(),
     }
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A simulated drive as signals (n,) over `time` (s from the beginning of the recorded acceleration).
+
+    `acceleration` (m/s^2) is that of the chassis, `displacement` (m) that of the mount, `setpoint` in A.
+    """
+
+    time: Column
+    acceleration: Column
+    displacement: Column
+    setpoint: Column
+
+
+def both_motions(recorded: Recorded, changes: Parameters) -> tuple[Motion, Motion]:
+    """Return the two drives that `compared_motion` compares: as recorded, and with `changes`."""
+    _, first, other = _both(recorded, changes, _PICTURED, _PICTURED)
+    return _motion(first), _motion(other)
+
+
+def _motion(drive: '_Drive') -> Motion:
+    time = (drive.column('stamp') - drive.start) * 1e-9
+    return Motion(
+        time, *(drive.column(name) for name in ('chassis_acceleration', 'displacement', 'setpoint'))
+    )
+
+
+def _both(
+    recorded: Recorded, changes: Parameters, kept: Sequence[str], of_other: Sequence[str]
+) -> tuple[SimParameters, '_Drive', '_Drive']:
+    """Return the parameters of the simulator, the drive as recorded, and the one with `changes`."""
+    after = _with_plant(recorded, changed_parameters(recorded, changes))
+    before = _with_plant(recorded, recorded.parameters)
+    sim = with_flattened(SimParameters(), before['mount_sim'])
+    excitation = _shaken(recorded.recording, sim.timeline.start)
+    first = _driven(before, excitation, kept)
+    return sim, first, _driven(after, excitation, of_other, first)
 
 
 def _with_plant(recorded: Recorded, parameters: Parameters) -> dict[str, Mapping[str, Any]]:
@@ -81,7 +121,8 @@ def _with_plant(recorded: Recorded, parameters: Parameters) -> dict[str, Mapping
     known = defaults_of_nodes()['mount_sim']
     told = session_parameters(recorded.session).get('mount_sim', {})
     plant = {name: value for name, value in told.items() if name in known and name not in _OWN}
-    return {**parameters, **checked_settings({'mount_sim': plant})}
+    settings = {**parameters, **checked_settings({'mount_sim': plant})}
+    return with_sample_rate(settings, control_parameters(parameters).sample_rate)
 
 
 def _shaken(recording: Recording, start: float) -> Excitation:
@@ -99,20 +140,26 @@ def _shaken(recording: Recording, start: float) -> Excitation:
     return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, start)
 
 
-def _driven(parameters: Parameters, excitation: Excitation, other: '_Drive | None') -> '_Drive':
-    drive = _Drive(CoreChain(parameters).policy, round(excitation.start * 1e9), other)
+def _driven(
+    parameters: Parameters, excitation: Excitation, kept: Sequence[str], other: '_Drive | None' = None
+) -> '_Drive':
+    drive = _Drive(CoreChain(parameters).policy, round(excitation.start * 1e9), kept, other)
     run_core_into(drive, parameters, excitation=excitation)
     return drive
 
 
 class _Drive:
-    """Takes the samples of a drive from the stamp `start` (ns) on; with `other`, the differences from it."""
+    """Takes the samples of a drive from the stamp `start` (ns) on, and keeps the columns `kept` of them.
 
-    def __init__(self, policy: Policy, start: int, other: '_Drive | None'):
+    With `other`, which kept `_COMPARED`, it takes the differences from that one.
+    """
+
+    def __init__(self, policy: Policy, start: int, kept: Sequence[str], other: '_Drive | None'):
         self.start = start
         self.answers, self.difference = AnswerFigures(), DifferenceFigures()
         self._trace, self._other = trace_dtype(policy), other
-        self._setpoints: list[Column] = []
+        self._kept: dict[str, list[NDArray[Any]]] = {name: [] for name in kept}
+        self._displacements = DifferenceFigures()
         self._count, self._initialised = 0, False
         self._motion = np.zeros(1, _MOTION).view(np.uint8)
 
@@ -131,12 +178,12 @@ class _Drive:
     def write_off(self, stamp: int) -> None:
         """Let the last setpoint pass."""
 
-    @property
-    def setpoints(self) -> Column:
-        """All setpoints (A) from `start` on."""
-        if len(self._setpoints) > 1:
-            self._setpoints = [np.concatenate(self._setpoints)]
-        return self._setpoints[0]
+    def column(self, name: str) -> NDArray[Any]:
+        """Return a column that is kept, (n,), from `start` on: A, m, m/s^2, or stamps in ns."""
+        parts = self._kept[name]
+        if len(parts) > 1:
+            parts[:] = [np.concatenate(parts)]
+        return parts[0]
 
     def motion(self, changed: str = '') -> dict[str, Any]:
         """Return the figures of the motion as columns, with `changed` before their unit."""
@@ -147,6 +194,15 @@ class _Drive:
             f'peak_mount_force{changed}_n': float(now['force_peak']),
         }
 
+    def moved(self) -> dict[str, Any]:
+        """Return how the motion differs from that of the other drive, as columns."""
+        differences = self._displacements
+        return {
+            'displacement_difference_rms_m': differences.rms,
+            'displacement_difference_largest_m': differences.largest,
+            'displacement_difference_largest_at_s': differences.largest_at(self.start),
+        }
+
     def _take(self, samples: Samples, part: slice) -> None:
         stamps, traced = samples.stamps[part].copy(), samples.traced[part].copy()
         setpoints = samples.setpoints[part].copy()
@@ -155,11 +211,14 @@ class _Drive:
         truth = samples.truths[part].view(TRUTH)[:, 0]
         _add_motion(self._motion, truth['displacement'], truth['mount_force'])
         self.answers.add(ControlAnswers(stamps, setpoints, traced, traces, SampleCounts()))
-        if self._other is None:
-            self._setpoints.append(setpoints)
-        else:
-            others = self._other.setpoints[self._count : self._count + len(stamps)]
-            self.difference.add(stamps, setpoints, others)
+        displacement = truth['displacement'].copy()
+        if self._other is not None:
+            others = slice(self._count, self._count + len(stamps))
+            self.difference.add(stamps, setpoints, self._other.column('setpoint')[others])
+            self._displacements.add(stamps, displacement, self._other.column('displacement')[others])
+        of_sample = {'stamp': stamps, 'setpoint': setpoints, 'displacement': displacement}
+        for name, parts in self._kept.items():
+            parts.append(of_sample[name] if name in of_sample else truth[name].copy())
         self._count += len(stamps)
 
 

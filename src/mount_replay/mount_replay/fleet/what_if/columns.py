@@ -16,6 +16,8 @@ _RECORDING = (
     Column('sha256', TEXT, '', 'SHA-256 of its MCAP files'),
     Column('recorded_with', TEXT, '', 'version of this project that made the recording, where it tells'),
     Column('replayed_with', TEXT, '', 'versions of the project and of the libraries that replayed it, JSON'),
+    Column('mapping_file', TEXT, '', 'mapping file of a file of others; empty: read by titles and units'),
+    Column('mapped', TEXT, '', 'columns of a file of others that were taken, JSON {quantity: column}'),
     Column('changes', TEXT, '', 'what was other than recorded, {node: {parameter: value}}, JSON'),
 )
 
@@ -60,13 +62,23 @@ _FRICTION = (
         'largest friction force that the force model of the controller predicts, as recorded',
     ),
     Column('peak_friction_changed_n', NUMBER, 'N', _CHANGED),
-    Column('rms_friction_n', NUMBER, 'N', 'rms of that force over all samples'),
+    Column('rms_friction_n', NUMBER, 'N', 'rms of the predicted friction force, as recorded'),
     Column('rms_friction_changed_n', NUMBER, 'N', _CHANGED),
-    Column('pad_energy_j', NUMBER, 'J', 'energy that the pads take by it at the measured velocity'),
+    Column('pad_energy_j', NUMBER, 'J', 'energy that the pads take by the predicted friction, as recorded'),
     Column('pad_energy_changed_j', NUMBER, 'J', _CHANGED),
 )
 
 _MOTION = (
+    Column(
+        'displacement_difference_rms_m',
+        NUMBER,
+        'm',
+        'rms of the difference of the two simulated displacements (--closed-loop)',
+    ),
+    Column('displacement_difference_largest_m', NUMBER, 'm', 'largest difference, changed minus as recorded'),
+    Column(
+        'displacement_difference_largest_at_s', NUMBER, 's', 'when, from the beginning of the acceleration on'
+    ),
     Column('peak_displacement_m', NUMBER, 'm', 'largest displacement, simulated as recorded (--closed-loop)'),
     Column('peak_displacement_changed_m', NUMBER, 'm', _CHANGED),
     Column('rms_displacement_m', NUMBER, 'm', 'rms of the displacement, simulated as recorded'),

@@ -13,13 +13,15 @@ from mount_control.settings import check_effect
 from mount_replay.agreement import SETTLED, SETTLING
 from mount_replay.core import ControlReplay, run_ramp
 from mount_replay.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
-from mount_replay.given.input import parameters_of, recorded_gaps, session_of
+from mount_replay.given.foreign import default_gap
+from mount_replay.given.input import dated, parameters_of, recorded_gaps, session_of
 from mount_replay.given.parameter_changes import recorded_changes, without
 from mount_replay.given.ramps import MeasuredGap, Ramp, ramps_of
 from mount_replay.given.stretches import STRETCH, OutOfOrderError, Stretch, Stretches
 from mount_replay.given.taken import Column, ControlRun, Notes, ReplayError, quiet_at_first
 from mount_replay.replay import check_parameters, refuse_other_rate, with_changes
 from mount_ros import topics
+from mount_signals.importing.provenance import SCENARIO
 
 Parameters = Mapping[str, Mapping[str, Any]]
 
@@ -97,7 +99,7 @@ class _Comparison:
         self._recording, self._parameters = recorded.recording, recorded.parameters
         self._changed = changed_parameters(recorded, changes)
         self._control = control_parameters(recorded.parameters)
-        self._gaps = recorded_gaps(self._recording)
+        self._gaps = recorded_gaps(self._recording, _assumed_gap(recorded))
         ramps = self._ramps('mount_init' in changes)
         self._changed_gaps = self._initialised(ramps) if 'mount_init' in changes else {}
         self._told = recorded_changes(self._recording)
@@ -161,6 +163,11 @@ class _Comparison:
             **sums.after.row(sample_time, '_changed'),
             **switching_row(before, after, sample_time),
         }
+
+
+def _assumed_gap(recorded: Recorded) -> MeasuredGap | None:
+    """Return the nominal gap where the recording was made of files of others, which hold none."""
+    return dated(default_gap({}), 0) if recorded.session.get('scenario') == SCENARIO else None
 
 
 def _add(sums: _Sums, replays: _Replays, stretch: Stretch) -> None:

@@ -110,17 +110,24 @@ class DifferenceFigures:
         """The largest difference with its sign, A; NaN where nothing was compared."""
         return float(self._record['largest']) if self.compared else math.nan
 
+    @property
+    def rms(self) -> float:
+        """Rms of all differences, A; NaN where nothing was compared."""
+        return math.sqrt(float(self._record['square']) / self.compared) if self.compared else math.nan
+
+    def largest_at(self, zero: int) -> float:
+        """Return when the largest difference was, in s from the stamp `zero` (ns) on; NaN without any."""
+        return (int(self._record['largest_stamp']) - zero) / 1e9 if self.differing else math.nan
+
     def row(self, zero: int) -> dict[str, Any]:
         """Return the figures as columns; times in s from the stamp `zero` (ns) on."""
-        sums, differing = self._record, self.differing
-        rms = math.sqrt(float(sums['square']) / self.compared) if self.compared else math.nan
-        first, largest = ((int(sums[name]) - zero) / 1e9 for name in ('first_stamp', 'largest_stamp'))
+        first = (int(self._record['first_stamp']) - zero) / 1e9
         return {
-            'setpoints_differing': differing,
-            'setpoint_difference_rms_a': rms,
+            'setpoints_differing': self.differing,
+            'setpoint_difference_rms_a': self.rms,
             'setpoint_difference_largest_a': self.largest,
-            'setpoint_difference_largest_at_s': largest if differing else math.nan,
-            'setpoint_difference_first_at_s': first if differing else math.nan,
+            'setpoint_difference_largest_at_s': self.largest_at(zero),
+            'setpoint_difference_first_at_s': first if self.differing else math.nan,
         }
 
     @property

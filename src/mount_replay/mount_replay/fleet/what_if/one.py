@@ -13,6 +13,7 @@ from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.run.place import recording_hash, recording_place
 from mount_bags.run.versions import versions
 from mount_replay.fleet.catalogue.places import Place
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
 from mount_replay.fleet.what_if.columns import DISPLACEMENT, SETPOINTS
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
 from mount_signals.sources.source import StoreAwayError
@@ -38,17 +39,24 @@ class Replayed:
     worker: str
 
 
-def replay_one(asked: Place, changes: Changes, closed_loop: bool = False) -> Replayed:
+def replay_one(
+    asked: Place, changes: Changes, closed_loop: bool = False, said: Said = NOTHING_SAID
+) -> Replayed:
     """Return the rows of one recording with `changes` {node: {parameter: value}}; nothing is remembered.
 
-    What cannot be replayed, and what cannot be fetched, is a row with its reason. Raises `StoreAwayError`
-    where the store does not answer.
+    `said` is what is said of files of others. What cannot be replayed, and what cannot be fetched, is a row
+    with its reason. Raises `StoreAwayError` where the store does not answer.
     """
     begin, worker = time.process_time(), f'{platform.node()}/{os.getpid()}'
     common = {'recording': asked.recording, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
     try:
         with local_copy(asked.uri) as path:
-            rows = tuple({**common, **row} for row in _rows(asked, path, changes, closed_loop))
+            found = (
+                [_foreign_row(asked, path, changes, closed_loop, said)]
+                if is_of_others(path, said)
+                else _rows(asked, path, changes, closed_loop)
+            )
+            rows = tuple({**common, **row} for row in found)
         fetched = True
     except StoreAwayError:
         raise
@@ -65,6 +73,19 @@ def told_of(changes: Changes, closed_loop: bool) -> Row:
         'replayed_with': _json(replayed_with),
         'changes': _json(changes),
     }
+
+
+def _foreign_row(asked: Place, path: Path, changes: Changes, closed_loop: bool, said: Said) -> Row:
+    """Return the row of a file of others, which is made a recording for as long as it is replayed."""
+    row: Row = {'sha256': recording_hash(path), 'mount': ''}
+    try:
+        mapped = mapped_in(path, said)
+        row |= mapped.told
+        with as_recording(mapped, closed_loop=closed_loop) as place:
+            row |= _figures(open_recording(place), changes, closed_loop) | {'recorded_with': ''}
+    except ValueError as error:
+        row['reason'] = _told(error, asked, path)
+    return row
 
 
 def _rows(asked: Place, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:

@@ -83,8 +83,9 @@ class Result:
         """
         parts = (row for part in self._read() for row in part.to_pylist())
         # a recording that was another one before has other rows there, of another fingerprint
-        rows = [row for row in parts if asked.get(row['recording']) == row.pop(_FINGERPRINT)]
-        table = table_of(REPLAY_COLUMNS, [*rows, *others]).sort_by(_SORTED_BY).combine_chunks()
+        rows = [row for row in parts if asked.get(row['recording']) == row[_FINGERPRINT]]
+        table = table_of(_OF_PARTS, [*rows, *others]).drop([_FINGERPRINT])
+        table = table.sort_by(_SORTED_BY).combine_chunks()
         write_table(table, self.table)
         return table
 

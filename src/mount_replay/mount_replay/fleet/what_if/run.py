@@ -12,6 +12,7 @@ from mount_bags.run.versions import versions
 from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.places import Place, root_of
 from mount_replay.fleet.cluster import LOCAL, processes_for
+from mount_replay.fleet.foreign import NOTHING_SAID, Said
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.fleet.what_if.asked import recordings_asked
 from mount_replay.fleet.what_if.one import Replayed, Row, replay_one, told_of
@@ -30,12 +31,13 @@ _OF_A_WORKER = ('mount_bringup', 'numpy', 'numba', 'python')
 class FleetOrder:
     """What is asked: `places` (catalogues, URIs, paths) with `changes` {node: {parameter: value}}.
 
-    `closed_loop`: displacement is asked, not setpoints.
+    `closed_loop`: displacement is asked, not setpoints. `said` is what is said of files of others.
     """
 
     places: Sequence[str]
     changes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     closed_loop: bool = False
+    said: Said = NOTHING_SAID
 
     def told(self) -> dict[str, Any]:
         """Return what makes two orders the same: all but where they run."""
@@ -45,6 +47,7 @@ class FleetOrder:
             'changes': self.changes,
             'closed_loop': self.closed_loop,
             'versions': {name: here[name] for name in _OF_A_WORKER},
+            **({'of_others': of_others} if (of_others := self.said.told) else {}),
         }
         return json.loads(json.dumps(told, default=list))
 
@@ -114,7 +117,7 @@ def replay_fleet(
     run cannot begin or go on; what was done until then stays, and the same order goes on from there.
     """
     begin = time.monotonic()
-    asked = recordings_asked(order.places)
+    asked = recordings_asked(order.places, others=order.said.is_known)
     result = Result(out)
     with result.taken(order.told()):
         finished = result.finished()
@@ -163,8 +166,8 @@ class _Run:
 
     def through(self, scheduler: str, workers: int) -> None:
         """Replay all that is left; what is done is written, whatever ends this."""
-        work = partial(replay_one, changes=self._order.changes, closed_loop=self._order.closed_loop)
-        watch = StoreWatch()
+        order, watch = self._order, StoreWatch()
+        work = partial(replay_one, changes=order.changes, closed_loop=order.closed_loop, said=order.said)
         begin = written = time.monotonic()
         try:
             for count, done in enumerate(

@@ -1,9 +1,9 @@
 // ---- drawing
 
-function colourOf(name) { // lighter on dark paper; grey stays behind
-  if (!dark.matches || printing || name.slice(1, 3) === name.slice(3, 5)) return name;
-  const part = (place) => parseInt(name.slice(place, place + 2), 16);
-  return `rgb(${[1, 3, 5].map((place) => Math.round(part(place) + 0.42 * (255 - part(place)))).join(',')})`;
+function colourOf(name) { // lighter on dark paper; grey stays behind, where it can still be read
+  if (!dark.matches || printing) return name;
+  const part = (place) => parseInt(name.slice(place, place + 2), 16), lighter = part(1) === part(3) ? 0.27 : 0.42;
+  return `rgb(${[1, 3, 5].map((place) => Math.round(part(place) + lighter * (255 - part(place)))).join(',')})`;
 }
 
 function draw(chart) {
@@ -96,8 +96,10 @@ function paintFrame(paint, chart, panel, area, [low, high], last, width, ink) {
     const x = Math.round(area.x(tick)) + 0.5;
     if (x < left || x > right + 1) continue;
     line(paint, x, top, x, bottom);
-    if (last) paint.fillText(Number(tick.toPrecision(8)), x, bottom + 4);
+    paint.textAlign = x > right - 8 ? 'right' : 'center'; // whole at the edge of the page too
+    if (last) paint.fillText(Number(tick.toPrecision(8)), x > right - 8 ? right + RIGHT : x, bottom + 4);
   }
+  paint.textAlign = 'center';
   if (last) paint.fillText(chart.told.x_label, (left + right) / 2, bottom + 20);
 }
 

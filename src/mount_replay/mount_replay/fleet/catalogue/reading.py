@@ -1,0 +1,40 @@
+"""One recording, or file of others, as rows of a catalogue."""
+
+from pathlib import Path
+
+from mount_replay.fleet.catalogue.columns import DRIVE, REPLAY
+from mount_replay.fleet.catalogue.places import Place
+from mount_replay.fleet.catalogue.rows import Rows, rows_of, unreadable
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, is_of_others
+from mount_signals.sources.source import StoreAwayError
+from mount_signals.sources.stores import local_copy
+
+
+def read_place(place: Place, said: Said = NOTHING_SAID) -> Rows:
+    """Return the rows of what lies at `place`; never raises for what is wrong with it.
+
+    `said` is what is said of files of others. What could not be fetched has no fingerprint, so that it is
+    tried again next time; what depends on `said` has its mark in the fingerprint. Raises `StoreAwayError`
+    where the store does not answer.
+    """
+    try:
+        with local_copy(place.uri) as path:
+            rows = _rows_of_others(path, place, said) if is_of_others(path, said) else rows_of(path, place)
+    except StoreAwayError:
+        raise
+    except OSError as error:
+        return unreadable(place, str(error), fingerprint='')
+    for row in rows.recordings:
+        row['fingerprint'] = fingerprint_of(place, row['kind'], said.mark)
+    return rows
+
+
+def _rows_of_others(path: Path, place: Place, said: Said) -> Rows:
+    from mount_replay.fleet.catalogue.foreign import foreign_rows  # loads the simulator
+
+    return foreign_rows(path, place, said)
+
+
+def fingerprint_of(place: Place, kind: str, mark: str) -> str:
+    """Return the fingerprint of a row of this `kind`; `mark`: of what is said of files of others."""
+    return place.fingerprint if kind in (DRIVE, REPLAY) else place.fingerprint + mark
