@@ -6,7 +6,11 @@ import signal
 
 import pytest
 
-from mount_bringup.graph.ending_signals import ending_signals, interrupt_and_remember
+from mount_bringup.graph.ending_signals import (
+    ending_signals,
+    interrupt_and_remember,
+    remembered_interrupts,
+)
 
 
 @pytest.fixture
@@ -36,3 +40,18 @@ def test_an_interrupt_that_a_library_has_swallowed_ends_what_begins_after_it(rem
         assert ends == [True]
     with ending_signals(lambda: ends.append(True)):
         assert ends == [True]
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnraisableExceptionWarning')
+def test_an_interrupt_that_came_in_a_destructor_is_raised_by_who_waits():
+    class Interrupted:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    with remembered_interrupts() as raise_lost:
+        raise_lost()
+        Interrupted()  # Python drops what its destructor raises
+        with pytest.raises(KeyboardInterrupt):
+            raise_lost()
+    assert signal.getsignal(signal.SIGINT) is before

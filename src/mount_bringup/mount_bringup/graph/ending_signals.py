@@ -1,6 +1,7 @@
 """Ctrl-C and its kin, handed to who can end in order instead of tearing what runs."""
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -16,6 +17,34 @@ def interrupt_and_remember(number: int, *_: Any) -> None:
     """
     _unheard.append(number)
     raise KeyboardInterrupt
+
+
+@contextmanager
+def remembered_interrupts() -> Iterator[Callable[[], None]]:
+    """Yield a function that raises `KeyboardInterrupt` if one came while the context lasts, and was lost.
+
+    Python drops an exception in a destructor. For who waits again and again in the main thread; in another
+    thread, or where SIGINT is ignored, nothing is changed.
+    """
+    came: list[int] = []
+
+    def remember(number: int, *_: Any) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    def raise_lost() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield raise_lost
+        return
+    signal.signal(signal.SIGINT, remember)
+    try:
+        yield raise_lost
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from mount_bringup.graph.ending_signals import remembered_interrupts
 from mount_replay.fleet.cluster import LOCAL, SchedulerLostError, connected
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ Result = TypeVar('Result')
 
 LOSSES = 3
 """So many workers may be lost with a task before it is given up; chosen."""
+_LOOK = 0.1  # s, chosen, as Dask does itself: what arrives ends the wait at once
 _AHEAD = (
     4  # tasks per thread that are handed over at a time, chosen: those that run, and as many again that wait
 )
@@ -53,8 +55,11 @@ def run_tasks(
     """
     if not items:
         return
-    with connected(scheduler, workers, len(items), memory) as client:
-        stream = _Stream(client, work, items)
+    with (
+        remembered_interrupts() as raise_lost,
+        connected(scheduler, workers, len(items), memory) as client,
+    ):
+        stream = _Stream(client, work, items, raise_lost)
         try:
             yield from stream.results()
         except OSError as error:
@@ -67,10 +72,17 @@ def run_tasks(
 class _Stream(Generic[Item, Result]):
     """The tasks of one call on one cluster."""
 
-    def __init__(self, client: 'Client', work: Callable[[Item], Result], items: Sequence[Item]):
+    def __init__(
+        self,
+        client: 'Client',
+        work: Callable[[Item], Result],
+        items: Sequence[Item],
+        raise_lost: Callable[[], None],
+    ):
         from distributed import as_completed
 
         self._client, self._work, self._items = client, work, items
+        self._raise_lost = raise_lost
         self._arriving = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         self._under_way: dict[Any, int] = {}  # future: place of its item
         self._losses: dict[int, int] = {}  # place: workers lost with it
@@ -108,7 +120,7 @@ class _Stream(Generic[Item, Result]):
     def _arrived(self) -> Iterator[Done[Result]]:
         from distributed import KilledWorker
 
-        for future, result in self._arriving.next_batch():
+        for future, result in self._next_batch():
             is_lost = isinstance(result, CancelledError)
             if is_lost:
                 self._client.nthreads()  # raises where it was the scheduler that was lost
@@ -123,3 +135,11 @@ class _Stream(Generic[Item, Result]):
                 if self._losses[place] >= LOSSES:
                     reason = f'{LOSSES} workers were lost with it: killed, or out of memory'
                     yield Done(place, None, reason)
+
+    def _next_batch(self) -> list[Any]:
+        """Return what has arrived, one at least; raises `KeyboardInterrupt` where Dask lost one."""
+        while not (batch := self._arriving.next_batch(block=False)):
+            self._raise_lost()
+            with self._arriving.thread_condition:
+                self._arriving.thread_condition.wait(_LOOK)
+        return batch
