@@ -15,7 +15,6 @@ import pytest
 
 import mount_bags
 from mount_bags.messages.compact_times import compact
-from mount_replay.fleet.catalogue import index as indexing
 from mount_replay.fleet.catalogue.columns import BANDS, EVENTS, RECORDINGS, band_name
 from mount_replay.fleet.catalogue.in_bands import in_bands
 from mount_replay.fleet.catalogue.index import indexed
@@ -25,7 +24,6 @@ from mount_replay.fleet.catalogue.reading import read_place
 from mount_replay.fleet.catalogue.rows import rows_of
 from mount_replay.fleet.catalogue.stored import CatalogueError, read_catalogue
 from mount_replay.fleet.columns import schema_of
-from mount_replay.fleet.runner import Done
 
 REFERENCES = Path(__file__).parents[3] / 'bags' / 'reference'
 
@@ -46,20 +44,6 @@ def drives(tmp_path):
     (folder / 'garbage.mcap').write_bytes(b'no recording')
     (folder / 'notes.txt').write_text('nothing')
     return folder
-
-
-@pytest.fixture
-def inside(monkeypatch):
-    """Let tasks run in this process, where it does not matter which; returns the URIs that were read."""
-    read = []
-
-    def run_tasks(work, items, **_):
-        for place, item in enumerate(items):
-            read.append(item.uri)
-            yield Done(place, work(item))
-
-    monkeypatch.setattr(indexing, 'run_tasks', run_tasks)
-    return read
 
 
 def row_of(table, recording):

@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 from mount_replay.fleet import before_and_after as pictures
-from mount_replay.fleet.catalogue import index as indexing
 from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.places import places
 from mount_replay.fleet.foreign import NOTHING_SAID, said_in
-from mount_replay.fleet.runner import Done
-from mount_replay.fleet.what_if import run
 from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
 from mount_replay.fleet.worst import said_of, worst
 from mount_replay.given.foreign import foreign_order
@@ -55,21 +52,6 @@ def said(tmp_path):
     for name, text in (('rack', RACK), ('car', CAR)):
         (tmp_path / f'{name}.yaml').write_text(text, encoding='utf-8')
     return said_in([tmp_path / 'rack.yaml', tmp_path / 'car.yaml'])
-
-
-@pytest.fixture
-def inside(monkeypatch):
-    """Let tasks run in this process; returns the URIs that were read."""
-    read = []
-
-    def run_tasks(work, items, **_):
-        for place, item in enumerate(items):
-            read.append(item.uri)
-            yield Done(place, work(item))
-
-    monkeypatch.setattr(indexing, 'run_tasks', run_tasks)
-    monkeypatch.setattr(run, 'run_tasks', run_tasks)
-    return read
 
 
 def rows_of(table):

@@ -17,6 +17,7 @@ from mount_replay.fleet.example.fleet import make_one, whole_fleet
 from mount_replay.fleet.example.variations import VARIATIONS
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
 from mount_replay.fleet.what_if.one import replay_one
+from mount_replay.given.taken import QUIET_AT_FIRST
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 _RECORDINGS = 3  # chosen: the plain ones of the first drives; all topics of the simulator are in them
@@ -26,7 +27,7 @@ _CHANGE = {'mount_control': {'highest_current': 2.0}}
 _COLUMNS = {
     DISPLACEMENT.name: DISPLACEMENT.names,
     CURRENT_SETPOINT.name: CURRENT_SETPOINT.names,
-    CONTROL_TRACE.name: ('displacement', 'bridged_samples', 'velocity', 'friction_deflection'),
+    CONTROL_TRACE.name: ('displacement', *QUIET_AT_FIRST),
 }
 
 
