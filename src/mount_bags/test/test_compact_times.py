@@ -77,5 +77,6 @@ def test_packed_records_are_those_that_were_added():
     assert list(rows) == expected
     assert rows[3:7] == expected[3:7]
     assert rows[-1] == expected[-1]
+    assert rows.column(1).tolist() == [second for _, second, _ in expected]
     with pytest.raises(IndexError):
         rows[100]

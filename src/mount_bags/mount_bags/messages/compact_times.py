@@ -203,6 +203,13 @@ def distinct(times: Times) -> Times:
     return times[np.append(True, times[1:] > times[:-1])] if len(times) else times
 
 
+def each_once(times: Times) -> tuple[Times, 'slice | NDArray[np.intp]']:
+    """Return the distinct times, rising, and where the first of each stands; no copies where they rise."""
+    if bool((times[1:] > times[:-1]).all()):
+        return times, slice(None)
+    return np.unique(times, return_index=True)
+
+
 def within(times: Times, begin: int, end: int) -> Times:
     """Return the times from `begin` to `end`."""
     return times[(times >= begin) & (times <= end)]
