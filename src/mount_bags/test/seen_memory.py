@@ -2,5 +2,5 @@
 
 from types import SimpleNamespace
 
-SEEN = SimpleNamespace(mmap=lambda _, size: bytearray(size))
+SEEN = SimpleNamespace(MAP_PRIVATE=0, mmap=lambda _, size, flags: bytearray(size))
 """In place of the module `mmap`."""

@@ -42,7 +42,9 @@ def _in_small_parts(monkeypatch):
         monkeypatch.setattr(module, name, AT_ONCE)
     monkeypatch.setattr(column_parts.column_parts, '__defaults__', (AT_ONCE,))
     # `tracemalloc` sees no mapping
-    monkeypatch.setattr(compact_times, 'mmap', SimpleNamespace(mmap=lambda _, size: bytearray(size)))
+    monkeypatch.setattr(
+        compact_times, 'mmap', SimpleNamespace(MAP_PRIVATE=0, mmap=lambda _, size, flags: bytearray(size))
+    )
 
 
 def held_more(drives, look):

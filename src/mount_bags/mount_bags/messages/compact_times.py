@@ -46,7 +46,7 @@ class _Slabs:
     def kept(self, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a copy of `data` in this memory."""
         if data.size > len(self._free):
-            self._free = np.frombuffer(mmap.mmap(-1, max(_SLAB, data.size)), np.uint8)
+            self._free = np.frombuffer(mmap.mmap(-1, max(_SLAB, data.size), mmap.MAP_PRIVATE), np.uint8)
         place, self._free = self._free[: data.size], self._free[data.size :]
         place[:] = data.reshape(-1)
         return place.reshape(data.shape)
