@@ -246,14 +246,14 @@ class McapFile:
         """Return the chunks of which the summary tells in their order, None if one cannot be there."""
         found, told = summary_chunks(), self._summary.chunks
         self._summary.chunks = indexed_chunks()  # what it tells of them is not kept twice
-        positions = [index.position for index in told]
         forgotten = 0
-        for place in sorted(range(len(told)), key=positions.__getitem__):
-            if not add_chunk(self._data, told[place], found):
+        for place in np.argsort(told.column(0), kind='stable'):
+            index = told[int(place)]
+            if not add_chunk(self._data, index, found):
                 return None
-            if positions[place] - forgotten >= _KEPT:
-                forget(self._data, forgotten, positions[place])
-                forgotten = positions[place]
+            if index.position - forgotten >= _KEPT:
+                forget(self._data, forgotten, index.position)
+                forgotten = index.position
         return found
 
     def _take_times(self, statistics: Statistics) -> None:

@@ -4,6 +4,9 @@ from array import array
 from collections.abc import Callable, Hashable, Sequence
 from typing import Generic, TypeVar, overload
 
+import numpy as np
+from numpy.typing import NDArray
+
 T = TypeVar('T')
 
 
@@ -28,6 +31,10 @@ class PackedRows(Sequence[T], Generic[T]):
             self._known.append(common)
         self._numbers.extend(numbers)
         self._kinds.append(kind)
+
+    def column(self, place: int) -> NDArray[np.uint64]:
+        """Return one number of all records; none can be added while it is held."""
+        return np.frombuffer(self._numbers, np.uint64)[place :: self._width]
 
     @overload
     def __getitem__(self, place: int) -> T: ...

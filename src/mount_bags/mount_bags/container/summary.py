@@ -34,7 +34,7 @@ _FOOTER_SIZE = 20  # bytes behind opcode and length
 _FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
 _CRC_SIZE = 4  # bytes
 _DATA_END = struct.Struct('<BQI')
-_STEP = 1 << 20  # bytes of the file in memory while its checksum is made
+_STEP = 1 << 20  # bytes of the file in memory while they are read, chosen
 _AT_ONCE = 1 << 18  # bytes, chosen: they stay in the processor's cache from one checksum to the other
 
 
@@ -149,14 +149,18 @@ def parsed_attachment(content: bytes) -> Attachment | None:
 
 
 def _fill(summary: Summary, data: mmap.mmap) -> bool:
-    position = summary.begin
+    position = forgotten = summary.begin
     while position + RECORD.size <= summary.footer:
+        if position - forgotten >= _STEP:
+            forget(data, forgotten, position)
+            forgotten = position
         opcode, length = RECORD.unpack_from(data, position)
         position += RECORD.size
         content = data[position : position + length]
         position += length
         if position > summary.footer or not _take(summary, opcode, content):
             return False
+    forget(data, forgotten, position)
     return True
 
 
