@@ -74,10 +74,10 @@ class _FileColumns:
         self._columns = _Columns(size)
 
     def parts(self) -> Iterator[ColumnPart]:
-        for chunk in self._file.passing():
+        numbers = [number for each in self._numbers.values() for number in each]
+        for place in self._file.passing(self._file.chunks.holding(numbers)):
+            chunk = self._file.chunks[place]
             held = self._held_in(chunk)
-            if not held:
-                continue
             filled = self._take(chunk) if self._columns.know(held) else -1
             if filled < 0:
                 yield from self._columns.flushed()
