@@ -5,6 +5,7 @@ import struct
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
@@ -12,6 +13,7 @@ from mcap.records import ChunkIndex
 from mount_bags.container.chunk_index import can_be_there, indexed_chunks
 from mount_bags.container.chunk_table import chunk_table
 from mount_bags.container.chunks import SHORTEST_CHUNK, Chunk
+from mount_bags.container.unpacker import Unpacker
 
 HEAD = 9  # bytes of a record: opcode and length
 SIZES = 56  # byte of a record at which the length of its compression's name stands, without channels
@@ -154,3 +156,38 @@ def test_chunks_that_are_known_one_by_one_are_the_same_in_a_table():
     assert table.unprotected == 1
     with pytest.raises(IndexError):
         table[3]
+
+
+def unpacked(contents, sizes, compressions):
+    """Return what is unpacked of chunks whose heads tell these sizes."""
+    packs = [
+        zstandard.compress(each) if kind else each for each, kind in zip(contents, compressions, strict=True)
+    ]
+    ends = np.cumsum([len(pack) for pack in packs]).tolist()
+    chunks = [
+        Chunk(0, end - len(pack), (end,), size, 0, kind, 0, 0)
+        for pack, end, size, kind in zip(packs, ends, sizes, compressions, strict=True)
+    ]
+    unpacker = Unpacker(b''.join(packs), chunk_table(chunks))
+    unpacker.unpacked(np.arange(1))  # what is left of it must not be seen
+    data, ends = unpacker.unpacked(np.arange(len(chunks)))
+    return [data[begin:end].tobytes() for begin, end in zip([0, *ends], ends, strict=False)]
+
+
+def test_chunks_are_unpacked_in_a_row():
+    contents = [b'a' * 1000, b'', b'b' * 10, b'c' * 3000]
+    assert unpacked(contents, [1000, 0, 10, 3000], ['zstd', 'zstd', '', 'zstd']) == contents
+
+
+@pytest.mark.parametrize('told', [0, 9, 11, 5000])
+@pytest.mark.parametrize('compression', ['', 'zstd'])
+def test_a_chunk_that_is_not_as_long_as_its_head_tells_is_not_unpacked(told, compression):
+    contents = [b'a' * 1000, b'b' * 10, b'c' * 3000]
+    assert unpacked(contents, [1000, told, 3000], ['zstd', compression, 'zstd']) == contents[:1]
+
+
+def test_what_is_not_packed_as_told_is_not_unpacked():
+    packed = zstandard.compress(b'b' * 10)
+    data = bytes(4) + packed[4:]
+    table = chunk_table([Chunk(0, 0, (len(data),), 10, 0, 'zstd', 0, 0)])
+    assert len(Unpacker(data, table).unpacked(np.arange(1))[1]) == 0

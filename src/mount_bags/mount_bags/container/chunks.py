@@ -189,15 +189,6 @@ def _extents(chunk: Chunk) -> set[int]:
     return {end - chunk.begin for end in chunk.ends}
 
 
-def unpacked(packed: bytes, chunk: Chunk, decompressor: zstandard.ZstdDecompressor) -> bytes | None:
-    """Return the unpacked bytes of packed ones that are known to be those written, None if they are not."""
-    try:
-        content = decompressor.decompress(packed, max_output_size=chunk.size) if chunk.compression else packed
-    except (zstandard.ZstdError, MemoryError):
-        return None
-    return content if len(content) == chunk.size else None
-
-
 def _unpacked(packed: bytes, chunk: Chunk) -> bytes | None:
     """Return the unpacked bytes if they are the ones that were written, as far as the file can prove it."""
     kind = chunk.compression

@@ -14,7 +14,6 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
-from zstandard import ZstdDecompressor
 
 from mount_bags.container.chunk_index import can_be_there, take_checksums
 from mount_bags.container.chunk_table import Places, chunk_table
@@ -29,7 +28,6 @@ from mount_bags.container.chunks import (
     messages_at,
     partial_chunk,
     scattered_chunks,
-    unpacked,
 )
 from mount_bags.container.message_compression import plain
 from mount_bags.container.stored import ACCOUNTS, StorageError, StoredMessages, StoredTopic
@@ -44,6 +42,7 @@ from mount_bags.container.summary import (
     parsed_metadata,
     read_summary,
 )
+from mount_bags.container.unpacker import Unpacker
 from mount_bags.container.whole_files import COMPRESSED_SUFFIXES, FileError, forget, mapped
 
 _KEPT = 1 << 22  # bytes of the file in memory while the chunks are looked at, chosen
@@ -74,7 +73,6 @@ class McapFile:
         self.chunks = chunk_table(())
         self._damaged: set[int] = set()  # positions of chunks
         self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
-        self._decompressor = ZstdDecompressor()
         self.closed = False  # whether the writer came to the end of its messages
         self.undeclared = 0  # messages whose topic is not known
         self.tail: Chunk | None = None  # begun at the end of the file, cut off before its own
@@ -129,10 +127,11 @@ class McapFile:
         """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
         self.data_proof()
         wanted = np.array(sorted(topics), np.int64)
-        for place in self.passing(self.chunks.holding(topics)):
-            contents = self.contents(self.chunks[place])
-            if contents is not None and len(found := contents.messages.of(wanted)):
-                yield plain(found)
+        for places in self.passing(self.chunks.holding(topics)):
+            for place in places.tolist():
+                contents = self.contents(self.chunks[place])
+                if contents is not None and len(found := contents.messages.of(wanted)):
+                    yield plain(found)
         if self._loose:
             found = messages_at(self._data, np.array(self._loose)).of(wanted)
             if len(found):
@@ -170,30 +169,22 @@ class McapFile:
         """Return whether a chunk is known to be damaged; others are taken for sound until they are read."""
         return chunk.position in self._damaged
 
-    def unpacked(self, chunk: Chunk) -> bytes | None:
-        """Return the bytes in a chunk of a `plain` file, which need no checksum of their own.
+    def unpacker(self) -> Unpacker:
+        """Return what unpacks the chunks of a `plain` file, which need no checksum of their own."""
+        return Unpacker(self._data, self.chunks)
 
-        None if it is damaged.
+    def passing(self, places: Places) -> Iterator[Places]:
+        """Yield the numbers of chunks, near ones together; the system may take back what stands before them.
+
+        That is all of the file before, for what stands beside a chunk is read with it.
         """
-        return unpacked(self._data[chunk.begin : chunk.end], chunk, self._decompressor)
-
-    def passing(self, places: Places) -> Iterator[int]:
-        """Yield the numbers of chunks; the system may take back the memory of those that were read."""
-        for part, begin, end in self._stretches(places):
-            yield from part.tolist()
-            forget(self._data, begin, end)
-
-    def _stretches(self, places: Places) -> Iterator[tuple[Places, int, int]]:
-        """Yield the numbers of chunks that stand near to each other, and from where to where they were read.
-
-        That begins where the stretch before it ends, for what stands beside a chunk is read with it.
-        """
-        positions, first, begin = self.chunks.rows['position'][places], 0, 0
+        positions, first, forgotten = self.chunks.rows['position'][places], 0, 0
         while first < len(places):
             last = int(np.searchsorted(positions, positions[first] + _KEPT, 'right'))
+            yield places[first:last]
             end = int(self.chunks.rows['end'][places[last - 1]])
-            yield places[first:last], begin, end
-            first, begin = last, end
+            forget(self._data, forgotten, end)
+            first, forgotten = last, end
 
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
@@ -248,9 +239,8 @@ class McapFile:
 
     def _take_checksums(self) -> None:
         data = np.frombuffer(self._data, np.uint8)
-        for part, begin, end in self._stretches(np.arange(len(self.chunks))):
-            take_checksums(data, self.chunks.rows[part[0] : part[-1] + 1])
-            forget(self._data, begin, end)
+        for places in self.passing(np.arange(len(self.chunks))):
+            take_checksums(data, self.chunks.rows[places[0] : places[-1] + 1])
 
     def _take_times(self, statistics: Statistics) -> None:
         """Take the times of the chunks, which are nearer to the messages than the statistics of the file."""
@@ -285,8 +275,9 @@ class McapFile:
         self._loose, self._counts, self._times = [], {}, None
         chunks, loose_channels, loose_schemas = self._walk_all()
         self._channels, self._schemas = {}, {}
-        for place in self.passing(np.arange(len(chunks))):
-            self._take_explored(chunks[place])
+        for places in self.passing(np.arange(len(chunks))):
+            for place in places.tolist():
+                self._take_explored(chunks[place])
         self.chunks = chunk_table(chunks)  # with what their messages say of them
         if not self.chunks or (self.whole and self._summary.proof is not Proof.WRONG):
             # Nothing better is known, or there is no reason to doubt.
