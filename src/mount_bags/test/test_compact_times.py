@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from seen_memory import SEEN
 
-from mount_bags.container.packed_rows import PackedRows
 from mount_bags.messages import compact_times
 from mount_bags.messages.compact_times import CompactTimes, compact, together
 
@@ -67,16 +66,3 @@ def test_times_of_a_clock_take_two_bytes_each(monkeypatch):
     tracemalloc.stop()
     assert len(times) == count
     assert 1.0 < kept / count < 3.0  # with the memory that is not yet filled
-
-
-def test_packed_records_are_those_that_were_added():
-    rows = PackedRows(lambda first, second, text: (first, second, text), 2)
-    for number in range(100):
-        rows.add((number, 2**64 - 1 - number), 'even' if number % 2 == 0 else 'odd')
-    expected = [(number, 2**64 - 1 - number, 'odd' if number % 2 else 'even') for number in range(100)]
-    assert list(rows) == expected
-    assert rows[3:7] == expected[3:7]
-    assert rows[-1] == expected[-1]
-    assert rows.column(1).tolist() == [second for _, second, _ in expected]
-    with pytest.raises(IndexError):
-        rows[100]
