@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mount_bags.bag.recording import ReadingError, Recording
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import switching_times
+from mount_bags.messages.compact_times import each_once
 from mount_bags.messages.series import Series, SeriesError
 from mount_bags.run.session import recorded_sample_rate, recorded_session
 from mount_report.drawing.chart import Array
@@ -55,7 +56,7 @@ class Signals:
         self.name = name or recording.short_name
         self.missing: list[str] = []
         self._found: dict[tuple[str, str], Signal | None] = {}
-        self._orders: dict[str, tuple[Array, slice | NDArray[np.int64]]] = {}  # times, places of the values
+        self._orders: dict[str, tuple[Array, slice | NDArray[np.intp]]] = {}  # times, places of the values
         recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
         self.axis = recording.time_axis
         self.zero = self.axis.zero if zero is None else zero
@@ -113,9 +114,8 @@ class Signals:
 
     def _ordered(self, series: Series, values: Array) -> Signal:
         if series.topic not in self._orders:
-            stamps, first = np.unique(series.stamps, return_index=True)
-            in_order = np.array_equal(first, np.arange(len(series)))
-            self._orders[series.topic] = (stamps - self.zero) / 1e9, slice(None) if in_order else first
+            stamps, first = each_once(series.stamps)
+            self._orders[series.topic] = (stamps - self.zero) / 1e9, first
         time, places = self._orders[series.topic]
         return Signal(time, np.asarray(values, np.float64)[places])
 

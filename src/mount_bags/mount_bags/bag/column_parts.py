@@ -1,6 +1,6 @@
 """Columns of topics straight from the unpacked chunks of a file, part by part: for many or long recordings.
 
-A compiled function walks the records of a chunk and picks the wanted numbers of each message. It takes one
+A compiled function walks the records of chunks and picks the wanted numbers of each message. It takes one
 only if everything that fixes its layout is as in the first one of its topic; a chunk with any other goes the
 general way of `Recording.parts`, which gives the same numbers.
 """
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.container.chunks import MESSAGE_HEAD, Chunk
+from mount_bags.container.chunk_table import Places
+from mount_bags.container.chunks import MESSAGE_HEAD
 from mount_bags.container.mcap_file import McapFile
 from mount_bags.messages.series import Column, Series, Times
 from mount_bags.messages.taken import LOG_TIME_PLACE, WORD, Wanted, take
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 PART = 1 << 13
 """Messages of a topic in a part, chosen: where nothing asks for more or fewer."""
+_AT_ONCE = 1 << 19  # bytes of chunks that are unpacked together, chosen: they stay in the processor's cache
 _FLOAT = np.dtype('<f8')
 
 
@@ -70,40 +72,46 @@ class _FileColumns:
     ):
         self._recording, self._file, self._wanted, self._size = recording, file, wanted, size
         self._numbers = {name: recording.numbers_in(file, name) for name in wanted}
-        self._held: dict[frozenset[int], frozenset[str]] = {}
+        kinds = [kind.channels or frozenset() for kind in file.chunks.kinds]  # all told in a plain file
+        self._held = [{name for name in wanted if not kind.isdisjoint(self._numbers[name])} for kind in kinds]
+        self._known = np.zeros(len(kinds), np.bool_)  # whether all that is wanted of a kind can be picked
         self._columns = _Columns(size)
+        self._unpacker = file.unpacker()
 
     def parts(self) -> Iterator[ColumnPart]:
-        for chunk in self._file.passing():
-            held = self._held_in(chunk)
-            if not held:
-                continue
-            filled = self._take(chunk) if self._columns.know(held) else -1
-            if filled < 0:
-                yield from self._columns.flushed()
-                yield from self._read(chunk)
-            elif filled >= self._size:
-                yield from self._columns.flushed(self._size)
+        chunks = self._file.chunks
+        numbers = {number for known in self._numbers.values() for number in known}
+        for places in self._file.passing(chunks.holding(numbers)):
+            before = np.cumsum(chunks.rows['size'][places])
+            for some in np.split(places, np.flatnonzero(np.diff(before // _AT_ONCE)) + 1):
+                yield from self._parts_of(some)
         yield from self._columns.flushed()
 
-    def _held_in(self, chunk: Chunk) -> frozenset[str]:
-        """Return which of the topics have messages in a chunk."""
-        channels = chunk.channels
-        assert channels is not None  # of a plain file
-        if channels not in self._held:
-            self._held[channels] = frozenset(
-                name for name, numbers in self._numbers.items() if not channels.isdisjoint(numbers)
-            )
-        return self._held[channels]
+    def _parts_of(self, places: Places) -> Iterator[ColumnPart]:
+        """Yield the parts that some chunks fill, together as far as all that is wanted of them is known."""
+        while len(places):
+            known = self._known[self._file.chunks.rows['kind'][places]]
+            count = len(places) if known.all() else int(known.argmin())
+            yield from self._taken(places[:count]) if count else self._read(places[0])
+            places = places[max(count, 1) :]
 
-    def _take(self, chunk: Chunk) -> int:
-        """Take a chunk into the columns; return as `_Columns.take` does."""
-        content = self._file.unpacked(chunk)
-        return -1 if content is None else self._columns.take(content)
+    def _taken(self, places: Places) -> Iterator[ColumnPart]:
+        """Yield the parts that chunks fill; one whose messages are others is read the general way."""
+        content, ends = self._unpacker.unpacked(places)
+        taken = 0
+        while taken < len(places):
+            if taken < len(ends):
+                taken = self._columns.take(content, ends, taken)
+            if self._columns.full:
+                yield from self._columns.flushed(self._size)
+            elif taken < len(places):
+                yield from self._read(places[taken])
+                taken += 1
 
-    def _read(self, chunk: Chunk) -> Iterator[ColumnPart]:
+    def _read(self, place: np.int64) -> Iterator[ColumnPart]:
         """Read a chunk the general way, and learn from it the layout of topics not seen before."""
-        contents = self._file.contents(chunk)
+        yield from self._columns.flushed()
+        contents = self._file.contents(self._file.chunks[int(place)])
         if contents is None:
             return
         for name, numbers in self._numbers.items():
@@ -115,6 +123,7 @@ class _FileColumns:
                 picked = _picked(series, self._wanted[name], numbers[0])
                 if picked is not None:
                     self._columns.learn(name, picked)
+                    self._known[:] = [self._columns.know(held) for held in self._held]
             yield _part_of(series, self._wanted[name])
 
 
@@ -163,14 +172,23 @@ class _Columns:
         self._filled = np.zeros(len(topics), np.int64)
         self._numbers = np.empty((len(topics), max(count for _, count in counts), 0), np.int64)
 
-    def take(self, content: bytes) -> int:
-        """Take the messages in a chunk, all or none; return how many the fullest topic has, else -1."""
-        needed = self._size + len(content) // self._shortest + 1
+    @property
+    def full(self) -> bool:
+        """Whether a topic has as many messages as a part."""
+        return bool(self._filled.max() >= self._size)
+
+    def take(self, content: NDArray[np.uint8], ends: NDArray[np.int64], first: int) -> int:
+        """Take the messages in chunks, which end at `ends` in `content`, from the `first` on; return how far.
+
+        It ends before a chunk with a message unlike those before, and behind the one with which a part is
+        `full`.
+        """
+        needed = self._size + int(ends[-1]) // self._shortest + 1
         if needed > self._numbers.shape[2]:
             rows = np.empty((*self._numbers.shape[:2], 2 * needed), np.int64)
             rows[:, :, : self._numbers.shape[2]] = self._numbers
             self._numbers = rows
-        return take(np.frombuffer(content, np.uint8), *self._wanted, self._numbers, self._filled)
+        return take(content, ends, first, self._size, *self._wanted, self._numbers, self._filled)
 
     def flushed(self, least: int = 1) -> Iterator[ColumnPart]:
         """Yield the messages of the topics that have at least so many, and begin these anew."""

@@ -159,7 +159,9 @@ class Recording:
         """
         wanted = {self.resolve(topic): self._unread(self.resolve(topic), columns[topic]) for topic in columns}
         collectors = {
-            name: ColumnCollector(partial(self._made, name), names) for name, names in wanted.items() if names
+            name: ColumnCollector(partial(self._made, name), names, self.topics[name].message_count)
+            for name, names in wanted.items()
+            if names
         }
         for name, block in self._blocks(list(collectors)) if collectors else ():
             collectors[name].add(block)

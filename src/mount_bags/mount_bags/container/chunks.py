@@ -11,14 +11,12 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from mount_bags.container.packed_rows import PackedRows
 from mount_bags.container.stored import HEAD, StoredMessages, rows_at
 
 Bytes = NDArray[np.uint8]
@@ -40,15 +38,15 @@ RECORD = struct.Struct('<BQ')  # opcode, length of what follows
 LENGTH_BESIDES_PAYLOAD = MESSAGE_HEAD.itemsize - RECORD.size  # of a message record
 _HEAD = struct.Struct('<QQQII')  # start, end, unpacked size, checksum, length of the compression's name
 _SIZE = struct.Struct('<Q')
-_INDEXED = struct.Struct('<QQQQI')  # of a chunk index: start, end, position, length, bytes of the offsets
-_OFFSET = struct.Struct('<HQ')  # channel, position of its message index
-_INDEXED_SIZES = struct.Struct('<QI')  # length of the message indexes, length of the compression's name
-_PACKED_SIZES = struct.Struct('<QQ')
 _INDEX = struct.Struct('<HI')  # channel, length of the entries
-_SHORTEST = RECORD.size + _HEAD.size + _SIZE.size  # bytes of a chunk record without compression and messages
+SHORTEST_CHUNK = RECORD.size + _HEAD.size + _SIZE.size
+"""Bytes of a chunk record without compression and messages."""
+CRC_PLACE = RECORD.size + 3 * _SIZE.size
+"""Byte of a chunk record at which the checksum of its unpacked messages stands."""
 _TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
 _PLAIN = re.compile(rb'\x06(?=.{4}\x00{4})', re.DOTALL)
-_LARGEST = 1 << 32  # bytes; more is a damaged length
+LARGEST_CHUNK = 1 << 32
+"""Bytes in a chunk; more is a damaged length."""
 _MAGICS = {b'\x28\xb5\x2f\xfd': 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
 
 
@@ -90,7 +88,7 @@ class Contents:
 
 def chunk_at(data: mmap.mmap, position: int) -> Chunk | None:
     """Return the chunk whose record begins at `position`; None if there is none or its end is missing."""
-    if position < 0 or position + _SHORTEST > len(data):
+    if position < 0 or position + SHORTEST_CHUNK > len(data):
         return None
     head = partial_chunk(data, position)
     if head is None:
@@ -104,80 +102,14 @@ def chunk_at(data: mmap.mmap, position: int) -> Chunk | None:
 
 def partial_chunk(data: mmap.mmap, position: int) -> Chunk | None:
     """Return the chunk that begins at `position` as if the file's end were its own."""
-    if position + _SHORTEST > len(data):
+    if position + SHORTEST_CHUNK > len(data):
         return None
     start, last, size, crc, name_length = _HEAD.unpack_from(data, position + RECORD.size)
-    begin = position + _SHORTEST + name_length
-    if name_length > 16 or size > _LARGEST or begin > len(data):
+    begin = position + SHORTEST_CHUNK + name_length
+    if name_length > 16 or size > LARGEST_CHUNK or begin > len(data):
         return None
     name = data[begin - _SIZE.size - name_length : begin - _SIZE.size].decode(errors='replace')
     return Chunk(position, begin, (len(data),), size, crc, name, start, last)
-
-
-class IndexedChunk(NamedTuple):
-    """What a summary tells of a chunk; positions and lengths in bytes, times in ns."""
-
-    position: int
-    length: int
-    index_length: int  # of the message indexes behind it
-    packed: int
-    size: int  # when unpacked
-    start_time: int
-    end_time: int
-    compression: str
-    channels: frozenset[int]
-
-
-IndexedChunks: TypeAlias = PackedRows[IndexedChunk]
-
-
-def indexed_chunks() -> IndexedChunks:
-    """Return a place for what a summary tells of its chunks."""
-    return PackedRows(IndexedChunk, 7)
-
-
-def add_indexed(content: bytes, found: IndexedChunks) -> bool:
-    """Add to `found` what the chunk index record in `content` tells; False if it is not readable."""
-    try:
-        start, end, position, length, offsets = _INDEXED.unpack_from(content)
-        place = _INDEXED.size + offsets
-        index_length, name_length = _INDEXED_SIZES.unpack_from(content, place)
-        name_end = place + _INDEXED_SIZES.size + name_length
-        name = content[place + _INDEXED_SIZES.size : name_end].decode()
-        packed, size = _PACKED_SIZES.unpack_from(content, name_end)
-        if offsets % _OFFSET.size:
-            return False
-        low, high = (content[_INDEXED.size + byte : place : _OFFSET.size] for byte in range(2))
-        channels = frozenset(low)
-        if any(high):
-            channels = frozenset(each[0] for each in _OFFSET.iter_unpack(content[_INDEXED.size : place]))
-    except (struct.error, UnicodeDecodeError):
-        return False
-    found.add((position, length, index_length, packed, size, start, end), name, channels)
-    return True
-
-
-def summary_chunks() -> PackedRows[Chunk]:
-    """Return a place for the chunks that a summary with a sound checksum describes."""
-    return PackedRows(_from_summary, 8)
-
-
-def add_chunk(data: mmap.mmap, index: IndexedChunk, found: PackedRows[Chunk]) -> bool:
-    """Add the chunk of which a summary tells, False if there is none; its own head tells its checksum."""
-    position = index.position
-    end = position + index.length
-    if end > len(data) or not _SHORTEST + index.packed <= index.length or index.size > _LARGEST:
-        return False
-    crc = _HEAD.unpack_from(data, position + RECORD.size)[3]
-    numbers = (position, end - index.packed, end, index.size, crc, index.start_time, index.end_time)
-    channels = index.channels if index.index_length else None
-    found.add((*numbers, index.index_length), index.compression, channels)
-    return True
-
-
-def _from_summary(*told: Any) -> Chunk:
-    position, begin, end, size, crc, start, last, index_length, compression, channels = told
-    return Chunk(position, begin, (end,), size, crc, compression, start, last, index_length, channels)
 
 
 def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
@@ -257,15 +189,6 @@ def _extents(chunk: Chunk) -> set[int]:
     return {end - chunk.begin for end in chunk.ends}
 
 
-def unpacked(packed: bytes, chunk: Chunk, decompressor: zstandard.ZstdDecompressor) -> bytes | None:
-    """Return the unpacked bytes of packed ones that are known to be those written, None if they are not."""
-    try:
-        content = decompressor.decompress(packed, max_output_size=chunk.size) if chunk.compression else packed
-    except (zstandard.ZstdError, MemoryError):
-        return None
-    return content if len(content) == chunk.size else None
-
-
 def _unpacked(packed: bytes, chunk: Chunk) -> bytes | None:
     """Return the unpacked bytes if they are the ones that were written, as far as the file can prove it."""
     kind = chunk.compression
@@ -282,7 +205,7 @@ def _unpacked(packed: bytes, chunk: Chunk) -> bytes | None:
 def _unpack(packed: bytes, kind: str, size: int) -> bytes:
     if kind == 'zstd':
         told = zstandard.frame_content_size(packed)
-        if told > _LARGEST:
+        if told > LARGEST_CHUNK:
             raise ValueError(f'{told} bytes in one chunk')
         if told < 0:  # written as a stream
             return zstandard.ZstdDecompressor().decompressobj().decompress(packed)

@@ -5,7 +5,6 @@ is asked for. Where it is not, the file is walked record by record and searched 
 their checksums prove is taken. Declarations of topics count more where a checksum covers them.
 """
 
-import functools
 import mmap
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,26 +14,22 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
-from zstandard import ZstdDecompressor
 
+from mount_bags.container.chunk_index import can_be_there, take_checksums
+from mount_bags.container.chunk_table import Places, chunk_table
 from mount_bags.container.chunks import (
     MESSAGE_HEAD,
     RECORD,
     Chunk,
     Contents,
-    add_chunk,
     chunk_at,
     contents_of,
     explore,
-    indexed_chunks,
     messages_at,
     partial_chunk,
     scattered_chunks,
-    summary_chunks,
-    unpacked,
 )
 from mount_bags.container.message_compression import plain
-from mount_bags.container.packed_rows import PackedRows
 from mount_bags.container.stored import ACCOUNTS, StorageError, StoredMessages, StoredTopic
 from mount_bags.container.summary import (
     Hash,
@@ -47,6 +42,7 @@ from mount_bags.container.summary import (
     parsed_metadata,
     read_summary,
 )
+from mount_bags.container.unpacker import Unpacker
 from mount_bags.container.whole_files import COMPRESSED_SUFFIXES, FileError, forget, mapped
 
 _KEPT = 1 << 22  # bytes of the file in memory while the chunks are looked at, chosen
@@ -74,10 +70,9 @@ class McapFile:
         self.records: list[tuple[str, dict[str, str]]] = []
         self.warnings: list[str] = []
         self.lost_beside: list[str] = []  # names of metadata and attachments
-        self.chunks: Sequence[Chunk] = []
+        self.chunks = chunk_table(())
         self._damaged: set[int] = set()  # positions of chunks
         self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
-        self._decompressor = ZstdDecompressor()
         self.closed = False  # whether the writer came to the end of its messages
         self.undeclared = 0  # messages whose topic is not known
         self.tail: Chunk | None = None  # begun at the end of the file, cut off before its own
@@ -132,9 +127,9 @@ class McapFile:
         """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
         self.data_proof()
         wanted = np.array(sorted(topics), np.int64)
-        for chunk in self.passing():
-            if chunk.channels is None or not chunk.channels.isdisjoint(topics):
-                contents = self.contents(chunk)
+        for places in self.passing(self.chunks.holding(topics)):
+            for place in places.tolist():
+                contents = self.contents(self.chunks[place])
                 if contents is not None and len(found := contents.messages.of(wanted)):
                     yield plain(found)
         if self._loose:
@@ -168,31 +163,28 @@ class McapFile:
         """Whether a checksum vouches for all of it, and its messages are in chunks that tell their topics."""
         if not self.proven or self._loose or self.data_proof() is not Proof.SOUND:
             return False
-        return not self._damaged and self._chunks_are_plain
-
-    @functools.cached_property
-    def _chunks_are_plain(self) -> bool:
-        return all(chunk.channels is not None and chunk.compression in ('', 'zstd') for chunk in self.chunks)
+        return not self._damaged and self.chunks.plain
 
     def is_damaged(self, chunk: Chunk) -> bool:
         """Return whether a chunk is known to be damaged; others are taken for sound until they are read."""
         return chunk.position in self._damaged
 
-    def unpacked(self, chunk: Chunk) -> bytes | None:
-        """Return the bytes in a chunk of a `plain` file, which need no checksum of their own.
+    def unpacker(self) -> Unpacker:
+        """Return what unpacks the chunks of a `plain` file, which need no checksum of their own."""
+        return Unpacker(self._data, self.chunks)
 
-        None if it is damaged.
+    def passing(self, places: Places) -> Iterator[Places]:
+        """Yield the numbers of chunks, near ones together; the system may take back what stands before them.
+
+        That is all of the file before, for what stands beside a chunk is read with it.
         """
-        return unpacked(self._data[chunk.begin : chunk.end], chunk, self._decompressor)
-
-    def passing(self) -> Iterator[Chunk]:
-        """Yield the chunks; the system may take back the memory of those before, which were read."""
-        forgotten = 0
-        for chunk in self.chunks:
-            if chunk.position - forgotten >= _KEPT:
-                forget(self._data, forgotten, chunk.position)
-                forgotten = chunk.position
-            yield chunk
+        positions, first, forgotten = self.chunks.rows['position'][places], 0, 0
+        while first < len(places):
+            last = int(np.searchsorted(positions, positions[first] + _KEPT, 'right'))
+            yield places[first:last]
+            end = int(self.chunks.rows['end'][places[last - 1]])
+            forget(self._data, forgotten, end)
+            first, forgotten = last, end
 
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
@@ -217,22 +209,25 @@ class McapFile:
     @property
     def _unprotected(self) -> bool:
         """Whether it has messages that no checksum of a chunk covers."""
-        return bool(self._loose) or any(chunk.size and not chunk.crc for chunk in self.chunks)
+        return bool(self._loose) or self.chunks.unprotected > 0
 
     # A file with a sound summary.
 
     def _take_summary(self) -> bool:
         """Take what the summary tells; False if that is not enough."""
         summary = self._summary
-        chunks, statistics = self._indexed_chunks(), summary.statistics
-        if statistics is None or chunks is None or statistics.chunk_count != len(chunks):
+        statistics = summary.statistics
+        if statistics is None or statistics.chunk_count != len(summary.chunks):
+            return False
+        if not can_be_there(summary.chunks, len(self._data)):
             return False
         if statistics.channel_count > len(summary.channels) or statistics.schema_count > len(summary.schemas):
             return False  # not repeated in the summary
         self._channels, self._schemas = dict(summary.channels), dict(summary.schemas)
         if any(channel not in self._channels for channel in statistics.channel_message_counts):
             return False
-        self.chunks = chunks
+        self.chunks, summary.chunks = summary.chunks, self.chunks  # once in memory
+        self._take_checksums()
         self._counts = dict(statistics.channel_message_counts)
         self._walk_between_chunks()
         self._take_times(statistics)
@@ -242,26 +237,14 @@ class McapFile:
             self._warn('its last bytes are damaged; all else is read')
         return True
 
-    def _indexed_chunks(self) -> PackedRows[Chunk] | None:
-        """Return the chunks of which the summary tells in their order, None if one cannot be there."""
-        found, told = summary_chunks(), self._summary.chunks
-        self._summary.chunks = indexed_chunks()  # what it tells of them is not kept twice
-        positions = [index.position for index in told]
-        forgotten = 0
-        for place in sorted(range(len(told)), key=positions.__getitem__):
-            if not add_chunk(self._data, told[place], found):
-                return None
-            if positions[place] - forgotten >= _KEPT:
-                forget(self._data, forgotten, positions[place])
-                forgotten = positions[place]
-        return found
+    def _take_checksums(self) -> None:
+        data = np.frombuffer(self._data, np.uint8)
+        for places in self.passing(np.arange(len(self.chunks))):
+            take_checksums(data, self.chunks.rows[places[0] : places[-1] + 1])
 
     def _take_times(self, statistics: Statistics) -> None:
         """Take the times of the chunks, which are nearer to the messages than the statistics of the file."""
-        for chunk in self.chunks:
-            # Without indexes, whether a chunk holds messages shows in its times alone.
-            if chunk.channels or (chunk.channels is None and chunk.end_time):
-                self._widen(chunk.start_time, chunk.end_time)
+        self._times = self.chunks.times
         if self._loose:
             times = messages_at(self._data, np.array(self._loose)).heads['log_time']
             self._widen(int(times.min()), int(times.max()))
@@ -277,11 +260,11 @@ class McapFile:
                 self._warn(f'{index.name}, metadata or attachment at byte {index.offset}, is damaged')
 
     def _walk_between_chunks(self) -> None:
-        position = len(MCAP0_MAGIC)
-        for chunk in self.chunks:
-            self._walk(position, chunk.position)
-            position = chunk.end + chunk.index_length
-        self._walk(position, self._summary.begin)
+        rows = self.chunks.rows
+        begins = np.concatenate([[len(MCAP0_MAGIC)], rows['end'] + rows['index_length']])
+        limits = np.concatenate([rows['position'], [self._summary.begin]])
+        for place in np.flatnonzero(begins < limits):
+            self._walk(int(begins[place]), int(limits[place]))
         # A file with chunks has its messages there; a record that says otherwise needs a proof.
         if self._loose and self.chunks and self.data_proof() is not Proof.SOUND:
             self._drop_loose()
@@ -289,11 +272,13 @@ class McapFile:
     # A file without one.
 
     def _search(self) -> None:
-        self.chunks, self._loose, self._counts, self._times = [], [], {}, None
-        loose_channels, loose_schemas = self._walk_all()
+        self._loose, self._counts, self._times = [], {}, None
+        chunks, loose_channels, loose_schemas = self._walk_all()
         self._channels, self._schemas = {}, {}
-        for chunk in self.passing():
-            self._take_explored(chunk)
+        for places in self.passing(np.arange(len(chunks))):
+            for place in places.tolist():
+                self._take_explored(chunks[place])
+        self.chunks = chunk_table(chunks)  # with what their messages say of them
         if not self.chunks or (self.whole and self._summary.proof is not Proof.WRONG):
             # Nothing better is known, or there is no reason to doubt.
             self._channels = loose_channels | self._channels
@@ -304,41 +289,43 @@ class McapFile:
             self._count(messages_at(self._data, np.array(self._loose)))
         self._forget_undeclared()
 
-    def _walk_all(self) -> tuple[dict[int, Channel], dict[int, Schema]]:
-        """Find the chunks; return the channels and schemas that are declared outside of them."""
+    def _walk_all(self) -> tuple[list[Chunk], dict[int, Channel], dict[int, Schema]]:
+        """Return the chunks, and the channels and schemas that are declared outside of them."""
         self._channels, self._schemas = {}, {}
         found: list[Chunk] = []
         end = self._walk(len(MCAP0_MAGIC), len(self._data), found)
-        self.chunks = found
-        if not (self._footer_found and self._data[end:] == MCAP0_MAGIC):
+        cut_off = not (self._footer_found and self._data[end:] == MCAP0_MAGIC)
+        if cut_off:
             self.tail = self._tail(end)
-            self._add_scattered_chunks()
-            self._note_unexplained(end)
+            found = self._with_scattered(found)
+        self.chunks = chunk_table(found)
+        if cut_off:
+            self._note_unexplained(found, end)
             self.closed = bool(self._data_end)
-            kept = f'read up to byte {end}, {len(self.chunks)} whole chunks'
+            kept = f'read up to byte {end}, {len(found)} whole chunks'
             messages = 'all messages are there' if self.whole else kept
             self._warn(f'ends without its footer, as after a crash: {messages}')
         self.closed = bool(self._data_end)
         if self._summary.proof is Proof.WRONG:
             self._warn('the summary at its end is damaged; its chunks are searched for')
-        return self._channels, self._schemas
+        return found, self._channels, self._schemas
 
-    def _add_scattered_chunks(self) -> None:
-        """Replace what the walk found by all chunks of the file that their checksums prove."""
+    def _with_scattered(self, walked: list[Chunk]) -> list[Chunk]:
+        """Return instead of what the walk found all chunks of the file that their checksums prove."""
         found = {chunk.position: chunk for chunk in scattered_chunks(self._data)}
-        found |= {chunk.position: chunk for chunk in self.chunks}
+        found |= {chunk.position: chunk for chunk in walked}
         kept: list[Chunk] = []
         for _, chunk in sorted(found.items()):
             inside = bool(kept) and chunk.position < kept[-1].end
             if not inside and explore(self._data, chunk):
                 kept.append(chunk)
-        self.chunks = kept
         self._loose = [place for place in self._loose if not any(_holds(chunk, place) for chunk in kept)]
+        return kept
 
-    def _note_unexplained(self, walked: int) -> None:
+    def _note_unexplained(self, chunks: Sequence[Chunk], walked: int) -> None:
         position = len(MCAP0_MAGIC)
         stretches = []
-        for chunk in self.chunks:
+        for chunk in chunks:
             stretches.append((position, chunk.position))
             position = chunk.end
         stretches.append((position, len(self._data)))
@@ -495,7 +482,7 @@ class McapFile:
         self._loose = []
 
     def _note_missing_checksums(self) -> None:
-        without = sum(not chunk.crc for chunk in self.chunks if chunk.size)
+        without = self.chunks.unprotected
         if without:
             what = f'{without} of its {len(self.chunks)} chunks carry'
             self._warn(f'{what} no checksum, as their writer chose: a damaged number in them would go unseen')

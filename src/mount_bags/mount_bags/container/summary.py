@@ -3,6 +3,7 @@
 import mmap
 import struct
 import zlib
+from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
@@ -10,6 +11,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
@@ -25,7 +27,9 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from mount_bags.container.chunks import RECORD, IndexedChunks, add_indexed, indexed_chunks
+from mount_bags.container.chunk_index import indexed_chunks
+from mount_bags.container.chunk_table import ChunkTable, chunk_table
+from mount_bags.container.chunks import RECORD
 from mount_bags.container.whole_files import forget
 
 T = TypeVar('T')
@@ -34,7 +38,7 @@ _FOOTER_SIZE = 20  # bytes behind opcode and length
 _FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
 _CRC_SIZE = 4  # bytes
 _DATA_END = struct.Struct('<BQI')
-_STEP = 1 << 20  # bytes of the file in memory while its checksum is made
+_STEP = 1 << 20  # bytes of the file in memory while they are read, chosen
 _AT_ONCE = 1 << 18  # bytes, chosen: they stay in the processor's cache from one checksum to the other
 
 
@@ -62,7 +66,7 @@ class Summary:
     footer: int = 0
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: IndexedChunks = field(default_factory=indexed_chunks)
+    chunks: ChunkTable = field(default_factory=lambda: chunk_table(()))  # without their checksums
     statistics: Statistics | None = None
     beside: list[MetadataIndex | AttachmentIndex] = field(default_factory=list)
 
@@ -149,20 +153,31 @@ def parsed_attachment(content: bytes) -> Attachment | None:
 
 
 def _fill(summary: Summary, data: mmap.mmap) -> bool:
-    position = summary.begin
+    position = forgotten = summary.begin
+    begins, ends = array('q'), array('q')  # of what chunk indexes tell
     while position + RECORD.size <= summary.footer:
+        if position - forgotten >= _STEP:
+            forget(data, forgotten, position)
+            forgotten = position
         opcode, length = RECORD.unpack_from(data, position)
         position += RECORD.size
-        content = data[position : position + length]
-        position += length
-        if position > summary.footer or not _take(summary, opcode, content):
+        begin, position = position, position + length
+        if position > summary.footer:
             return False
+        if opcode == Opcode.CHUNK_INDEX:
+            begins.append(begin)
+            ends.append(position)
+        elif not _take(summary, opcode, data[begin:position]):
+            return False
+    chunks = indexed_chunks(np.frombuffer(data, np.uint8), np.array(begins), np.array(ends))
+    if chunks is None:
+        return False
+    summary.chunks = chunks
+    forget(data, summary.begin, position)
     return True
 
 
 def _take(summary: Summary, opcode: int, content: bytes) -> bool:
-    if opcode == Opcode.CHUNK_INDEX:
-        return add_indexed(content, summary.chunks)
     if opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
         summary.schemas[schema.id] = schema
     elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):

@@ -33,24 +33,40 @@ class Wanted(NamedTuple):
 
 
 @compiled
-def take(data, channels, begins, alike, marked, places, columns, filled):
-    """Fill `columns` from `filled` on with the messages in `data`; return how many the fullest has then.
+def take(data, ends, first, limit, channels, begins, alike, marked, places, columns, filled):
+    """Fill `columns` from `filled` on with the messages in chunks; return how many chunks are taken then.
 
-    `data`: bytes of a chunk, records from first to last; then the parts of `Wanted`. What stands at the
-    places of a topic are its rows of `columns`, (n, places, messages); of these `filled`, (n,), are taken.
-    Negative: a message is another, or these are no whole records; then `filled` stays.
+    `data[:ends[-1]]` are the bytes of chunks, each records from first to last, the end of each in `ends`; of
+    these the `first` are taken already. Then follow the parts of `Wanted`. What stands at the places of a
+    topic are its rows of `columns`, (n, places, messages); of these `filled`, (n,), are taken. It ends with
+    the chunk with which a topic has `limit` messages, or before one with another message or with what are no
+    whole records.
     """
-    position, size = 0, len(data)
     counts = filled.copy()
+    for chunk in range(first, len(ends)):
+        begin = ends[chunk - 1] if chunk > 0 else 0
+        content = data[begin : ends[chunk]]
+        if not _take_one(content, channels, begins, alike, marked, places, columns, counts):
+            return chunk
+        filled[:] = counts
+        if counts.max() >= limit:
+            return chunk + 1
+    return len(ends)
+
+
+@compiled
+def _take_one(data, channels, begins, alike, marked, places, columns, counts):
+    """Take the messages of one chunk behind the `counts` that are there; return False if one is another."""
+    position, size = 0, len(data)
     while position + _HEAD <= size:
         told = int(data[position + 1]) | int(data[position + 2]) << 8
         told |= int(data[position + 3]) << 16 | int(data[position + 4]) << 24
         longer = data[position + 5] | data[position + 6] | data[position + 7] | data[position + 8]
         if longer or told > size - position - _HEAD:
-            return -1
+            return False
         if data[position] == _MESSAGE:
             if told < _SHORTEST:
-                return -1
+                return False
             channel = int(data[position + 9]) | int(data[position + 10]) << 8
             for topic in range(len(channels)):
                 if channels[topic] != channel:
@@ -58,17 +74,14 @@ def take(data, channels, begins, alike, marked, places, columns, filled):
                 begin, end = begins[topic, 0], begins[topic + 1, 0]
                 payload = data[position + _HEAD + _SHORTEST : position + _HEAD + told]
                 if not _is_alike(payload, alike[begin:end], marked[begin:end]):
-                    return -1
+                    return False
                 begin, end = begins[topic, 1], begins[topic + 1, 1]
                 for index in range(end - begin):
                     place = position + places[begin + index]
                     columns[topic, index, counts[topic]] = _number(data[place : place + WORD])
                 counts[topic] += 1
         position += _HEAD + told
-    if position != size:
-        return -1
-    filled[:] = counts
-    return counts.max()
+    return position == size
 
 
 @compiled

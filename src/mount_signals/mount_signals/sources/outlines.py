@@ -129,13 +129,12 @@ def _needed(summary: Summary) -> Stretches:
     sessions = {
         number for number, channel in summary.channels.items() if channel.topic.split('/')[-1] == _SESSION
     }
-    needed, position = [], 0
-    for chunk in sorted(summary.chunks, key=lambda chunk: chunk.position):
-        needed.append((position, chunk.position))
-        position = chunk.position + chunk.length + chunk.index_length
-        if sessions & chunk.channels:
-            needed.append((chunk.position, position))
-    return [*needed, (position, summary.begin)]
+    begins = summary.chunks.rows['position']
+    ends = summary.chunks.rows['end'] + summary.chunks.rows['index_length']
+    held = summary.chunks.holding(sessions)
+    needed = [(0, begins[0]), *zip(ends[:-1], begins[1:], strict=True), (ends[-1], summary.begin)]
+    needed += zip(begins[held], ends[held], strict=True)
+    return [(int(begin), int(end)) for begin, end in needed]
 
 
 def _joined(stretches: Stretches) -> Stretches:

@@ -1,0 +1,60 @@
+"""Chunks that need no checksum of their own, unpacked one behind the other into the same memory each time."""
+
+import mmap
+
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from mount_bags.container.chunk_table import ChunkTable, Places
+
+Bytes = NDArray[np.uint8]
+Offsets = NDArray[np.int64]
+
+
+class Unpacker:
+    """The chunks of a file that is `plain` (`McapFile`), unpacked several at a time."""
+
+    def __init__(self, data: mmap.mmap, chunks: ChunkTable):
+        self._data, self._chunks = data, chunks
+        self._decompressor = zstandard.ZstdDecompressor()
+        self._target = np.empty(0, np.uint8)
+
+    def unpacked(self, places: Places) -> tuple[Bytes, Offsets]:
+        """Return the bytes of chunks in a row and the end of each among them; the next call overwrites them.
+
+        From the first chunk on that is not what its head says, none is there.
+        """
+        rows = self._chunks.rows[places]
+        ends = np.cumsum(rows['size'])
+        room = int(ends[-1]) + 1  # one byte more, so that a chunk that is too long is seen
+        if room > self._target.size:
+            try:
+                self._target = np.empty(room, np.uint8)
+            except MemoryError:
+                return self._target, ends[:0]
+        packed = [
+            (self._chunks.kinds[kind].compression, begin, end)
+            for kind, begin, end in zip(
+                rows['kind'].tolist(), rows['begin'].tolist(), rows['end'].tolist(), strict=True
+            )
+        ]
+        count, begin = 0, 0
+        with memoryview(self._data) as data, self._target.data as target:
+            for (compression, first, last), end in zip(packed, ends.tolist(), strict=True):
+                with data[first:last] as source:
+                    if self._unpack(source, compression, target[begin : end + 1]) != end - begin:
+                        break
+                count, begin = count + 1, end
+        return self._target, ends[:count]
+
+    def _unpack(self, source: memoryview, compression: str, target: memoryview) -> int:
+        """Unpack into a target with one byte more than needed; return how many there are, -1 for none."""
+        if not compression:
+            if len(source) < len(target):
+                target[: len(source)] = source
+            return len(source)
+        try:
+            return self._decompressor.stream_reader(source).readinto(target)
+        except zstandard.ZstdError:
+            return -1
