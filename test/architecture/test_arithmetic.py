@@ -49,7 +49,7 @@ ALLOWED = {
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimation', 'np.sum'): 'whole numbers',
-    ('mount_bags.container.writer', 'np.cumsum'): 'whole numbers',
+    ('mount_bags.container.filled_chunk', 'np.cumsum'): 'whole numbers',
     ('mount_bags.container.stored', 'np.cumsum'): 'whole numbers',
     ('mount_bags.container.unpacker', 'np.cumsum'): 'whole numbers',
     ('mount_bags.signals.even_grid', 'np.mean'): 'shares of whole numbers',

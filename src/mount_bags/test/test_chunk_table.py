@@ -11,7 +11,7 @@ from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
 
 from mount_bags.container.chunk_index import can_be_there, indexed_chunks
-from mount_bags.container.chunk_table import chunk_table
+from mount_bags.container.chunk_table import chunk_table, joined
 from mount_bags.container.chunks import SHORTEST_CHUNK, Chunk
 from mount_bags.container.unpacker import Unpacker
 
@@ -65,6 +65,17 @@ def chunk_of(index):
         index_length=index.message_index_length,
         channels=frozenset(index.message_index_offsets) if index.message_index_length else None,
     )
+
+
+def test_tables_of_parts_are_joined_in_the_order_of_their_positions():
+    indexes = [
+        *(index(5000 + 400 * place, [place % 3], 'zstd' if place % 2 else '') for place in range(7)),
+        *(index(400 * place, [7, 2], message_index_length=40 * place) for place in range(5)),
+    ]
+    parts = [table_of(indexes[:4]), table_of([]), table_of(indexes[4:])]
+    assert list(joined(parts)) == list(table_of(indexes))
+    assert len(joined(parts).kinds) == len(table_of(indexes).kinds)
+    assert not len(joined([]))
 
 
 def test_records_of_any_layout_tell_of_the_chunks_as_one_by_one():

@@ -32,6 +32,13 @@ def test_columns_and_stamps_are_those_of_all_messages_in_one_pass(drive, monkeyp
         assert not some[topic].loaded
 
 
+def test_topics_of_the_same_samples_share_their_stamps(tmp_path):
+    recording = mount_bags.open(write_drive(tmp_path / 'bag', COUNT, range(7, 9)))
+    recording.load_columns({'coil_ripple': ['coil_current'], 'current_setpoint': ['coil_current']})
+    assert recording['coil_ripple'].stamps is recording['current_setpoint'].stamps
+    assert len(recording['displacement'].stamps) == COUNT - 2
+
+
 def test_what_else_is_asked_of_a_topic_is_read_then(drive):
     some, whole = mount_bags.open(drive), mount_bags.open(drive)
     some.load_columns({'coil_ripple': ['coil_current']})

@@ -53,9 +53,7 @@ def messages_of(folder):
     with (folder / f'{folder.name}_0.mcap').open('rb') as file:
         return [
             (channel.topic, message.data, message.log_time)
-            for _, channel, message in make_reader(file, validate_crcs=True).iter_messages(
-                log_time_order=False
-            )
+            for _, channel, message in make_reader(file, validate_crcs=True).iter_messages()
         ]
 
 

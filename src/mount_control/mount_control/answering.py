@@ -104,8 +104,7 @@ class Answering:
 
     def heed_writers(self, foreign: str, doubt: str) -> None:
         """Answer with 0 A: until the next activation for a `foreign` writer, and while there is a `doubt`."""
-        self.watch.foreign = self.watch.foreign or foreign
-        self.watch.writer_doubt = doubt
+        self.watch.heed_writers(foreign, doubt)
 
     def change(self, settings: ControlSettings, told: str = '') -> None:
         """Go on with other settings from the next usable sample on; may come from another thread."""

@@ -64,6 +64,7 @@ class ControlFigures:
     doubt: str = ''  # why displacements were not believed last, or empty
     doubted: bool = False  # whether they are not believed at present
     foreign: str = ''  # which other node has sent what only one may, or empty
+    name_awaited: bool = False  # whether discovery may soon tell its name
     writer_doubt: str = ''  # which other node may, at present
     unread: Unread = _ALL_READ
     earlier: Counted = _NOTHING  # a window ago, or at the activation
@@ -90,7 +91,8 @@ def verdict(figures: ControlFigures) -> Verdict:
         'parameter_changes': figures.parameter_changes,
         'needs_initialisation': bool(figures.table_refusal),
         'messages_malformed': figures.unread.messages,
-        'fatal': bool(figures.foreign),  # a supervisor ends the graph
+        # A supervisor ends the graph, with the name of the other node where one can be known.
+        'fatal': bool(figures.foreign) and not figures.name_awaited,
     }
     well = 'damping on' if figures.damping_active else 'damping off'
     return verdict_on(_errors(figures) or _warnings(figures), well, values)

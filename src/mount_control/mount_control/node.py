@@ -42,6 +42,7 @@ from mount_ros.nodes.parameters import SpecimenValues, declare
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.sliding_window import SlidingWindow
 from mount_ros.timing import LatencyHistogram
+from mount_ros.writers import NamelessWriter
 
 _MEASURED_BEFORE = (
     'measured_before',
@@ -69,6 +70,7 @@ class MountControl(SafeLifecycleNode):
         self._activation = Activation()
         self._damping_log = DampingLog()
         self._foreign = False  # whether another node publishes what this one hears
+        self._nameless = NamelessWriter()
         self._unread = Unread()
         self._last_sample: tuple[int, float] | None = None  # stamp ns, m
         self._last_setpoint = (0, OFF)  # stamp ns, A
@@ -166,6 +168,7 @@ class MountControl(SafeLifecycleNode):
                 table_refusal=answering.refusal,
                 writer_doubt=answering.watch.writer_doubt,
                 foreign=answering.watch.foreign,
+                name_awaited=self._nameless.is_awaited(answering.watch.nameless),
                 unread=self._unread,
                 damping_active=answering.damping_active,
                 current=answering.current,

@@ -68,6 +68,7 @@ class SampleWatch:
         self._broken = False  # whether `first` came after a break that was heard
         self.interrupted = False  # since the activation
         self.foreign = ''  # which other sender there is, since the activation
+        self.nameless = False  # whether `foreign` only tells what came, not from whom
         self.writer_doubt = ''  # which other sender there may be at present
         self.counts = SampleCounts()
         self._intruded: deque[int] = deque(maxlen=_INTRUSIONS)  # stamps of samples that came too soon, ns
@@ -151,8 +152,14 @@ class SampleWatch:
         self._closest = round(_CLOSEST * self._period)
         self.plausibility = Plausibility(parameters)
         self._used, self._seen, self.interrupted, self.counts = None, None, False, SampleCounts()
-        self.foreign = ''
+        self.foreign, self.nameless = '', False
         self._intruded.clear()
+
+    def heed_writers(self, foreign: str, doubt: str) -> None:
+        """Take which other sender discovery has found, and which there may be; the first name stays."""
+        if foreign and (self.nameless or not self.foreign):
+            self.foreign, self.nameless = foreign, False
+        self.writer_doubt = doubt
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
         """Return the judgement on a noted sample (ns, m), and how many are missing before it."""
@@ -224,6 +231,7 @@ class SampleWatch:
         found = self._intruded
         found.append(stamp)
         if len(found) == _INTRUSIONS and stamp - found[0] <= _INTRUSION_PERIOD and not self.foreign:
+            self.nameless = True
             self.foreign = (
                 f'{len(found)} displacement samples within {_INTRUSION_PERIOD * 1e-9:g} s were repeated, '
                 f'older than the one before or less than {self._closest * 1e-6:g} ms behind it: end one of '

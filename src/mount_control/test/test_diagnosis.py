@@ -115,6 +115,12 @@ def test_another_writer_is_an_error_that_ends_the_graph():
     )
 
 
+def test_another_writer_whose_name_may_still_come_does_not_end_the_graph_yet():
+    judged = verdict(replace(GOOD, foreign='10 samples were repeated: end one', name_awaited=True))
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
+    assert judged.sentence.startswith('0 A: 10 samples were repeated')
+
+
 def test_a_writer_in_doubt_is_an_error_while_it_lasts():
     judged = verdict(replace(GOOD, writer_doubt='two of them: end one'))
     assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)

@@ -226,6 +226,18 @@ def test_a_second_sender_is_noticed_by_its_stamps_and_answered_with_0_ampere(wat
     assert _judge(watch, 101) == [(Judgement.RESTART, 0)]
 
 
+def test_a_sender_noticed_by_its_stamps_is_told_by_its_name_as_soon_as_discovery_has_it(watch):
+    _judge(watch, 1, 1, 2, 2, 3, 3)
+    assert watch.nameless
+    watch.heed_writers('', '')
+    assert watch.foreign.startswith('3 displacement samples within 1 s were repeated')
+    for name in ('/evil', '/worse'):
+        watch.heed_writers(f'{name} must not publish', '')
+        assert (watch.foreign, watch.nameless) == ('/evil must not publish', False)
+    watch.begin(600 * MS, ControlParameters())
+    assert (watch.foreign, watch.nameless) == ('', False)
+
+
 def test_repeated_samples_now_and_then_are_no_second_sender(watch):
     for second in range(5):
         begin = 800 * second

@@ -33,8 +33,13 @@ class LinkWatch:
         return Past(self._window.earlier(now.time, now), self._second.earlier(now.time, now))
 
 
-def judge(now: Snapshot, past: Past, parameters: DriverParameters, *, lockstep: bool) -> Verdict:
-    """Return the verdict: the gravest finding speaks, all figures follow."""
+def judge(
+    now: Snapshot, past: Past, parameters: DriverParameters, *, lockstep: bool, name_awaited: bool = False
+) -> Verdict:
+    """Return the verdict: the gravest finding speaks, all figures follow.
+
+    With `name_awaited`, discovery may soon name the other sender that a fault tells of: nothing ends before.
+    """
     where, earlier = f'{parameters.interface} {parameters.channel}', past.window
     found = (
         *_bus_findings(now, where, parameters),
@@ -48,7 +53,9 @@ def judge(now: Snapshot, past: Past, parameters: DriverParameters, *, lockstep: 
         *_frame_findings(now, earlier),
         *_refusal_findings(now, earlier),
     )
-    return verdict_on(found, 'link to the electronics is up', _figures(now, earlier, parameters))
+    figures = _figures(now, earlier, parameters)
+    figures['fatal'] = figures['fatal'] and not name_awaited
+    return verdict_on(found, 'link to the electronics is up', figures)
 
 
 Findings = list[Finding]

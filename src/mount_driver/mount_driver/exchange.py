@@ -128,8 +128,7 @@ class Exchange:
         if fault is None:
             return
         graver = link.needs_initialisation and not fault.needs_initialisation
-        nameless = link.fault == link.double_answer
-        if link.fault and not (graver or nameless):
+        if link.fault and not (graver or link.nameless):
             return
         with self._sending:
             self._send(link.switch_off(*fault))

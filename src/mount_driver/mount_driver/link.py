@@ -186,6 +186,11 @@ class Link:
         self.refusals[reason] += 1
         self.last_refusal = reason
 
+    @property
+    def nameless(self) -> bool:
+        """Whether the fault tells of two answers to a sample, but not who gives the other."""
+        return bool(self.fault) and self.fault == self.double_answer
+
     def switch_off(self, fault: str, needs_initialisation: bool) -> Setpoint:
         """Refuse all setpoints from now on; return the one that switches the coil off."""
         self.fault, self.needs_initialisation = fault, needs_initialisation

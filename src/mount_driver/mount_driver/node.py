@@ -24,6 +24,7 @@ from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import Urgent
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.writers import NamelessWriter
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
 
@@ -41,7 +42,7 @@ class MountDriver(SafeLifecycleNode):
         self._settings, self._law = DriverParameters(), RippleLaw()
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
-        self._watch = LinkWatch()
+        self._watch, self._nameless = LinkWatch(), NamelessWriter()
         self._started_ns = 0
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
@@ -115,7 +116,9 @@ class MountDriver(SafeLifecycleNode):
         if exchange is None:
             return Verdict(Level.OK, 'inactive')
         now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
-        return judge(now, self._watch.past(now), self._settings, lockstep=self.lockstep)
+        awaited = self._nameless.is_awaited(now.nameless)
+        past = self._watch.past(now)
+        return judge(now, past, self._settings, lockstep=self.lockstep, name_awaited=awaited)
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()

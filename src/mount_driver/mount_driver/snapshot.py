@@ -45,6 +45,7 @@ class Snapshot(NamedTuple):
     trouble: str = ''
     failure: str = ''
     fault: str = ''  # keeps the coil off until the next activation
+    nameless: bool = False  # it tells of two answers to a sample, but not who gives the other
     needs_initialisation: bool = False  # and nothing else
     other_senders: int = 0  # frames that neither our electronics nor we have sent
     other_sender_age: float = math.inf  # s, since the last of them
@@ -96,6 +97,7 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         trouble=exchange.trouble,
         failure=exchange.failure,
         fault=link.fault,
+        nameless=link.nameless,
         needs_initialisation=link.needs_initialisation,
         other_senders=guard.other_senders,
         other_sender_age=math.inf if seen is None else (link.clock.now(now_ns) - seen) * 1e-9,

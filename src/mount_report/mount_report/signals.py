@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from mount_bags.bag.recording import ReadingError, Recording
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import switching_times
+from mount_bags.messages.compact_times import Times, each_once
 from mount_bags.messages.series import Series, SeriesError
 from mount_bags.run.session import recorded_sample_rate, recorded_session
 from mount_report.drawing.chart import Array
@@ -46,6 +48,14 @@ class Signal:
     values: Array
 
 
+class _Order(NamedTuple):
+    """In which order the values of a topic with these `stamps` (ns) are taken, and their times (s)."""
+
+    stamps: Times
+    time: Array
+    places: slice | NDArray[np.intp]
+
+
 class Signals:
     """The signals of one recording. What is asked for and not there is noted in `missing`, in words."""
 
@@ -55,7 +65,7 @@ class Signals:
         self.name = name or recording.short_name
         self.missing: list[str] = []
         self._found: dict[tuple[str, str], Signal | None] = {}
-        self._orders: dict[str, tuple[Array, slice | NDArray[np.int64]]] = {}  # times, places of the values
+        self._orders: dict[str, _Order] = {}
         recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
         self.axis = recording.time_axis
         self.zero = self.axis.zero if zero is None else zero
@@ -113,11 +123,14 @@ class Signals:
 
     def _ordered(self, series: Series, values: Array) -> Signal:
         if series.topic not in self._orders:
-            stamps, first = np.unique(series.stamps, return_index=True)
-            in_order = np.array_equal(first, np.arange(len(series)))
-            self._orders[series.topic] = (stamps - self.zero) / 1e9, slice(None) if in_order else first
-        time, places = self._orders[series.topic]
-        return Signal(time, np.asarray(values, np.float64)[places])
+            alike = (order for order in self._orders.values() if order.stamps is series.stamps)
+            self._orders[series.topic] = next(alike, None) or self._order_of(series.stamps)
+        order = self._orders[series.topic]
+        return Signal(order.time, np.asarray(values, np.float64)[order.places])
+
+    def _order_of(self, stamps: Times) -> '_Order':
+        rising, places = each_once(stamps)
+        return _Order(stamps, (rising - self.zero) / 1e9, places)
 
     def _absence(self, topic: str) -> str:
         alike = [name for name in self.recording if name.endswith(f'/{topic}')]

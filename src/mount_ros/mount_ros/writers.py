@@ -17,6 +17,9 @@ from mount_ros.topics import Topic
 LONGEST_DOUBT = 6.0
 """How long two writers may bear one name, s: the lease of a killed one (5 s, `dds/`), and 1 s (chosen)."""
 
+NAMING_TIME = 1.0
+"""How long discovery may need to name the sender of a message, s, chosen: the name travels by itself."""
+
 _LOOK_PERIOD = 0.05  # s, chosen: while an activation waits
 _NAMELESS = '_NODE_NAME_UNKNOWN_'  # rmw_fastrtps, until the name has come
 
@@ -128,6 +131,22 @@ class WriterWatch:
         if len(set(names)) > 1:  # one name alone stands in for the writers, or is one of them
             return sorted(others - nameless), twice or sorted(nameless)
         return [], twice
+
+
+class NamelessWriter:
+    """A second writer that is known by what it sends alone, until discovery names it."""
+
+    def __init__(self):
+        self._since: float | None = None  # s, steady clock
+
+    def is_awaited(self, nameless: bool) -> bool:
+        """Return whether its name may still come: within `NAMING_TIME` of the first call with `nameless`."""
+        now = time.monotonic()
+        if not nameless:
+            self._since = None
+            return False
+        self._since = now if self._since is None else self._since
+        return now - self._since < NAMING_TIME
 
 
 _IF_KILLED = f'a killed one is gone after {LONGEST_DOUBT:g} s, else end it'

@@ -12,7 +12,7 @@ from mount_ros.messages.types import message_class
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import wait_until
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, TOPICS
-from mount_ros.writers import ForeignWriterError
+from mount_ros.writers import NAMING_TIME, ForeignWriterError, NamelessWriter
 
 
 @pytest.fixture
@@ -157,3 +157,17 @@ def test_a_node_without_a_name_is_a_doubt_and_one_of_another_type_is_not_heard(h
     infos[-1] = _info('evil')
     heard.writers.look()
     assert heard.writers.foreign.startswith('/car/evil must not publish displacement too')
+
+
+def test_the_name_of_a_writer_is_awaited_for_a_moment_from_its_first_message(monkeypatch):
+    now, nameless = [100.0], NamelessWriter()
+    monkeypatch.setattr(mount_ros.writers.time, 'monotonic', lambda: now[0])
+    assert not nameless.is_awaited(False)
+    for _ in range(2):
+        begin = now[0]
+        assert nameless.is_awaited(True)
+        now[0] = begin + 0.9 * NAMING_TIME
+        assert nameless.is_awaited(True)
+        now[0] = begin + 1.1 * NAMING_TIME
+        assert not nameless.is_awaited(True)
+        assert not nameless.is_awaited(False)  # named, or gone

@@ -11,12 +11,12 @@ from itertools import count
 import pytest
 from served_stores import BreakingWay, know_host
 
-from mount_signals.sources import fetching, reading
+from mount_signals.sources import fetching, patience, reading
 from mount_signals.sources.filesystems import forget_connections
 from mount_signals.sources.patience import Attempts, Patience
 from mount_signals.sources.reasons import is_lasting
 from mount_signals.sources.remote import RemoteStore
-from mount_signals.sources.source import SourceError
+from mount_signals.sources.source import SourceError, StoreAwayError
 from mount_signals.sources.stores import fetched, traffic
 
 DATA = bytes(range(256)) * 8192  # 2 MB
@@ -126,6 +126,25 @@ def test_progress_gives_new_patience(monkeypatch):
         attempts.failed(ConnectionError('reset'))
     with pytest.raises(SourceError, match=r'ConnectionError: reset \(4 attempts'):
         attempts.failed(ConnectionError('reset'))
+
+
+def test_a_store_that_takes_requests_and_never_answers_uses_up_the_time_not_the_attempts(monkeypatch):
+    now, silence = [0.0], 30.0
+    monkeypatch.setattr(patience.time, 'monotonic', lambda: now[0])
+    limits = Patience(seed=1)
+
+    def wait_in_vain(attempts, times=limits.attempts):
+        for _ in range(times):
+            now[0] += silence
+            attempts.failed(TimeoutError('no byte'))
+
+    attempts = Attempts('https://host/a', limits, lambda pause: None)
+    wait_in_vain(attempts, 1)
+    attempts.progress()
+    begin = now[0]
+    with pytest.raises(StoreAwayError, match='4 attempts'):
+        wait_in_vain(attempts)
+    assert now[0] - begin <= limits.standstill + silence
 
 
 @pytest.mark.parametrize(('status', 'requests'), [(404, 2), (403, 2), (503, 8)])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from mount_bags.bag.chunk_groups import chunk_group
 from mount_bags.bag.metadata import NO_TIME, FileInformation
 from mount_bags.bag.offered_qos import OfferedQos, qos_text
 from mount_bags.bag.schemas import schema_text
@@ -94,7 +95,8 @@ class Piece:
         """Declare a topic and return the number of its channel."""
         details = {'offered_qos_profiles': qos_text(topic.offered_qos), 'topic_type_hash': topic.type_hash}
         details |= units_text(topic.units)
-        return self.container.add_channel(topic.name, MESSAGE_ENCODING, topic.schema, details)
+        group = chunk_group(topic.name, topic.type)
+        return self.container.add_channel(topic.name, MESSAGE_ENCODING, topic.schema, details, group)
 
     def repeat(self, repetitions: Iterable[Repetition], time: int) -> None:
         """Write the latched messages with log time `time` (ns) and their own publish times.

@@ -159,12 +159,18 @@ class Recording:
         """
         wanted = {self.resolve(topic): self._unread(self.resolve(topic), columns[topic]) for topic in columns}
         collectors = {
-            name: ColumnCollector(partial(self._made, name), names) for name, names in wanted.items() if names
+            name: ColumnCollector(partial(self._made, name), names, self.topics[name].message_count)
+            for name, names in wanted.items()
+            if names
         }
         for name, block in self._blocks(list(collectors)) if collectors else ():
             collectors[name].add(block)
+        all_stamps: list[Times] = []
         for name in list(collectors):
             heads, found, stamps = collectors.pop(name).finish()
+            if stamps is not None:  # topics of the same samples share them
+                stamps = next((known for known in all_stamps if np.array_equal(known, stamps)), stamps)
+                all_stamps.append(stamps)
             self._note_damage(name, len(heads.received))
             known = self._series[name].columns if name in self._series else {}
             self._series[name] = self._made(

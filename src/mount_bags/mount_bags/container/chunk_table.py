@@ -91,6 +91,20 @@ class ChunkTable(Sequence[Chunk]):
         return np.flatnonzero(np.fromiter(wanted, np.bool_, len(self.kinds))[self.rows['kind']])
 
 
+def joined(tables: Sequence[ChunkTable]) -> ChunkTable:
+    """Return the chunks of several tables in the order of their positions."""
+    known: dict[Kind, int] = {}
+    rows, end = np.empty(sum(map(len, tables)), ROW), 0
+    for table in tables:
+        begin, end = end, end + len(table)
+        rows[begin:end] = table.rows
+        kinds = [known.setdefault(kind, len(known)) for kind in table.kinds]
+        rows['kind'][begin:end] = np.array(kinds, np.uint32)[table.rows['kind']]
+    if (rows['position'][1:] < rows['position'][:-1]).any():
+        rows = rows[np.argsort(rows['position'], kind='stable')]
+    return ChunkTable(rows, list(known))
+
+
 def chunk_table(chunks: Iterable[Chunk]) -> ChunkTable:
     """Return the table of chunks that are known one by one."""
     known: dict[Kind, int] = {}

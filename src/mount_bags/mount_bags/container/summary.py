@@ -28,7 +28,7 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from mount_bags.container.chunk_index import indexed_chunks
-from mount_bags.container.chunk_table import ChunkTable, chunk_table
+from mount_bags.container.chunk_table import ChunkTable, chunk_table, joined
 from mount_bags.container.chunks import RECORD
 from mount_bags.container.whole_files import forget
 
@@ -38,7 +38,7 @@ _FOOTER_SIZE = 20  # bytes behind opcode and length
 _FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
 _CRC_SIZE = 4  # bytes
 _DATA_END = struct.Struct('<BQI')
-_STEP = 1 << 20  # bytes of the file in memory while its checksum is made
+_STEP = 1 << 20  # bytes of the file in memory while they are read, chosen
 _AT_ONCE = 1 << 18  # bytes, chosen: they stay in the processor's cache from one checksum to the other
 
 
@@ -153,24 +153,33 @@ def parsed_attachment(content: bytes) -> Attachment | None:
 
 
 def _fill(summary: Summary, data: mmap.mmap) -> bool:
-    position = summary.begin
-    begins, ends = array('q'), array('q')  # of what chunk indexes tell
+    tables, position = [], summary.begin
     while position + RECORD.size <= summary.footer:
-        opcode, length = RECORD.unpack_from(data, position)
-        position += RECORD.size
-        begin, position = position, position + length
-        if position > summary.footer:
+        begin = position
+        position, table = _take_part(summary, data, begin)
+        if table is None:
             return False
-        if opcode == Opcode.CHUNK_INDEX:
-            begins.append(begin)
-            ends.append(position)
-        elif not _take(summary, opcode, data[begin:position]):
-            return False
-    chunks = indexed_chunks(np.frombuffer(data, np.uint8), np.array(begins), np.array(ends))
-    if chunks is None:
-        return False
-    summary.chunks = chunks
+        tables.append(table)
+        forget(data, begin, position)
+    summary.chunks = joined(tables)
     return True
+
+
+def _take_part(summary: Summary, data: mmap.mmap, begin: int) -> tuple[int, ChunkTable | None]:
+    """Take the records of some `_STEP` bytes; return their end and chunks, None if one is not readable."""
+    position, begins, ends = begin, array('q'), array('q')  # of what chunk indexes tell
+    while position - begin < _STEP and position + RECORD.size <= summary.footer:
+        opcode, length = RECORD.unpack_from(data, position)
+        content = position + RECORD.size
+        position = content + length
+        if position > summary.footer:
+            return position, None
+        if opcode == Opcode.CHUNK_INDEX:
+            begins.append(content)
+            ends.append(position)
+        elif not _take(summary, opcode, data[content:position]):
+            return position, None
+    return position, indexed_chunks(np.frombuffer(data, np.uint8), np.array(begins), np.array(ends))
 
 
 def _take(summary: Summary, opcode: int, content: bytes) -> bool:

@@ -12,10 +12,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mount_bags.bag.chunk_groups import chunk_group
 from mount_bags.bag.metadata import NO_TIME
 from mount_bags.bag.piece_topics import repeated_topics
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.bag.statement import read_statement
+from mount_bags.container.chunks import Chunk
 from mount_bags.container.mcap_file import McapFile
 from mount_bags.container.stored import RECORDER_RECORD, StoredMessages
 from mount_bags.edit.beside_messages import copy_beside_messages, lost_beside_messages
@@ -23,6 +25,7 @@ from mount_bags.edit.inherited_statement import inherited_statement, sources_of
 from mount_bags.edit.verbatim import VerbatimBag
 
 _SECOND = 1e9  # ns
+_NEAR = 600 * _SECOND  # chosen: chunks are shorter by far
 
 Progress = Callable[[int, int], None]  # messages done, messages in all
 
@@ -198,15 +201,37 @@ def _lost_bytes(file: McapFile) -> int:
 
 
 def _lost_inside(file: McapFile) -> int:
-    """Return the ns between whole chunks with something lost between them."""
+    """Return the ns between whole chunks of the same group with something lost between them."""
     losses = [chunk.position for chunk in file.chunks if file.is_damaged(chunk)]
     losses += [stretch.begin for stretch in file.unexplained]
     whole = [chunk for chunk in file.chunks if not file.is_damaged(chunk)]
-    lost = 0
-    for before, after in itertools.pairwise(whole):
-        if any(before.position < position < after.position for position in losses):
-            lost += max(0, after.start_time - before.end_time)
-    return lost
+    lost = []
+    for chunks in _by_group(file, whole):
+        for before, after in itertools.pairwise(chunks):
+            if any(before.position < position < after.position for position in losses):
+                lost.append((before.end_time, after.start_time))
+    return _covered(lost)
+
+
+def _by_group(file: McapFile, chunks: Sequence[Chunk]) -> list[Sequence[Chunk]]:
+    """Return the chunks of each group of topics, all in one where a chunk holds topics of several."""
+    group_of = {number: chunk_group(topic.name, topic.type) for number, topic in file.topics.items()}
+    held = [{group_of.get(number) for number in chunk.channels or ()} for chunk in chunks]
+    if any(chunk.channels is None for chunk in chunks) or any(len(groups) > 1 for groups in held):
+        return [chunks]
+    return [
+        [chunk for chunk, groups in zip(chunks, held, strict=True) if group in groups]
+        for group in set().union(*held)
+    ]
+
+
+def _covered(spans: Sequence[tuple[int, int]]) -> int:
+    """Return how much the spans (begin, end) cover, each part once."""
+    covered, reached = 0, 0
+    for begin, end in sorted(spans):
+        covered += max(0, end - max(begin, reached))
+        reached = max(reached, end)
+    return covered
 
 
 def _lost_at_ends(recording: Recording, kept: tuple[int, int]) -> float:
@@ -219,10 +244,17 @@ def _lost_at_ends(recording: Recording, kept: tuple[int, int]) -> float:
         begin, end = information.starting_time, information.starting_time + information.duration
     else:
         tail = getattr(recording.files[-1], 'tail', None)
-        if tail is None or not last <= tail.end_time <= last + 600 * _SECOND:
+        if tail is None or not _is_near(tail, kept):
             return math.nan
-        begin, end = first, tail.end_time
+        # The chunk of the other group may be whole and of the same time.
+        begin, end, last = first, tail.end_time, min(last, tail.start_time)
     return (max(0, first - begin) + max(0, end - last)) / _SECOND
+
+
+def _is_near(tail: Chunk, kept: tuple[int, int]) -> bool:
+    """Return whether the times of a chunk that was cut off, which no checksum covers, are to be believed."""
+    first, last = kept
+    return first - _NEAR <= tail.start_time <= tail.end_time <= last + _NEAR
 
 
 def _reasons(recording: Recording) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mcap.records import Attachment
 
+from mount_bags.bag.chunk_groups import chunk_group
 from mount_bags.bag.metadata import (
     METADATA_NAME,
     NO_TIME,
@@ -72,7 +73,8 @@ class VerbatimBag:
         self._schemas[definition] = schema_id
         wanted = (topic.name, topic.encoding, schema_id)
         if wanted not in self._channels:
-            added = self._container.add_channel(*wanted, topic.details)
+            group = chunk_group(topic.name, topic.type)
+            added = self._container.add_channel(*wanted, topic.details, group)
             self._channels[wanted] = added
             self._topics[added] = TopicInformation(
                 name=topic.name,

@@ -1,12 +1,16 @@
 """Chosen columns of a topic, taken block by block: a long recording needs the memory of these alone."""
 
 from collections.abc import Callable, Iterable
+from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mount_bags.container.stored import StoredMessages
 from mount_bags.messages.compact_times import CompactTimes
 from mount_bags.messages.series import Column, Heads, Payloads, Series, SeriesError, Times, heads_of
+
+Kind = TypeVar('Kind', np.float64, np.int64)
 
 _BLOCK = 4096  # messages, chosen: 3 MB of the longest ones of this project
 
@@ -14,13 +18,35 @@ MakeSeries = Callable[[Payloads, Heads], Series]
 """Makes a series of messages and their heads."""
 
 
+class FillingColumn(Generic[Kind]):
+    """A column that fills part by part: never held twice where not more comes than is expected."""
+
+    def __init__(self, expected: int, kind: type[Kind]):
+        """Make room for so many numbers; more may come."""
+        self._numbers: NDArray[Kind] = np.empty(expected, kind)
+        self._count = 0
+
+    def add(self, numbers: NDArray[Kind]) -> None:
+        """Add numbers behind the others."""
+        begin, self._count = self._count, self._count + len(numbers)
+        if self._count > len(self._numbers):
+            self._numbers = np.concatenate([self._numbers[:begin], np.empty(self._count, numbers.dtype)])
+        self._numbers[begin : self._count] = numbers
+
+    @property
+    def filled(self) -> NDArray[Kind]:
+        """All that was added."""
+        return self._numbers[: self._count]
+
+
 class ColumnCollector:
     """Collects columns and stamps of one topic; what is not in each message is left out."""
 
-    def __init__(self, make_series: MakeSeries, names: Iterable[str]):
+    def __init__(self, make_series: MakeSeries, names: Iterable[str], expected: int):
+        """Take what makes a series of a block, the names, and how many messages are expected."""
         self._make_series = make_series
-        self._columns: dict[str, list[Column]] = {name: [] for name in names}
-        self._stamps: list[Times] | None = []
+        self._columns = {name: FillingColumn(expected, np.float64) for name in names}
+        self._stamps: FillingColumn[np.int64] | None = FillingColumn(expected, np.int64)
         self._heads = Heads(CompactTimes(), CompactTimes(), CompactTimes())
         self._waiting: list[np.ndarray | list[bytes]] = []
         self._waiting_heads: list[np.ndarray] = []
@@ -40,8 +66,8 @@ class ColumnCollector:
             self._take()
         if not len(self._heads.received):
             return self._heads, {}, None
-        columns = {name: np.concatenate(self._columns.pop(name)) for name in list(self._columns)}
-        stamps = None if self._stamps is None else np.concatenate(self._stamps)
+        columns: dict[str, Column] = {name: column.filled for name, column in self._columns.items()}
+        stamps = None if self._stamps is None else self._stamps.filled
         for times in self._heads:
             times.finished()
         return self._heads, columns, stamps
@@ -54,11 +80,11 @@ class ColumnCollector:
         self._waiting, self._waiting_heads, self._count = [], [], 0
         for name in list(self._columns):
             try:
-                self._columns[name].append(series[name])
+                self._columns[name].add(series[name])
             except SeriesError:
                 del self._columns[name]
         if self._stamps is not None:
             try:
-                self._stamps.append(series.stamps)
+                self._stamps.add(series.stamps)
             except SeriesError:
                 self._stamps = None

@@ -4,6 +4,7 @@ Times that follow one another differ by nearly the same step. Block by block the
 are above the least of them, in as few bytes as that needs: at 1 kHz 0 to 4 instead of 8.
 """
 
+import mmap
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ Times = NDArray[np.int64]
 
 BLOCK = 1 << 13  # times, chosen: so that one long step makes few others take more bytes
 _WORD = 8  # bytes of a time
+_SLAB = 1 << 20  # bytes that are taken from the system at once, chosen
 
 
 class _Block(NamedTuple):
@@ -35,6 +37,21 @@ class _Block(NamedTuple):
         return np.cumsum(found, out=found)
 
 
+class _Slabs:
+    """Memory that goes back to the system with its owner; small pieces of the heap would stay there."""
+
+    def __init__(self) -> None:
+        self._free = np.empty(0, np.uint8)
+
+    def kept(self, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a copy of `data` in this memory."""
+        if data.size > len(self._free):
+            self._free = np.frombuffer(mmap.mmap(-1, max(_SLAB, data.size), mmap.MAP_PRIVATE), np.uint8)
+        place, self._free = self._free[: data.size], self._free[data.size :]
+        place[:] = data.reshape(-1)
+        return place.reshape(data.shape)
+
+
 class CompactTimes:
     """A column of times (ns) in the order in which they were added, to be read block by block."""
 
@@ -46,6 +63,7 @@ class CompactTimes:
         self.strictly_rising = True
         """Whether each is above the one before it."""
         self._blocks: list[_Block] = []
+        self._slabs = _Slabs()
         self._last = 0
         self._waiting: list[Times] = []
         self._waiting_count = self._packed_count = 0
@@ -147,7 +165,7 @@ class CompactTimes:
             int(times.min()),
             int(times.max()),
             least,
-            _narrow(steps - least, highest - least),
+            self._slabs.kept(_narrow(steps - least, highest - least)),
         )
         self._blocks.append(found)
         self._last = int(times[-1])
@@ -185,6 +203,13 @@ def distinct(times: Times) -> Times:
     return times[np.append(True, times[1:] > times[:-1])] if len(times) else times
 
 
+def each_once(times: Times) -> tuple[Times, 'slice | NDArray[np.intp]']:
+    """Return the distinct times, rising, and where the first of each stands; no copies where they rise."""
+    if bool((times[1:] > times[:-1]).all()):
+        return times, slice(None)
+    return np.unique(times, return_index=True)
+
+
 def within(times: Times, begin: int, end: int) -> Times:
     """Return the times from `begin` to `end`."""
     return times[(times >= begin) & (times <= end)]
@@ -200,4 +225,4 @@ def is_in(times: Times, known: Times) -> NDArray[np.bool_]:
 def _narrow(above: Times, highest: int) -> NDArray[np.uint8]:
     """Return numbers from 0 to `highest` (n,) as the fewest bytes that hold each of them (n, bytes)."""
     width = -(-highest.bit_length() // 8)
-    return above.view(np.uint8).reshape(-1, _WORD)[:, :width].copy()
+    return above.view(np.uint8).reshape(-1, _WORD)[:, :width]

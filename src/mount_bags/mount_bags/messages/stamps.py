@@ -150,12 +150,13 @@ def _covered(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> int:
 
 def _places(stamps: CompactTimes, rate: float) -> tuple[int, int]:
     """Return how many places the grid under jittering `stamps` (ns, sorted) has, and how many are taken."""
-    places = np.fromiter(_grid(stamps, rate), np.int64)
-    first, last = 0, int(places[-1])
-    shared = places[:-1][places[1:] == places[:-1]]
-    taken = distinct(places)
+    places = CompactTimes()
+    for block in _grid(stamps, rate):
+        places.add(block)
+    first, last = 0, places.finished().highest
+    shared = np.concatenate(list(_repeated(places)))
     nearest = np.array(sorted(range(-_NEAR, _NEAR + 1), key=abs))
-    empty = ~is_in(shared[:, None] + nearest, taken)
+    empty = _none_at(places, shared, nearest)
     added: set[int] = set()
     for place, is_empty in zip(shared.tolist(), empty, strict=True):
         near = (place + nearest[is_empty]).tolist()
@@ -168,19 +169,37 @@ def _places(stamps: CompactTimes, rate: float) -> tuple[int, int]:
         elif last - place < _NEAR:
             last += 1
             added.add(last)
-    return last - first + 1, len(taken) + len(added)
+    return last - first + 1, len(places) - len(shared) + len(added)
 
 
-def _grid(stamps: CompactTimes, rate: float) -> Iterator[int]:
-    """Yield the place of each distinct stamp on a grid that follows them."""
+def _repeated(places: CompactTimes) -> Iterator[Times]:
+    """Yield those of rising places that are the one before them once more."""
+    last = -1
+    for block in places.blocks():
+        yield block[np.diff(block, prepend=last) == 0]
+        last = int(block[-1])
+
+
+def _none_at(places: CompactTimes, known: Times, steps: Times) -> NDArray[np.bool_]:
+    """Return at which `steps` from each of `known` places, which rise, there is none; (known, steps)."""
+    none = np.ones((len(known), len(steps)), bool)
+    for block in places.blocks():
+        near = slice(*np.searchsorted(known, [block[0] - steps.max(), block[-1] - steps.min() + 1]))
+        none[near] &= ~is_in(known[near, None] + steps, block)
+    return none
+
+
+def _grid(stamps: CompactTimes, rate: float) -> Iterator[Times]:
+    """Yield the place of each distinct stamp on a grid that follows them, block by block."""
     phase, place, known = 0.0, 0, stamps.least - 1
     for block in stamps.blocks():
         new = distinct(block[block > known])
-        known = int(block[-1])
+        known, places = int(block[-1]), []
         for position in ((new - stamps.least) * (rate / _NANOSECONDS)).tolist():
             place = max(place, round(position - phase))
             phase += _FOLLOWS * (position - phase - place)
-            yield place
+            places.append(place)
+        yield np.array(places, np.int64)
 
 
 @dataclass(frozen=True)

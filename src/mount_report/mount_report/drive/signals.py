@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
+from mount_bags.messages.compact_times import Times, each_once, is_in
 from mount_bags.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
@@ -83,12 +84,12 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
     if excitation_start is not None:
         zero = excitation_stamp(recording, excitation_start)
     truth = recording[SIM_TRUTH.name]
-    order = np.argsort(truth.stamps)
+    stamps, order = _sorted(truth.stamps)
     return DriveSignals(
         recording=recording.path,
         zero=zero,
         seen=_seen(recording, zero),
-        truth=Truth((truth.stamps[order] - zero) * 1e-9, *(truth[name][order] for name in scalars)),
+        truth=Truth((stamps - zero) * 1e-9, *(truth[name][order] for name in scalars)),
         sample_time=1.0 / recorded_sample_rate(recording),
     )
 
@@ -100,18 +101,28 @@ def excitation_stamp(recording: Recording, start: float) -> int:
 
 def _seen(recording: Recording, zero: int) -> Seen:
     displacement, trace = recording[DISPLACEMENT.name], recording[CONTROL_TRACE.name]
-    order = np.argsort(displacement.stamps)
-    stamps = displacement.stamps[order]
-    _, places, of_trace = np.intersect1d(stamps, trace.stamps, return_indices=True)
+    stamps, order = _sorted(displacement.stamps)
+    known, of_known = each_once(trace.stamps)
+    # of samples that came twice the first
+    places = np.flatnonzero(is_in(stamps, known) & (np.diff(stamps, prepend=stamps[:1] - 1) > 0))
+    of_trace = np.searchsorted(known, stamps[places])
     traced = {name: np.full(len(stamps), np.nan) for name in (*_TRACED, _OF_SOME)}
     for name, values in traced.items():
         if name in trace.columns or name != _OF_SOME:
-            values[places] = trace[name][of_trace]
+            values[places] = trace[name][of_known][of_trace]
     return Seen(
         time=(stamps - zero) / _SECOND,
         displacement=displacement['mount'][order],
         damping_active=traced['damping_active'] > 0.0,
-        current=np.nan_to_num(traced['current']),
-        desired_force=np.nan_to_num(traced['desired_force']),
+        current=np.nan_to_num(traced['current'], copy=False),
+        desired_force=np.nan_to_num(traced['desired_force'], copy=False),
         band_displacement=traced['band_displacement'],
     )
+
+
+def _sorted(stamps: Times) -> tuple[Times, slice | NDArray[np.intp]]:
+    """Return stamps (ns) sorted, and their places; no copies where they rise."""
+    if bool((stamps[1:] > stamps[:-1]).all()):
+        return stamps, slice(None)
+    order = np.argsort(stamps)
+    return stamps[order], order

@@ -20,10 +20,12 @@ class Patience:
     """Attempts without a byte of progress, and the pauses between: doubled each time, shortened by chance.
 
     All numbers are chosen: the nine pauses of ten attempts take 23.75 s to 47.5 s, so that a store may be
-    away for 20 s. The chance keeps many workers from asking all at once; `seed` makes it the same each time.
+    away for 20 s. A store that takes requests and does not answer uses up the time instead. The chance keeps
+    many workers from asking all at once; `seed` makes it the same each time.
     """
 
     attempts: int = 10
+    standstill: float = 100.0  # s without a byte, behind which there is no other attempt
     first: float = 0.5  # s
     longest: float = 8.0  # s
     seed: int | None = None
@@ -48,12 +50,13 @@ class Attempts:
     def progress(self) -> None:
         """Begin to count anew: something came."""
         self._failed = 0
+        self._moved = time.monotonic()
         self._pauses = self._patience.pauses()
 
     def failed(self, error: Exception) -> None:
         """Wait before the next attempt; raises `SourceError` where there is none.
 
-        `StoreAwayError` where the attempts are used up.
+        `StoreAwayError` where the attempts or their time are used up.
         """
         if isinstance(error, (SourceError, MissingLibraryError)):
             raise error
@@ -61,7 +64,7 @@ class Attempts:
         if is_lasting(error):
             raise SourceError(self._sentence(error)) from error
         pause = next(self._pauses, None)
-        if pause is None:
+        if pause is None or time.monotonic() - self._moved > self._patience.standstill:
             raise StoreAwayError(self._sentence(error)) from error
         self._pause(pause)
         forget_connections(self._uri)

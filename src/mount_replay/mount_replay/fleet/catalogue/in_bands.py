@@ -5,13 +5,10 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_bags.messages.compact_times import CompactTimes
+from mount_replay.fleet.catalogue.band_pass import BandPass, FloatArray
 
-FloatArray = NDArray[np.float64]
-
-_ORDER = 4  # chosen: of the Butterworth filter at each side of a band
 _PIECE = 1 << 18  # samples, chosen
 
 
@@ -46,18 +43,13 @@ def in_bands(
 
 
 class _Pass:
-    """A band-pass, and what came through it."""
+    """What came through the filter of a band."""
 
     def __init__(self, band: tuple[float, float], rate: float):
-        from scipy import signal
-
-        self._sections = signal.butter(_ORDER, band, 'bandpass', fs=rate, output='sos')
-        self._state, self._peak, self._square = np.zeros((len(self._sections), 2)), 0.0, 0.0
+        self._filter, self._peak, self._square = BandPass(band, rate), 0.0, 0.0
 
     def take(self, values: FloatArray) -> None:
-        from scipy import signal
-
-        passed, self._state = signal.sosfilt(self._sections, values, zi=self._state)
+        passed = self._filter.passed(values)
         self._peak = max(self._peak, float(np.abs(passed).max()))
         self._square += float(np.sum(passed**2))
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mount_bags.bag.column_parts import ColumnPart
+from mount_bags.messages.columns import FillingColumn
 from mount_bags.messages.compact_times import BLOCK, CompactTimes, compact
 from mount_bags.messages.stamps import FARTHEST, misdated
 from mount_replay.fleet.catalogue.columns import BANDS, band_name
@@ -22,15 +23,11 @@ class Motion:
     def __init__(self, expected: int = 0):
         """Make room for the samples that are expected; more may come."""
         self._stamps = CompactTimes()
-        self._values = np.empty(expected)
-        self._count = 0
+        self._values = FillingColumn(expected, np.float64)
 
     def add(self, part: ColumnPart) -> None:
         """Take a part of the topic."""
-        begin, self._count = self._count, self._count + len(part)
-        if self._count > len(self._values):
-            self._values = np.concatenate([self._values[:begin], np.empty(self._count)])
-        self._values[begin : self._count] = part.column(DISPLACEMENT.names[0])
+        self._values.add(part.column(DISPLACEMENT.names[0]))
         self._stamps.add(part.stamps)
 
     def figures(self, rate: float) -> dict[str, Any]:
@@ -42,7 +39,7 @@ class Motion:
 
         Those that are misdated are left out: between them and the others there is nothing to look at.
         """
-        stamps, values = self._stamps.finished(), self._values[: self._count]
+        stamps, values = self._stamps.finished(), self._values.filled
         if stamps.longest_step > FARTHEST:
             told = stamps.whole()
             sound = ~misdated(told)
