@@ -182,25 +182,31 @@ def _single(law, tables, state, window, trace, displacement, bridged_samples):
 
     `law`, `state` and `trace` are the bytes of their records.
     """
-    records = law.view(LAW)[0], state.view(STATE)[0], trace.view(TRACE)[0]
-    return _step(records, tables, state.view(np.int64), window, trace, 0, displacement, bridged_samples)
+    records, bits = (law.view(LAW)[0], state.view(STATE)[0], trace.view(TRACE)[0]), state.view(np.int64)
+    sound = _all_finite(bits)
+    return _step(records, tables, bits, sound, window, trace, 0, displacement, bridged_samples)
 
 
 def _run(law, tables, state, window, traces, displacements):
     """Fill `traces` with one step for each displacement; arguments as for `_single`."""
     law_record, state_record, trace_records = law.view(LAW)[0], state.view(STATE)[0], traces.view(TRACE)
     bits = state.view(np.int64)
+    sound = _all_finite(bits)
     for index in range(len(displacements)):
         records = law_record, state_record, trace_records[index]
-        _step(records, tables, bits, window, traces, index, displacements[index], 0)
+        _step(records, tables, bits, sound, window, traces, index, displacements[index], 0)
+        sound = sound or abs(displacements[index]) <= FARTHEST_DISPLACEMENT  # a step leaves no other memory
 
 
-def _step(records, tables, bits, window, traces, index, displacement, bridged_samples):
-    """Take one sample; `bits` are those of the state, the trace stands at `index` in the bytes `traces`."""
+def _step(records, tables, bits, sound, window, traces, index, displacement, bridged_samples):
+    """Take one sample; `bits` are those of the state, the trace stands at `index` in the bytes `traces`.
+
+    `sound`: whether all numbers of the state are finite.
+    """
     law, state, trace = records
     if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
         return _refuse(trace, traces, index, displacement)
-    if not _all_finite(bits):
+    if not sound:
         return _clear(records, window, traces, index, displacement)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):

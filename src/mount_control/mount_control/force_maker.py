@@ -14,7 +14,7 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.simplified import normal_force_for, simplified_step
+from mount_models.friction.simplified import normal_force_for, simplified_step_with, speed_terms
 
 FADE_TIME = 0.050
 """s, chosen: in it the current goes over to a new law: first it stands for a sample, and its distance from
@@ -79,16 +79,17 @@ def make(law, currents, state, force, velocity, active):
     counts as 0 N, for friction cannot make it.
     """
     normal_force, coefficient, current = 0.0, np.nan, 0.0
+    of_speed = speed_terms(law.friction, velocity)
     state.on = 1 if active != 0.0 else 0
     if state.on == 1:
         wanted = 0.0 if force * velocity < 0.0 else force
-        normal_force, coefficient = _normal_force(law, currents, state, wanted, velocity)
+        normal_force, coefficient = _normal_force(of_speed, law, currents, state, wanted, velocity)
         current = _faded(law, state, force_to_current.current_for(currents, law.limits, normal_force))
     else:
         state.fading = 0
     state.current = current
-    _, state.deflection, _ = simplified_step(
-        law.contact, law.friction, state.deflection, velocity, normal_force, law.sample_time
+    _, state.deflection, _ = simplified_step_with(
+        of_speed, law.contact, law.friction, state.deflection, velocity, normal_force, law.sample_time
     )
     state.normal_force = normal_force
     return normal_force, coefficient, current
@@ -107,10 +108,10 @@ def _faded(law, state, wanted):
 
 
 @compiled
-def _normal_force(law, currents, state, wanted, velocity):
+def _normal_force(of_speed, law, currents, state, wanted, velocity):
     """Return (normal force N, friction coefficient) that make the wanted force, within the table."""
     direction = -1.0 if velocity < 0.0 else 1.0
     force, coefficient = normal_force_for(
-        law.friction, wanted, velocity, direction * state.deflection, state.normal_force
+        of_speed, law.friction, wanted, velocity, direction * state.deflection, state.normal_force
     )
     return min(force, force_to_current.highest_force(currents)), coefficient

@@ -13,6 +13,7 @@ from mount_models.friction.simplified import (
     normal_force_for,
     simplified_response,
     simplified_step,
+    speed_terms,
 )
 
 COEFS = FrictionCoefficients()
@@ -79,6 +80,11 @@ def test_force_fades_to_zero_at_rest_and_is_whole_at_sliding_speed():
     )
 
 
+def needed(force, velocity, deflection_u, start):
+    """Return the normal force (N) for a force (N), and its coefficient."""
+    return normal_force_for(speed_terms(COEFS, velocity), COEFS, force, velocity, deflection_u, start)
+
+
 @given(
     velocity=st.floats(0.004, 0.5),
     sign=st.sampled_from([-1.0, 1.0]),
@@ -88,21 +94,21 @@ def test_force_fades_to_zero_at_rest_and_is_whole_at_sliding_speed():
 )
 @settings(deadline=None, derandomize=True, max_examples=200)
 def test_normal_force_gives_the_desired_force(velocity, sign, force, deflection_u, start):
-    normal_force, coefficient = normal_force_for(COEFS, force, sign * velocity, deflection_u, start)
+    normal_force, coefficient = needed(force, sign * velocity, deflection_u, start)
     assert coefficient * normal_force == pytest.approx(force, rel=1e-12)
     mu = faded_coefficient(COEFS, sign * velocity, deflection_u, normal_force)
     assert mu * normal_force == pytest.approx(force, rel=1e-3)
 
 
 def test_normal_force_for_a_signed_force_is_that_for_its_magnitude():
-    assert normal_force_for(COEFS, -80.0, -0.02, 0.0, 50.0) == normal_force_for(COEFS, 80.0, -0.02, 0.0, 50.0)
+    assert needed(-80.0, -0.02, 0.0, 50.0) == needed(80.0, -0.02, 0.0, 50.0)
 
 
 def test_coefficient_counts_at_least_its_floor_where_it_fades():
-    normal_force, coefficient = normal_force_for(COEFS, 3.0, 0.0, 0.0, 0.0)
+    normal_force, coefficient = needed(3.0, 0.0, 0.0, 0.0)
     assert coefficient == LOWEST_COEFFICIENT
     assert normal_force == pytest.approx(60.0)
 
 
 def test_no_desired_force_needs_no_normal_force():
-    assert normal_force_for(COEFS, 0.0, 0.03, 0.0, 80.0)[0] == 0.0
+    assert needed(0.0, 0.03, 0.0, 80.0)[0] == 0.0

@@ -220,8 +220,14 @@ def _log_root(constant, log_gain, shift):
 
 
 @compiled
+def load_within_limits(coefs, normal_force):
+    """Return the normal force in N with which mu is that with `normal_force`: beyond it changes no more."""
+    return min(max(normal_force, coefs.lowest_normal_force), coefs.highest_normal_force)
+
+
+@compiled
 def _offset_parts(coefs, velocity, normal_force):
-    load = min(max(normal_force, coefs.lowest_normal_force), coefs.highest_normal_force)
+    load = load_within_limits(coefs, normal_force)
     if velocity < 0.0:
         factor = coefs.alpha_n1 + coefs.alpha_n2 * load
         return factor * coefs.a_n1, factor * coefs.a_n2, coefs.a_n3
@@ -231,6 +237,6 @@ def _offset_parts(coefs, velocity, normal_force):
 
 @compiled
 def _slope_parts_mm(coefs, normal_force):
-    load = min(max(normal_force, coefs.lowest_normal_force), coefs.highest_normal_force)
+    load = load_within_limits(coefs, normal_force)
     factor = coefs.beta_1 + coefs.beta_2 * load
     return coefs.b_offset + coefs.b_1 * factor, coefs.b_2 * factor

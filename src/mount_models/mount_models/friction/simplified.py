@@ -7,6 +7,7 @@ from mount_models.arithmetic.elementary import expm1
 from mount_models.friction.coefficient import (
     dynamic_coefficient,
     dynamic_coefficient_with,
+    load_within_limits,
     offset_coefficient_with,
     slope_coefficient,
     speed_logarithm,
@@ -32,9 +33,16 @@ def simplified_step(contact, coefs, deflection, velocity, normal_force, dt):
     `deflection` xi in m, `velocity` in m/s, forces in N; `coefficient` is mu after fading, so that
     |force| = coefficient x normal force.
     """
+    of_speed = speed_terms(coefs, velocity)
+    return simplified_step_with(of_speed, contact, coefs, deflection, velocity, normal_force, dt)
+
+
+@compiled
+def simplified_step_with(of_speed, contact, coefs, deflection, velocity, normal_force, dt):
+    """Return `simplified_step` with the `speed_terms` of `velocity`."""
+    fading, logarithm = of_speed
     load = max(normal_force, 0.0)
     direction = -1.0 if velocity < 0.0 else 1.0
-    fading, logarithm = fade_weight(velocity), speed_logarithm(coefs, velocity)
     weight = fading * coefs.scale
     drive = direction * weight * load * offset_coefficient_with(logarithm, coefs, velocity, load)
     stiffness = contact.tangential_stiffness - weight * load * slope_coefficient(coefs, velocity, load)
@@ -64,27 +72,38 @@ def faded_coefficient(coefs, velocity, deflection_u, normal_force):
 
 
 @compiled
+def speed_terms(coefs, velocity):
+    """Return what depends on the size of `velocity` (m/s) alone: the weight that fades mu, the logarithm."""
+    return fade_weight(velocity), speed_logarithm(coefs, velocity)
+
+
+@compiled
 def fade_weight(velocity):
     """Return 1 - exp(-(v/v_w)^2) for `velocity` in m/s."""
     return -expm1(-((velocity / FADE_VELOCITY) ** 2))
 
 
 @compiled
-def normal_force_for(coefs, desired_force, velocity, deflection_u, start):
+def normal_force_for(of_speed, coefs, desired_force, velocity, deflection_u, start):
     """Return (normal force, coefficient) that give the magnitude of `desired_force` (N) at `velocity`.
 
     The inverse of `faded_coefficient`: mu depends on F_N, so F_N = F / mu(F_N) is solved by fixed-point
-    steps from `start` (the last value, N). mu counts at least `LOWEST_COEFFICIENT`. u in m.
+    steps from `start` (the last value, N). mu counts at least `LOWEST_COEFFICIENT`. u in m; `of_speed` are
+    the `speed_terms` of the velocity.
     """
-    fading, logarithm = fade_weight(velocity), speed_logarithm(coefs, velocity)
+    fading, logarithm = of_speed
     wanted = abs(desired_force)
-    normal_force = start
-    for _ in range(_DAMPED_STEPS):
-        mu = fading * dynamic_coefficient_with(logarithm, coefs, velocity, deflection_u, normal_force)
-        normal_force += _DAMPING * (wanted / max(mu, LOWEST_COEFFICIENT) - normal_force)
-    mu = fading * dynamic_coefficient_with(logarithm, coefs, velocity, deflection_u, normal_force)
-    coefficient = max(mu, LOWEST_COEFFICIENT)
-    return wanted / coefficient, coefficient
+    normal_force, known, coefficient, fitting = start, np.nan, 0.0, 0.0
+    for step in range(_DAMPED_STEPS + 1):
+        load = load_within_limits(coefs, normal_force)
+        if load != known:  # beyond the limits mu is that of the step before
+            known = load
+            mu = fading * dynamic_coefficient_with(logarithm, coefs, velocity, deflection_u, load)
+            coefficient = max(mu, LOWEST_COEFFICIENT)
+            fitting = wanted / coefficient
+        if step < _DAMPED_STEPS:
+            normal_force += _DAMPING * (fitting - normal_force)
+    return fitting, coefficient
 
 
 @compiled
