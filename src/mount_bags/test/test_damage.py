@@ -17,7 +17,7 @@ from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
 from mount_bags.audit.report import as_json, as_table, sentences
 from mount_bags.edit.recover import RecoveryError, recover
-from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
 TIMES = 200
 LATCHED = b'\x00\x01\x00\x00\x02\x00\x00\x00a\x00'
@@ -28,16 +28,16 @@ PERIOD = 1_000_000
 
 @pytest.fixture(scope='module')
 def intact(tmp_path_factory) -> Path:
-    """Return a recording of 60 samples in a dozen chunks, with a latched topic and a session."""
+    """Return 60 samples in chunks of two groups, with a latched topic and a session."""
     folder = tmp_path_factory.mktemp('intact') / 'bag'
     writer = BagWriter(folder, chunk_size=2500)
     writer.add_topic('/session', 'std_msgs/msg/String')
-    for topic in (AIR_GAP, DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT):
+    for topic in (AIR_GAP, SIM_TRUTH, DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT):
         writer.add_topic(f'/{topic.name}', topic.type)
     writer.write('/session', LATCHED, START - 5)
     writer.write('/air_gap', sample(AIR_GAP, 0), START - 3)
     for index in range(60):
-        for topic in (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT):
+        for topic in (SIM_TRUTH, DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT):
             sent = START + index * PERIOD + 100_000
             writer.write(f'/{topic.name}', sample(topic, index), sent + 50_000, sent)
     writer.close()

@@ -23,7 +23,7 @@ from mount_ros.testing import wait_until
 STRING = 'std_msgs/msg/String'
 KILLS = 5
 LARGEST_LOSS = 200  # samples at 1 kHz
-NAMES = ('/stream', '/latched')
+NAMES = ('/stream', '/session')  # of no car and of one: in two chunks
 
 
 @pytest.mark.parametrize('seed', range(KILLS))
@@ -94,7 +94,7 @@ def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
     folder = tmp_path_factory.mktemp('bags') / 'bag'
     writer = BagWriter(folder, split=SplitRule(duration=duration), chunk_size=chunk_size)
     for name in NAMES:
-        writer.add_topic(name, STRING, latched=name == '/latched')
+        writer.add_topic(name, STRING, latched=name == '/session')
     written, safe, safe_sizes = [], 0, {}
     for step in steps:
         if step != 'flush':
