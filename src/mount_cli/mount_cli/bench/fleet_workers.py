@@ -15,7 +15,7 @@ from mount_replay.fleet.what_if.one import Replayed, replay_one
 _REPEATED = 160  # recordings in a run, chosen: several seconds, in which a start tells little
 _CORES = 2  # chosen: every machine that works on a fleet has them
 _UNIT = 'times real time'
-_PATIENCE = 120.0  # s, chosen: for a process, until it has done its part
+_PATIENCE = 600.0  # s, chosen: for a process, until it has done its part
 
 Changes = Mapping[str, Mapping[str, Any]]
 
