@@ -52,6 +52,7 @@ ALLOWED = {
     ('mount_bags.container.filled_chunk', 'np.cumsum'): 'whole numbers',
     ('mount_bags.container.stored', 'np.cumsum'): 'whole numbers',
     ('mount_bags.container.unpacker', 'np.cumsum'): 'whole numbers',
+    ('mount_bags.container.chunk_index', 'np.cumsum'): 'whole numbers',
     ('mount_bags.signals.even_grid', 'np.mean'): 'shares of whole numbers',
     ('mount_bags.messages.compact_times', 'np.cumsum'): 'whole numbers',
     ('mount_bags.messages.stamps', 'np.cumsum'): 'whole numbers',

@@ -8,7 +8,7 @@ import time
 import pytest
 from typer.testing import CliRunner
 
-from mount_cli.bench import bench, fleet
+from mount_cli.bench import bench, fleet, fleet_workers
 from mount_cli.bench.chain_runs import Place, relay_in_turn
 from mount_cli.bench.comparison import Comparison
 from mount_cli.bench.processes import children, memory, processor_time
@@ -45,11 +45,17 @@ def test_an_unknown_group_is_refused_with_the_known_ones():
 
 def test_the_stages_of_a_replayed_second_stand_beside_all_of_it(monkeypatch):
     monkeypatch.setattr(fleet, '_RECORDINGS', 1)
-    figures = fleet.fleet_figures(seconds=4.0, rounds=1)
+    monkeypatch.setattr(fleet_workers, '_REPEATED', 6)
+    figures = fleet.fleet_figures(lambda _: None, seconds=4.0, rounds=1)
     whole = figures.pop('fleet')
     assert (whole.other_name, whole.other) == ('real time', 1.0)
-    assert set(figures) == {'fleet_open', 'fleet_beside', 'fleet_columns', 'fleet_control'}
-    assert all(stage.other == whole.ours > 0.0 for stage in figures.values())
+    stages = [figures.pop(f'fleet_{name}') for name in ('open', 'beside', 'columns', 'control')]
+    assert all(stage.other == whole.ours > 0.0 for stage in stages)
+    workers = {
+        f'fleet_{what}{start}' for what in ('worker', 'workers', 'processes') for start in ('', '_started')
+    }
+    assert set(figures) == workers
+    assert all(figure.ours > 0.0 for name, figure in figures.items() if name.endswith('_started'))
 
 
 def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain):

@@ -57,6 +57,34 @@ def test_a_task_that_raises_is_a_result_with_its_reason():
     assert isinstance(done[1].error, KeyError)
 
 
+def test_short_tasks_are_handed_over_several_together_and_each_is_told_once(monkeypatch):
+    import distributed
+
+    class OddError(Exception):  # of no module: it cannot be sent
+        pass
+
+    def work(place):
+        if place in (60, 61):
+            raise KeyError('gap')
+        if place == 150:
+            raise OddError('odd')
+        return -place
+
+    handed, submit = [], distributed.Client.submit
+    monkeypatch.setattr(
+        distributed.Client, 'submit', lambda *told, **options: (handed.append(1), submit(*told, **options))[1]
+    )
+    done = sorted(run_tasks(work, range(200), workers=1), key=lambda one: one.place)
+    assert [one.place for one in done] == list(range(200))
+    assert {one.place: one.reason for one in done if one.reason} == {
+        60: "KeyError: 'gap'",
+        61: "KeyError: 'gap'",
+        150: 'RuntimeError: OddError: odd',
+    }
+    assert all(one.result == -one.place for one in done if not one.reason)
+    assert len(handed) < 100
+
+
 def test_a_worker_that_is_killed_costs_a_retry(tmp_path):
     first = tmp_path / 'first'
 

@@ -100,9 +100,10 @@ def _distinct(
         at = np.flatnonzero(ends - begins == width)
         for part in np.split(at, range(_AT_ONCE, len(at), _AT_ONCE)):
             rows = told(rows_at(data, begins[part], width))
-            if (rows == rows[0]).all():
-                rows = rows[:1]
-            numbers[part] = [known.setdefault(row.tobytes(), len(known)) for row in rows]
+            fresh = np.ones(len(rows), np.bool_)  # others are as the one before
+            fresh[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+            found = [known.setdefault(row.tobytes(), len(known)) for row in rows[fresh]]
+            numbers[part] = np.array(found)[np.cumsum(fresh) - 1]
     return numbers, list(known)
 
 

@@ -16,7 +16,7 @@ class Unpacker:
     """The chunks of a file that is `plain` (`McapFile`), unpacked several at a time."""
 
     def __init__(self, data: mmap.mmap, chunks: ChunkTable):
-        self._data, self._chunks = data, chunks
+        self._packed, self._chunks = memoryview(data), chunks
         self._decompressor = zstandard.ZstdDecompressor()
         self._target = np.empty(0, np.uint8)
 
@@ -33,19 +33,15 @@ class Unpacker:
                 self._target = np.empty(room, np.uint8)
             except MemoryError:
                 return self._target, ends[:0]
-        packed = [
-            (self._chunks.kinds[kind].compression, begin, end)
-            for kind, begin, end in zip(
-                rows['kind'].tolist(), rows['begin'].tolist(), rows['end'].tolist(), strict=True
-            )
-        ]
         count, begin = 0, 0
-        with memoryview(self._data) as data, self._target.data as target:
-            for (compression, first, last), end in zip(packed, ends.tolist(), strict=True):
-                with data[first:last] as source:
-                    if self._unpack(source, compression, target[begin : end + 1]) != end - begin:
-                        break
-                count, begin = count + 1, end
+        whole, compressed = self._target.data, [kind.compression for kind in self._chunks.kinds]
+        for kind, first, last, end in zip(
+            rows['kind'].tolist(), rows['begin'].tolist(), rows['end'].tolist(), ends.tolist(), strict=True
+        ):
+            target = whole[begin : end + 1]
+            if self._unpack(self._packed[first:last], compressed[kind], target) != end - begin:
+                break
+            count, begin = count + 1, end
         return self._target, ends[:count]
 
     def _unpack(self, source: memoryview, compression: str, target: memoryview) -> int:

@@ -69,7 +69,7 @@ def _storage(order: BenchOrder, say: Callable[[str], None]) -> Figures:
 def _fleet(order: BenchOrder, say: Callable[[str], None]) -> Figures:
     from mount_cli.bench.fleet import fleet_figures
 
-    return fleet_figures()
+    return fleet_figures(say)
 
 
 def _graph(order: BenchOrder, say: Callable[[str], None]) -> Figures:

@@ -3,7 +3,7 @@
 import statistics
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
@@ -12,6 +12,7 @@ from mount_bags.bag.column_parts import column_parts
 from mount_bags.bag.recording import open_recording
 from mount_bags.run.place import recording_hash
 from mount_cli.bench.comparison import Comparison
+from mount_cli.bench.fleet_workers import worker_figures
 from mount_replay.fleet.catalogue.places import Place, places
 from mount_replay.fleet.example.fleet import make_one, whole_fleet
 from mount_replay.fleet.example.variations import VARIATIONS
@@ -31,9 +32,12 @@ _COLUMNS = {
 }
 
 
-def fleet_figures(seconds: float = _SECONDS, rounds: int = _ROUNDS) -> dict[str, Comparison]:
-    """Return the processor time (s) for a recorded second: of all beside real time, of the stages beside all.
+def fleet_figures(
+    say: Callable[[str], None], seconds: float = _SECONDS, rounds: int = _ROUNDS
+) -> dict[str, Comparison]:
+    """Return what a recorded second costs and where it goes, and how that grows with the workers.
 
+    It is processor time (s), of all beside real time and of the stages beside all; then `worker_figures`.
     `seconds` is the length of the excitations. A second counts where the controller was at work, as in the
     figures of `fleet replay`; what a process does once, such as to load the compiled laws, does not.
     """
@@ -43,11 +47,12 @@ def fleet_figures(seconds: float = _SECONDS, rounds: int = _ROUNDS) -> dict[str,
         found = list(places([folder]).values())
         recorded = sum(row['duration_s'] for place in found for row in replay_one(place, _CHANGE).rows)
         times = [_stages(found) for _ in range(rounds)]
+        workers = worker_figures(found, _CHANGE, say)
     whole, *stages = (statistics.median(each) / recorded for each in zip(*times, strict=True))
     figures = {'fleet': Comparison('a recorded second in fleet replay', whole, 'real time', 1.0)}
     for (name, what), stage in zip(_STAGES.items(), stages, strict=True):
         figures[f'fleet_{name}'] = Comparison(f'of it {what}', stage, 'all of it', whole)
-    return figures
+    return figures | workers
 
 
 _STAGES = {

@@ -9,7 +9,7 @@ from mount_cli.completion.values import named
 from mount_cli.terminal import terminal
 
 EPILOG = """Groups: `calls` (what one call costs), `storage` (recordings), `fleet` (a recorded
-second in `fleet replay`, stage by stage), `lockstep`, `graph` (latency,
+second in `fleet replay`, stage by stage, and how workers add up), `lockstep`, `graph` (latency,
 processor time, start and memory of the graph in real time, beside a chain of empty nodes), `rate` (2 kHz).
 
 Exit code: 0 when everything was measured, 1 when the graph refused or ended, with the reason.
