@@ -139,11 +139,19 @@ class CompactTimes:
 
     def whole(self) -> Times:
         """Return all times at once."""
-        return np.concatenate([np.empty(0, np.int64), *self.blocks()])
+        times, end = np.empty(len(self), np.int64), 0
+        for block in self.blocks():
+            begin, end = end, end + len(block)
+            times[begin:end] = block
+        return times
 
     def ordered(self) -> 'CompactTimes':
         """Return the times sorted."""
-        return self if self.rising else compact(np.sort(self.whole()))
+        if self.rising:
+            return self
+        times = self.whole()
+        times.sort()
+        return compact(times)
 
     def has_any(self, begin: int, end: int) -> bool:
         """Return whether one of the times is from `begin` to `end`."""
