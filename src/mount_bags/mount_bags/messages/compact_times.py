@@ -164,9 +164,10 @@ class CompactTimes:
         least = int(steps.min()) if steps.size else 0
         highest = int(steps.max()) if steps.size else 0
         self.longest_step = max(self.longest_step, abs(border), abs(least), abs(highest))
-        self.rising = self.rising and least >= 0 and border >= 0
-        above = (least > 0 or not steps.size) and (border > 0 or not self._blocks)
-        self.strictly_rising = self.strictly_rising and above
+        # Compared, for the step between times that are too far apart does not fit into its bits.
+        self.rising = self.rising and border >= 0 and bool((times[1:] >= times[:-1]).all())
+        above = border > 0 or not self._blocks
+        self.strictly_rising = self.strictly_rising and above and bool((times[1:] > times[:-1]).all())
         found = _Block(
             len(times),
             int(times[0]),
