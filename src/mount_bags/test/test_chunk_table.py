@@ -202,3 +202,8 @@ def test_what_is_not_packed_as_told_is_not_unpacked():
     data = bytes(4) + packed[4:]
     table = chunk_table([Chunk(0, 0, (len(data),), 10, 0, 'zstd', 0, 0)])
     assert len(Unpacker(data, table).unpacked(np.arange(1))[1]) == 0
+
+
+def test_a_damaged_time_below_0_is_one_without_a_sign():
+    table = chunk_table([Chunk(0, SHORTEST_CHUNK, (200,), 10, 0, '', -1, -1, 0, frozenset({1}))])
+    assert table.times == (2**64 - 1, 2**64 - 1)

@@ -36,3 +36,8 @@ def test_stamps_whose_middle_age_is_more_than_a_minute_are_of_another_clock():
         assert on_one_clock(*both(ages)) == bool(abs(np.median(ages)) <= 60e9)
 
     check()
+
+
+def test_damaged_times_that_are_farther_apart_than_any_clock_goes_are_of_another_clock():
+    stamps, times = np.array([-(2**62), 0, 2**62]), np.array([2**61, 0, -(2**61)])
+    assert not on_one_clock(compact(stamps), compact(times))

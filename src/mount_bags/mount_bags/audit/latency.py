@@ -10,6 +10,7 @@ from mount_bags.messages.compact_times import CompactTimes, Times
 EDGES = (0.0, 0.25e-3, 0.5e-3, 0.75e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 5e-3, 10e-3, 20e-3)  # s, chosen
 _SAME_PACE = 0.02  # chosen: two clocks that differ by more are not the same
 _SAME_CLOCK = 60 * 1_000_000_000  # ns, chosen: a setpoint that comes later is no answer
+_ANY_CLOCK = 1 << 62  # ns, 146 years: differences beyond it do not fit into 64 bits
 _PLACES = 1 << 16  # chosen: into so many steps of equal width ages are counted at once
 
 
@@ -47,7 +48,8 @@ def on_one_clock(stamps: CompactTimes, times: CompactTimes) -> bool:
     """Return whether the stamps of setpoints are on the clock of `times`, when they were sent or came."""
     if len(stamps) < 2:
         return False
-    if abs(float(np.median(_Ages(stamps, times).around(0.5)[0]))) > _SAME_CLOCK:
+    ages = _Ages(stamps, times)
+    if ages.highest - ages.least > _ANY_CLOCK or abs(float(np.median(ages.around(0.5)[0]))) > _SAME_CLOCK:
         return False
     stamped, timed = stamps.highest - stamps.least, times.highest - times.least
     return not (stamped > 1_000_000_000 and abs(timed / stamped - 1.0) > _SAME_PACE)

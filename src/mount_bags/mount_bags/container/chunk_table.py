@@ -1,7 +1,7 @@
 """The chunks of a file as columns: a recording of 2 h has 200 000, of which objects would take 0.1 GB."""
 
 from collections.abc import Collection, Iterable, Sequence
-from typing import NamedTuple, TypeVar, overload
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ ROW = np.dtype(
 )
 """What is known of a chunk, as in `Chunk`; `kind` is the number of what it has in common with others."""
 
-T = TypeVar('T')
+_UNSIGNED = (1 << 64) - 1
 
 
 class Kind(NamedTuple):
@@ -116,8 +116,8 @@ def chunk_table(chunks: Iterable[Chunk]) -> ChunkTable:
             chunk.size,
             chunk.crc,
             known.setdefault(Kind(chunk.compression, chunk.channels), len(known)),
-            chunk.start_time,
-            chunk.end_time,
+            chunk.start_time & _UNSIGNED,  # damaged ones may be below 0, read with a sign
+            chunk.end_time & _UNSIGNED,
             chunk.index_length,
         )
         for chunk in chunks
