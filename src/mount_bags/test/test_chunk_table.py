@@ -207,3 +207,10 @@ def test_what_is_not_packed_as_told_is_not_unpacked():
 def test_a_damaged_time_below_0_is_one_without_a_sign():
     table = chunk_table([Chunk(0, SHORTEST_CHUNK, (200,), 10, 0, '', -1, -1, 0, frozenset({1}))])
     assert table.times == (2**64 - 1, 2**64 - 1)
+
+
+def test_the_gaps_of_a_table_are_before_each_chunk_and_behind_the_last():
+    chunks = [Chunk(place, place + 50, (place + 60,), 1, 0, '', 1, 1, 15, None) for place in (20, 95, 200)]
+    for count, gaps in ((3, [(8, 20), (95, 95), (170, 200), (275, 400)]), (0, [(8, 400)])):
+        begins, ends = chunk_table(chunks[:count]).gaps(8, 400)
+        assert list(zip(begins.tolist(), ends.tolist(), strict=True)) == gaps

@@ -306,15 +306,20 @@ def test_while_a_writer_may_be_one_that_was_killed_every_answer_is_0_ampere(acti
     assert far.setpoint() == Setpoint(1.0, 2, True)
 
 
-def test_two_senders_behind_one_publisher_are_told_by_their_answers_and_end_the_graph_without_a_name(
-    active, controller, far
-):
-    driver = active()
+def _answer_twice(far, controller):
+    """Send three samples, of which each is answered by two setpoints."""
     for index in range(3):
         far.send(sample(index))
         controller.wait_for(index + 1)
         controller.setpoint(index * MS, 1.0)
         controller.setpoint(index * MS, 3.0)
+
+
+def test_two_senders_behind_one_publisher_are_told_by_their_answers_and_end_the_graph_without_a_name(
+    active, controller, far
+):
+    driver = active()
+    _answer_twice(far, controller)
     assert far.setpoint_where(lambda setpoint: not setpoint.enable).current == 0.0
     wait_until(lambda: driver.judge().level == Level.ERROR, 'the verdict')
     assert driver.judge().sentence.startswith('coil switched off: 3 samples within 1 s were answered twice')
@@ -323,11 +328,7 @@ def test_two_senders_behind_one_publisher_are_told_by_their_answers_and_end_the_
 
 def test_a_sender_told_by_its_answers_is_told_by_its_name_before_the_graph_ends(active, controller, far):
     driver = active()
-    for index in range(3):
-        far.send(sample(index))
-        controller.wait_for(index + 1)
-        controller.setpoint(index * MS, 1.0)
-        controller.setpoint(index * MS, 3.0)
+    _answer_twice(far, controller)
     wait_until(lambda: driver._exchange.link.nameless, 'the fault')
     verdict = driver.judge()
     assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, False)

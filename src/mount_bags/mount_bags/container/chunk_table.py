@@ -65,6 +65,17 @@ class ChunkTable(Sequence[Chunk]):
             kind.channels is None or not kind.channels.isdisjoint(channels) for kind in self.kinds
         )
 
+    def gaps(self, begin: int, end: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return where the stretches from `begin` to `end` without chunks and their indexes begin and end.
+
+        There is one before each chunk and one behind the last; bytes of the file.
+        """
+        rows = self.rows
+        return (
+            np.concatenate([[begin], rows['end'] + rows['index_length']]),
+            np.concatenate([rows['position'], [end]]),
+        )
+
     @property
     def plain(self) -> bool:
         """Whether all of them tell their channels, and are not packed or packed as this project does."""

@@ -260,9 +260,7 @@ class McapFile:
                 self._warn(f'{index.name}, metadata or attachment at byte {index.offset}, is damaged')
 
     def _walk_between_chunks(self) -> None:
-        rows = self.chunks.rows
-        begins = np.concatenate([[len(MCAP0_MAGIC)], rows['end'] + rows['index_length']])
-        limits = np.concatenate([rows['position'], [self._summary.begin]])
+        begins, limits = self.chunks.gaps(len(MCAP0_MAGIC), self._summary.begin)
         for place in np.flatnonzero(begins < limits):
             self._walk(int(begins[place]), int(limits[place]))
         # A file with chunks has its messages there; a record that says otherwise needs a proof.

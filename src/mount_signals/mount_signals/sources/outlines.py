@@ -129,11 +129,9 @@ def _needed(summary: Summary) -> Stretches:
     sessions = {
         number for number, channel in summary.channels.items() if channel.topic.split('/')[-1] == _SESSION
     }
-    begins = summary.chunks.rows['position']
-    ends = summary.chunks.rows['end'] + summary.chunks.rows['index_length']
+    begins, ends = summary.chunks.gaps(0, summary.begin)
     held = summary.chunks.holding(sessions)
-    needed = [(0, begins[0]), *zip(ends[:-1], begins[1:], strict=True), (ends[-1], summary.begin)]
-    needed += zip(begins[held], ends[held], strict=True)
+    needed = [*zip(begins, ends, strict=True), *zip(ends[held], begins[held + 1], strict=True)]
     return [(int(begin), int(end)) for begin, end in needed]
 
 
