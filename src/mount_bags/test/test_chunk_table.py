@@ -10,10 +10,10 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
 
-from mount_bags.container.chunk_index import can_be_there, indexed_chunks
-from mount_bags.container.chunk_table import chunk_table, joined
-from mount_bags.container.chunks import SHORTEST_CHUNK, Chunk
-from mount_bags.container.unpacker import Unpacker
+from mount_bags.container.mcap_reading.chunk_index import can_be_there, indexed_chunks
+from mount_bags.container.mcap_reading.chunk_table import chunk_table, joined
+from mount_bags.container.mcap_reading.chunks import SHORTEST_CHUNK, Chunk
+from mount_bags.container.mcap_reading.unpacker import Unpacker
 
 HEAD = 9  # bytes of a record: opcode and length
 SIZES = 56  # byte of a record at which the length of its compression's name stands, without channels

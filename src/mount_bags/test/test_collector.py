@@ -1,5 +1,6 @@
 """The collector: everything, in the order of arrival, with its times."""
 
+import math
 import threading
 import time
 from itertools import pairwise
@@ -166,7 +167,7 @@ def test_a_receiver_that_raises_costs_its_own_message_only(collector, sender, ca
     assert 'a message was not taken: ValueError: indigestible' in capfd.readouterr().err
 
 
-def test_in_a_shared_thread_everything_is_taken_up_to_the_end(context, owner, sender):
+def test_a_shared_thread_takes_everything_until_it_is_left(context, owner, sender):
     received, threads = [], set()
 
     def receive(raw, *_):
@@ -184,6 +185,25 @@ def test_in_a_shared_thread_everything_is_taken_up_to_the_end(context, owner, se
     assert received == list(range(200))
     assert threads == {'data'}
     assert not [thread for thread in threading.enumerate() if thread.name == 'data']
+
+
+def test_leaving_a_shared_thread_takes_what_is_there(context, owner, sender, monkeypatch):
+    monkeypatch.setattr('mount_bags.recorder.collector._SHARED_PERIOD', math.inf)  # nothing is due before
+    received, witnessed = [], []
+    shared, witness = Collector(owner, thread=DataThread(context)), Collector(owner)
+    shared.collect(DISPLACEMENT, lambda raw, *_: received.append(stamp_of(raw)))
+    witness.collect(DISPLACEMENT, lambda raw, *_: witnessed.append(stamp_of(raw)))
+    end = sender.open(DISPLACEMENT)
+    wait_until(lambda: end.get_subscription_count() == 2 and not shared.unmatched(), 'connection')
+    shared.start()
+    witness.start()
+    for stamp in range(20):
+        sender.send(DISPLACEMENT, stamp)
+    wait_until(lambda: len(witnessed) == 20, 'arrival')
+    assert received == []
+    shared.stop()
+    witness.stop()
+    assert received == list(range(20))
 
 
 def test_the_end_of_the_thread_is_told(owner):

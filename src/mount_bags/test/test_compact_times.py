@@ -8,15 +8,16 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from seen_memory import SEEN
 
-from mount_bags.messages import compact_times
+from mount_bags.messages import packed_column
 from mount_bags.messages.compact_times import CompactTimes, compact, together
+from mount_bags.messages.packed_column import PackedColumn
 
 ANY_TIME = st.integers(-(2**63), 2**63 - 1) | st.integers(0, 300)
 
 
 @pytest.fixture(autouse=True)
 def _short_blocks(monkeypatch):
-    monkeypatch.setattr(compact_times, 'BLOCK', 8)
+    monkeypatch.setattr(packed_column, 'BLOCK', 8)
 
 
 def test_any_times_come_back_as_they_were():
@@ -35,6 +36,21 @@ def test_any_times_come_back_as_they_were():
         np.testing.assert_array_equal(times.ordered().whole(), np.sort(whole))
         assert times.rising == bool((whole[1:] >= whole[:-1]).all())
         assert times.strictly_rising == bool((whole[1:] > whole[:-1]).all())
+
+    check()
+
+
+def test_any_numbers_come_back_to_the_bit():
+    @settings(deadline=None, derandomize=True)
+    @given(st.lists(st.lists(st.floats() | st.integers(0, 3).map(float), max_size=20), max_size=5))
+    def check(pieces):
+        column = PackedColumn()
+        for piece in pieces:
+            column.add(np.array(piece))
+        whole = np.array([number for piece in pieces for number in piece])
+        assert len(column) == len(whole)
+        assert column.finished().whole().tobytes() == whole.tobytes()
+        assert all(len(block) <= 8 for block in column.blocks())
 
     check()
 
@@ -58,7 +74,7 @@ def test_columns_are_looked_at_together_stretch_by_stretch():
 
 def test_times_of_a_clock_take_two_bytes_each(monkeypatch):
     monkeypatch.undo()
-    monkeypatch.setattr(compact_times, 'mmap', SEEN)
+    monkeypatch.setattr(packed_column, 'mmap', SEEN)
     count = 400_000
     stamps = np.arange(count) * 1_000_000 + np.random.default_rng(3).integers(-50, 50, count)
     tracemalloc.start()

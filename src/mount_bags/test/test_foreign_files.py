@@ -1,7 +1,8 @@
 """A file of a recording with any bytes changed: no value that was not written passes for sound.
 
 What a checksum covers is read as it was written or not at all. A value under none may be wrong; where the
-file as a whole has a checksum, the recording is then not whole, which is an error of the audit.
+file as a whole has a checksum, the recording is then not whole, which is an error of the audit. Where it has
+none either, which a damaged one of 0 means too, a warning says that a damaged number would go unseen.
 """
 
 import contextlib
@@ -11,8 +12,9 @@ from collections import Counter
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.writer import CompressionType, Writer
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from recorded_drive import write_drive
 from test_other_storages import written
 
@@ -21,6 +23,9 @@ from mount_bags import ReadingError
 from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import losses
 from mount_bags.bag.metadata import MetadataError, read_metadata
+from mount_bags.container.mcap_reading.chunks import CRC_PLACE, RECORD
+from mount_bags.container.mcap_reading.mcap_file import McapFile
+from mount_bags.container.mcap_reading.summary import Proof
 from mount_bags.messages.series import SeriesError
 from mount_ros.testing import mutated
 
@@ -79,10 +84,13 @@ def contents(recording):
 
 
 def judged(path):
-    """Return what is read of a recording and whether the audit finds it sound."""
+    """Return what is read of a recording, whether the audit finds it sound, and whether no checksum tells."""
     recording = mount_bags.open(path)
     found = contents(recording)
-    return found, losses(recording, audit(recording)).sound
+    unproven = any(
+        file.data_proof() is Proof.ABSENT for file in recording.files if isinstance(file, McapFile)
+    ) and any('a damaged number in them would go unseen' in warning for warning in recording.warnings)
+    return found, losses(recording, audit(recording)).sound, unproven
 
 
 @ONE_FILE
@@ -92,8 +100,70 @@ def test_what_is_read_of_a_mutated_file_is_what_was_written_or_not_sound(intact,
     file, content, original = intact
     file.write_bytes(mutated(content, seed))
     with contextlib.suppress(ReadingError):
-        found, sound = judged(file if alone else file.parent)
-        assert found <= original or not sound
+        found, sound, unproven = judged(file if alone else file.parent)
+        assert found <= original or not sound or unproven
+
+
+def records_of(content):
+    """Return (opcode, position) of the records of a file, those in chunks left out."""
+    position, found = len(MCAP0_MAGIC), []
+    while position < len(content) - len(MCAP0_MAGIC):
+        opcode, length = RECORD.unpack_from(content, position)
+        found.append((opcode, position))
+        position += RECORD.size + length
+    return found
+
+
+def foreign_file(folder, writer):
+    """Return the file of a recording by one of `WRITERS`, its bytes, content and records."""
+    file = folder / 'another.mcap'
+    rewritten(write_drive(folder / 'bag', 5, chunk_size=700) / 'bag_0.mcap', file, WRITERS[writer])
+    recording = mount_bags.open(file)
+    assert recording.whole
+    content = file.read_bytes()
+    return file, bytearray(content), contents(recording), records_of(content)
+
+
+def test_a_chunk_without_a_checksum_among_others_puts_the_recording_in_doubt(tmp_path):
+    file, content, _, records = foreign_file(tmp_path, 'chunks with checksums')
+    chunks = [position for opcode, position in records if opcode == Opcode.CHUNK]
+    assert len(chunks) > 1
+    content[chunks[0] + CRC_PLACE : chunks[0] + CRC_PLACE + 4] = bytes(4)
+    file.write_bytes(content)
+    recording = mount_bags.open(file)
+    assert not recording.whole
+    assert any('no checksum, while others do' in warning for warning in recording.warnings)
+
+
+def test_a_damaged_declaration_behind_the_messages_is_none_of_them(tmp_path):
+    file, content, original, records = foreign_file(tmp_path, 'chunks without')
+    end = dict(records)[Opcode.DATA_END]
+    position = next(place for opcode, place in records if opcode == Opcode.CHANNEL and place > end)
+    content[position] = Opcode.MESSAGE
+    file.write_bytes(content)
+    assert contents(mount_bags.open(file)) <= original
+
+
+def test_where_the_summary_is_damaged_and_nothing_vouches_for_the_messages_they_are_in_doubt(tmp_path):
+    file, content, _, records = foreign_file(tmp_path, 'no chunks')
+    places = dict(records)
+    content[places[Opcode.DATA_END] + RECORD.size : places[Opcode.DATA_END] + RECORD.size + 4] = bytes(4)
+    content[places[Opcode.STATISTICS] + RECORD.size] ^= 1
+    file.write_bytes(content)
+    recording = mount_bags.open(file)
+    assert contents(recording)
+    assert not recording.whole
+
+
+def test_an_index_that_passes_for_a_message_is_left_out_of_a_file_with_chunks(tmp_path):
+    file, content, original, records = foreign_file(tmp_path, 'chunks with checksums')
+    places = dict(records)
+    content[places[Opcode.MESSAGE_INDEX]] = Opcode.MESSAGE
+    content[places[Opcode.STATISTICS] + RECORD.size] ^= 1
+    file.write_bytes(content)
+    recording = mount_bags.open(file)
+    assert contents(recording) == original
+    assert any('outside of its chunks' in warning for warning in recording.warnings)
 
 
 @pytest.fixture(scope='module')

@@ -102,7 +102,7 @@ def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
             written.append(step)
             continue
         writer.flush()
-        writer._wait_for_closing()
+        writer._pieces.wait_for_closing()
         safe, safe_sizes = len(written), {path: path.stat().st_size for path in pieces_of(folder)}
     kill(writer)
     cut(folder, safe_sizes, share)
@@ -116,7 +116,7 @@ def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
 
 def kill(writer):
     """Leave the files of a writer as SIGKILL would."""
-    writer._wait_for_closing()
+    writer._pieces.wait_for_closing()
     writer._piece.file.release_room()
     writer._piece.file.close()
 

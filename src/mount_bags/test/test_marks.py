@@ -24,7 +24,7 @@ from mount_bags.events.automatic_marks import (
 )
 from mount_bags.events.event_marks import present_time
 from mount_bags.events.switching_changes import switching_times
-from mount_bags.messages.stamps import StampWatch
+from mount_bags.messages.stamp_watch import StampWatch
 from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
 from mount_bags.recorder.recorder import Recorder
 from mount_bags.recorder.watching import watch_topic

@@ -13,7 +13,7 @@ from small_disk import small_disk
 from mount_bags.bag.statement import read_statement
 from mount_bags.bag.writer import BagWriter, RecordingError
 from mount_bags.container.stored import RECORDER_RECORD
-from mount_bags.messages.stamps import StampWatch
+from mount_bags.messages.stamp_watch import StampWatch
 from mount_bags.recorder import recorder as recording
 from mount_bags.recorder.diagnosis import Counted, OnFull, RecorderState, judge
 from mount_bags.recorder.recorder import Recorder, RecorderFigures, Unobserved

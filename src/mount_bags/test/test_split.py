@@ -157,7 +157,7 @@ def test_file_that_cannot_be_finished_is_named_at_the_end(tmp_path, monkeypatch)
     with monkeypatch.context() as patch:
         patch.setattr('mount_bags.bag.piece.Piece.finish', refuse)
         writer.write('/text', string('y'), 10)
-        writer._wait_for_closing()
+        writer._pieces.wait_for_closing()
     with pytest.raises(RecordingError, match=r'bag_0\.mcap ends without its summary'):
         writer.close()
     assert len(mount_bags.open(tmp_path / 'bag')['text']) == 2

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_bags.messages.compact_times import compact
-from mount_bags.messages.stamps import StampWatch, misdated, missing_samples, redated, stamp_statistics
+from mount_bags.messages.stamp_watch import StampWatch
+from mount_bags.messages.stamps import misdated, missing_samples, redated, stamp_statistics
 
 RATE = 1000.0
 PERIOD = 1_000_000

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.container.chunk_table import Places
-from mount_bags.container.chunks import MESSAGE_HEAD
-from mount_bags.container.mcap_file import McapFile
+from mount_bags.bag.file_blocks import unpacked_together
+from mount_bags.container.mcap_reading.chunk_table import Places
+from mount_bags.container.mcap_reading.chunks import MESSAGE_HEAD
+from mount_bags.container.mcap_reading.mcap_file import McapFile
 from mount_bags.messages.series import Column, Series, Times
 from mount_bags.messages.taken import LOG_TIME_PLACE, WORD, Wanted, take
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 PART = 1 << 13
 """Messages of a topic in a part, chosen: where nothing asks for more or fewer."""
-_AT_ONCE = 1 << 19  # bytes of chunks that are unpacked together, chosen: they stay in the processor's cache
 _FLOAT = np.dtype('<f8')
 
 
@@ -81,10 +81,8 @@ class _FileColumns:
     def parts(self) -> Iterator[ColumnPart]:
         chunks = self._file.chunks
         numbers = {number for known in self._numbers.values() for number in known}
-        for places in self._file.passing(chunks.holding(numbers)):
-            before = np.cumsum(chunks.rows['size'][places])
-            for some in np.split(places, np.flatnonzero(np.diff(before // _AT_ONCE)) + 1):
-                yield from self._parts_of(some)
+        for places in unpacked_together(self._file, chunks.holding(numbers)):
+            yield from self._parts_of(places)
         yield from self._columns.flushed()
 
     def _parts_of(self, places: Places) -> Iterator[ColumnPart]:

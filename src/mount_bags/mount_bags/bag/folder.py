@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mount_bags.bag.metadata import METADATA_NAME, BagInformation, MetadataError, read_metadata
-from mount_bags.container.mcap_file import McapFile
+from mount_bags.container.mcap_reading.mcap_file import McapFile
 from mount_bags.container.sqlite_file import SqliteFile
 from mount_bags.container.stored import StoredFile
 from mount_bags.container.whole_files import COMPRESSED_SUFFIXES

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mount_bags.bag.file_blocks import Blocks, are_vouched, blocks_of, vouched_blocks
 from mount_bags.bag.folder import BagFolderError, find_pieces, open_piece
 from mount_bags.bag.metadata import (
     METADATA_NAME,
@@ -73,9 +74,9 @@ class Recording:
         ends = [name.removesuffix(DISPLACEMENT.name) for name in self.topics]
         return [end.strip('/') for end, name in zip(ends, self.topics, strict=True) if end != name]
 
-    def by_mount(self) -> list['Recording']:
-        """Return the recording of each mount, or this one alone where there are not several."""
-        return [self.of_mount(mount) for mount in self.mounts] if len(self.mounts) > 1 else [self]
+    def by_mount(self) -> Iterator['Recording']:
+        """Yield the recording of each mount, or this one alone where there are not several."""
+        yield from map(self.of_mount, self.mounts) if len(self.mounts) > 1 else [self]
 
     def of_mount(self, mount: str) -> 'Recording':
         """Return the same recording with the topics of one of `mounts` and those that belong to none.
@@ -151,6 +152,16 @@ class Recording:
         wanted = dict.fromkeys(self.resolve(name) for name in names)
         self._series |= self._load([name for name in wanted if not self._is_loaded(name)])
 
+    def load_alone(self, names: Iterable[str]) -> None:
+        """Read topics, for later use, without reading the files through where their own chunks prove them.
+
+        Raises `ReadingError`.
+        """
+        wanted = list(dict.fromkeys(self.resolve(name) for name in names))
+        numbers = [[each for name in wanted for each in self.numbers_in(file, name)] for file in self.files]
+        vouched = all(map(are_vouched, self.files, numbers))
+        self._series |= self._load(wanted, vouched_blocks if vouched else blocks_of)
+
     def load_columns(self, columns: Mapping[str, Iterable[str]]) -> None:
         """Read columns of topics and their stamps in one pass, for later use; raises `ReadingError`.
 
@@ -174,7 +185,7 @@ class Recording:
             self._note_damage(name, len(heads.received))
             known = self._series[name].columns if name in self._series else {}
             self._series[name] = self._made(
-                name, partial(self._payloads, name), heads, columns={**known, **found}, stamps=stamps
+                name, partial(self._whole, name), heads, columns={**known, **found}, stamps=stamps
             )
 
     def release(self) -> None:
@@ -359,9 +370,9 @@ class Recording:
         first = self.time_range[0] if self.time_range else 0
         return axis_of(self._types, arrivals, [zero for zero in steps if isinstance(zero, int)], first)
 
-    def _load(self, names: Sequence[str]) -> dict[str, Series]:
+    def _load(self, names: Sequence[str], blocks: Blocks = blocks_of) -> dict[str, Series]:
         found = {name: _Gathered() for name in names}
-        for name, block in self._blocks(names) if names else ():
+        for name, block in self._blocks(names, blocks) if names else ():
             found[name].add(block)
         for name, gathered in found.items():
             self._note_damage(name, len(gathered))
@@ -380,8 +391,8 @@ class Recording:
     def _is_loaded(self, name: str) -> bool:
         return name in self._series and self._series[name].loaded
 
-    def _payloads(self, name: str) -> Payloads:
-        return self._load([name])[name].payloads
+    def _whole(self, name: str) -> Series:
+        return self._load([name])[name]
 
     def _unread(self, name: str, columns: Iterable[str]) -> set[str]:
         """Return which of the columns need a pass through the files: none where all messages are here."""
@@ -393,7 +404,7 @@ class Recording:
     def _made(
         self,
         name: str,
-        payloads: Payloads | Callable[[], Payloads],
+        payloads: Payloads | Callable[[], Series],
         heads: Heads,
         *,
         columns: Mapping[str, Column] | None = None,
@@ -419,7 +430,9 @@ class Recording:
             self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
             self.missing[name] = expected - present
 
-    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, StoredMessages]]:
+    def _blocks(
+        self, names: Sequence[str], blocks: Blocks = blocks_of
+    ) -> Iterator[tuple[str, StoredMessages]]:
         """Yield the messages of topics, without those that a piece repeats from the one before."""
         last: dict[str, tuple[bytes, int]] = {}
         watched = frozenset().union(*repeated_topics(self.files))
@@ -427,7 +440,7 @@ class Recording:
             topics = {name: np.array(self._declared[name].numbers_in(file), np.int64) for name in names}
             topics = {name: numbers for name, numbers in topics.items() if numbers.size}
             heads = set(repeated)
-            for block in file.blocks([int(number) for numbers in topics.values() for number in numbers]):
+            for block in blocks(file, [int(number) for numbers in topics.values() for number in numbers]):
                 for name, numbers in topics.items():
                     found = block.of(numbers) if len(topics) > 1 else block
                     if not len(found):

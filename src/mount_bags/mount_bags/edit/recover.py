@@ -17,8 +17,8 @@ from mount_bags.bag.metadata import NO_TIME
 from mount_bags.bag.piece_topics import repeated_topics
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.bag.statement import read_statement
-from mount_bags.container.chunks import Chunk
-from mount_bags.container.mcap_file import McapFile
+from mount_bags.container.mcap_reading.chunks import Chunk
+from mount_bags.container.mcap_reading.mcap_file import McapFile
 from mount_bags.container.stored import RECORDER_RECORD, StoredMessages
 from mount_bags.edit.beside_messages import copy_beside_messages, lost_beside_messages
 from mount_bags.edit.inherited_statement import inherited_statement, sources_of

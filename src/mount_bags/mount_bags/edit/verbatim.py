@@ -22,7 +22,7 @@ from mount_bags.bag.piece_topics import offers_of
 from mount_bags.bag.writer import create_folder
 from mount_bags.container.record_file import RecordFile
 from mount_bags.container.stored import StoredTopic
-from mount_bags.container.writer import ChunkedMcap
+from mount_bags.container.writer import LONG_CHUNK_SIZE, ChunkedMcap
 
 _PROFILE = 'ros2'
 _LIBRARY = 'engine-mount mount_bags 0.1.0'
@@ -39,7 +39,7 @@ class VerbatimBag:
         self._topics: dict[int, TopicInformation] = {}
         create_folder(self.folder)
         self._file = RecordFile(self.folder / self._file_name)
-        self._container = ChunkedMcap(self._file)
+        self._container = ChunkedMcap(self._file, LONG_CHUNK_SIZE)
         self._container.start(_PROFILE, _LIBRARY)
 
     @property

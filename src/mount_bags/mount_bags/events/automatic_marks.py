@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from enum import Enum
 
 from mount_bags.events.switching_changes import PAUSE
-from mount_bags.messages.stamps import StampWatch
+from mount_bags.messages.stamp_watch import StampWatch
 from mount_ros.messages.event import Mark
 from mount_ros.messages.verdicts import ToldVerdict
 

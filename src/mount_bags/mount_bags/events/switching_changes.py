@@ -69,9 +69,20 @@ def switching_places(time: TimeAt, active: Signal | NDArray[np.bool_]) -> tuple[
 
     So it counts as on where the coil carries current. A pause shorter than `PAUSE` is none.
     """
-    is_active = active > 0.0
-    before = np.append(False, is_active[:-1])[: len(is_active)]
-    on, off = np.flatnonzero(is_active & ~before), np.flatnonzero(~is_active & before)
+    changes = changed_places(active > 0.0)
+    return without_pauses(time, changes[::2], changes[1::2])
+
+
+def changed_places(is_active: NDArray[np.bool_], before: bool = False) -> Places:
+    """Return where samples are active that the one before them is not, or the other way about.
+
+    `before` is the state before the first of them.
+    """
+    return np.flatnonzero(is_active != np.append(before, is_active)[: len(is_active)])
+
+
+def without_pauses(time: TimeAt, on: Places, off: Places) -> tuple[Places, Places]:
+    """Return the samples at which damping went `on` and `off` by turns, without pauses below `PAUSE`."""
     pauses = time[on[1:]] - time[off[: len(on) - 1]] >= PAUSE if len(on) else np.zeros(0, bool)
     return on[np.append(True, pauses)[: len(on)]], off[np.append(pauses, True)[: len(off)]]
 

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.column_parts import ColumnPart
-from mount_bags.events.switching_changes import Places, Signal, switching_places
+from mount_bags.events.switching_changes import (
+    Places,
+    Signal,
+    changed_places,
+    switching_places,
+    without_pauses,
+)
 from mount_bags.messages.compact_times import CompactTimes, Times
 
 
@@ -16,33 +22,40 @@ class SwitchingTrace:
     COLUMN = 'damping_active'
 
     def __init__(self) -> None:
+        self.active = 0
+        """At how many samples damping was active."""
         self._stamps = CompactTimes()
-        self._active: list[NDArray[np.bool_]] = [np.empty(0, bool)]
+        self._changes = [np.empty(0, np.intp)]  # samples at which it went on, off, on, ...
+        self._is_active = False  # at the last sample
 
     def add(self, part: ColumnPart) -> None:
         """Take a part of the trace with the column `COLUMN`."""
+        active = part.column(self.COLUMN) > 0.0
+        self.active += int(np.count_nonzero(active))
+        self._changes.append(len(self._stamps) + changed_places(active, self._is_active))
+        self._is_active = bool(active[-1])
         self._stamps.add(part.stamps)
-        self._active.append(part.column(self.COLUMN) > 0.0)
-
-    @property
-    def active(self) -> int:
-        """At how many samples damping was active."""
-        return sum(int(np.count_nonzero(each)) for each in self._active)
 
     def switched(self, order: CompactTimes | None = None) -> tuple[Places, Places]:
         """Return at which samples, counted as they came, damping went on and off.
 
         They follow one another by their stamps, or by what is told for each of them in `order`.
         """
-        active, stamps = np.concatenate(self._active), self._stamps.finished()
-        if not len(active):
-            return np.empty(0, np.intp), np.empty(0, np.intp)
+        changes, stamps = np.concatenate(self._changes), self._stamps.finished()
+        if not len(changes):
+            return changes, changes
         by = stamps if order is None else order
         if by.rising:
-            return switching_places(_Seconds(stamps), active)
+            return without_pauses(_Seconds(stamps), changes[::2], changes[1::2])
         places = np.argsort(by.whole(), kind='stable')
-        on, off = switching_places(_Seconds(stamps, places), active[places])
+        on, off = switching_places(_Seconds(stamps, places), self._all_active(changes)[places])
         return places[on], places[off]
+
+    def _all_active(self, changes: Places) -> NDArray[np.bool_]:
+        """Return at which samples damping was active."""
+        changed = np.zeros(len(self._stamps), bool)
+        changed[changes] = True
+        return np.logical_xor.accumulate(changed)
 
 
 class ArrivedSwitching(SwitchingTrace):

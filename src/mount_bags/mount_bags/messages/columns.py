@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.container.scratch import put_away, room
 from mount_bags.container.stored import StoredMessages
 from mount_bags.messages.compact_times import CompactTimes
 from mount_bags.messages.series import Column, Heads, Payloads, Series, SeriesError, Times, heads_of
@@ -13,17 +14,21 @@ from mount_bags.messages.series import Column, Heads, Payloads, Series, SeriesEr
 Kind = TypeVar('Kind', np.float64, np.int64)
 
 _BLOCK = 4096  # messages, chosen: 3 MB of the longest ones of this project
+_PUT_AWAY = 1 << 17  # messages, chosen: 1 MB of each column is in memory while it fills
 
 MakeSeries = Callable[[Payloads, Heads], Series]
 """Makes a series of messages and their heads."""
 
 
 class FillingColumn(Generic[Kind]):
-    """A column that fills part by part: never held twice where not more comes than is expected."""
+    """A column that fills part by part: never held twice where not more comes than is expected.
+
+    A long one is in a file (`scratch`).
+    """
 
     def __init__(self, expected: int, kind: type[Kind]):
         """Make room for so many numbers; more may come."""
-        self._numbers: NDArray[Kind] = np.empty(expected, kind)
+        self._numbers = room(expected, kind)
         self._count = 0
 
     def add(self, numbers: NDArray[Kind]) -> None:
@@ -50,7 +55,7 @@ class ColumnCollector:
         self._heads = Heads(CompactTimes(), CompactTimes(), CompactTimes())
         self._waiting: list[np.ndarray | list[bytes]] = []
         self._waiting_heads: list[np.ndarray] = []
-        self._count = 0
+        self._count = self._taken = 0
 
     def add(self, block: StoredMessages) -> None:
         """Take the messages in `block`."""
@@ -75,9 +80,13 @@ class ColumnCollector:
     def _take(self) -> None:
         heads = heads_of(np.concatenate(self._waiting_heads))
         series = self._make_series(Payloads(self._waiting), heads)
-        for kept, times in zip(self._heads, heads, strict=True):
-            kept.add(times.whole())
+        self._heads.received.add(heads.received.whole())
+        self._heads.sequences.add(heads.sequences.whole())
         self._waiting, self._waiting_heads, self._count = [], [], 0
+        self._taken += len(series)
+        if self._taken >= _PUT_AWAY:
+            put_away()
+            self._taken = 0
         for name in list(self._columns):
             try:
                 self._columns[name].add(series[name])

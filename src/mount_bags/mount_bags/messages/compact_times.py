@@ -1,61 +1,54 @@
 """Times of very many messages in little memory, exact to the nanosecond.
 
 Times that follow one another differ by nearly the same step. Block by block the steps are kept as what they
-are above the least of them, in as few bytes as that needs: at 1 kHz 0 to 4 instead of 8.
+are above the least of them, in as few bytes as that needs, and these packed by zstd: at 1 kHz 0 to 2 instead
+of 8.
 """
 
-import mmap
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mount_bags.messages.packed_column import Bytes, InBlocks, Slabs, unpacked
+
 Times = NDArray[np.int64]
 
-BLOCK = 1 << 13  # times, chosen: so that one long step makes few others take more bytes
 _WORD = 8  # bytes of a time
-_SLAB = 1 << 20  # bytes that are taken from the system at once, chosen
 
 
 class _Block(NamedTuple):
-    """Some of the times: the first, the least, the highest; steps above `least_step` where they differ."""
+    """Some of the times: the first, the least, the highest; steps above `least_step` where they differ.
+
+    `above` are `width` planes, of the lowest, the next, ... byte of each step; packed where that is shorter.
+    """
 
     size: int
     first: int
     least: int
     highest: int
     least_step: int
-    above: NDArray[np.uint8]  # (steps, bytes of each), little end first
+    width: int
+    above: Bytes
 
     def times(self) -> Times:
         found = np.empty(self.size, np.int64)
         found[0] = self.first
         found[1:] = 0
-        found[1:].view(np.uint8).reshape(-1, _WORD)[:, : self.above.shape[1]] = self.above
+        planes = unpacked(self.above, (self.size - 1) * self.width)
+        found[1:].view(np.uint8).reshape(-1, _WORD)[:, : self.width] = planes.reshape(
+            self.width, self.size - 1
+        ).T
         found[1:] += self.least_step
         return np.cumsum(found, out=found)
 
 
-class _Slabs:
-    """Memory that goes back to the system with its owner; small pieces of the heap would stay there."""
-
-    def __init__(self) -> None:
-        self._free = np.empty(0, np.uint8)
-
-    def kept(self, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return a copy of `data` in this memory."""
-        if data.size > len(self._free):
-            self._free = np.frombuffer(mmap.mmap(-1, max(_SLAB, data.size), mmap.MAP_PRIVATE), np.uint8)
-        place, self._free = self._free[: data.size], self._free[data.size :]
-        place[:] = data.reshape(-1)
-        return place.reshape(data.shape)
-
-
-class CompactTimes:
+class CompactTimes(InBlocks[np.int64]):
     """A column of times (ns) in the order in which they were added, to be read block by block."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.rising = True
         """Whether none is below the one before it."""
         self.longest_step = 0
@@ -63,31 +56,8 @@ class CompactTimes:
         self.strictly_rising = True
         """Whether each is above the one before it."""
         self._blocks: list[_Block] = []
-        self._slabs = _Slabs()
+        self._slabs = Slabs()
         self._last = 0
-        self._waiting: list[Times] = []
-        self._waiting_count = self._packed_count = 0
-
-    def __len__(self) -> int:
-        return self._packed_count + self._waiting_count
-
-    def add(self, times: Times) -> None:
-        """Add times behind the others; the array is not to be changed afterwards."""
-        self._waiting.append(times)
-        self._waiting_count += len(times)
-        if self._waiting_count >= BLOCK:
-            waiting = np.concatenate(self._waiting)
-            whole = len(waiting) - len(waiting) % BLOCK
-            for begin in range(0, whole, BLOCK):
-                self._pack(waiting[begin : begin + BLOCK])
-            self._waiting, self._waiting_count = [waiting[whole:].copy()], len(waiting) - whole
-
-    def finished(self) -> 'CompactTimes':
-        """Return itself with all that was added in blocks; columns of one length have equal ones."""
-        if self._waiting_count:
-            self._pack(np.concatenate(self._waiting))
-        self._waiting, self._waiting_count = [], 0
-        return self
 
     @property
     def least(self) -> int:
@@ -137,28 +107,45 @@ class CompactTimes:
             begin += len(block)
         return np.concatenate(found)
 
-    def whole(self) -> Times:
-        """Return all times at once."""
-        times, end = np.empty(len(self), np.int64), 0
-        for block in self.blocks():
-            begin, end = end, end + len(block)
-            times[begin:end] = block
+    def whole(self, numbers: Sequence[int] | None = None) -> Times:
+        """Return all times at once, or those of the blocks with these numbers."""
+        blocks = self._blocks if numbers is None else [self._blocks[number] for number in numbers]
+        times, end = np.empty(sum(block.size for block in blocks), np.int64), 0
+        for block in blocks:
+            begin, end = end, end + block.size
+            times[begin:end] = block.times()
         return times
 
     def ordered(self) -> 'CompactTimes':
-        """Return the times sorted."""
+        """Return the times sorted; in memory at once are those of blocks that reach into each other."""
         if self.rising:
             return self
-        times = self.whole()
-        times.sort()
-        return compact(times)
+        found = CompactTimes()
+        for numbers in self.overlapping():
+            times = self.whole(numbers)
+            times.sort()
+            found.add(times)
+        return found.finished()
 
     def has_any(self, begin: int, end: int) -> bool:
         """Return whether one of the times is from `begin` to `end`."""
         near = (block for block in self._blocks if block.least <= end and block.highest >= begin)
         return any(bool(within(block.times(), begin, end).size) for block in near)
 
-    def _pack(self, times: Times) -> None:
+    def overlapping(self) -> Iterator[list[int]]:
+        """Yield the numbers of blocks, those together that reach into each other, in the order of time."""
+        found, highest = list[int](), 0
+        for number in sorted(range(len(self._blocks)), key=lambda number: self._blocks[number].least):
+            block = self._blocks[number]
+            if found and block.least > highest:
+                yield sorted(found)
+                found = []
+            highest = max(highest, block.highest) if found else block.highest
+            found.append(number)
+        if found:
+            yield sorted(found)
+
+    def _keep(self, times: Times) -> None:
         steps = np.diff(times)
         border = int(times[0]) - self._last if self._blocks else 0
         least = int(steps.min()) if steps.size else 0
@@ -168,17 +155,18 @@ class CompactTimes:
         self.rising = self.rising and border >= 0 and bool((times[1:] >= times[:-1]).all())
         above = border > 0 or not self._blocks
         self.strictly_rising = self.strictly_rising and above and bool((times[1:] > times[:-1]).all())
+        width = -(-(highest - least).bit_length() // 8)
         found = _Block(
             len(times),
             int(times[0]),
             int(times.min()),
             int(times.max()),
             least,
-            self._slabs.kept(_narrow(steps - least, highest - least)),
+            width,
+            self._slabs.kept(_planes(steps - least, width)),
         )
         self._blocks.append(found)
         self._last = int(times[-1])
-        self._packed_count += len(times)
 
 
 def compact(times: 'Times | CompactTimes') -> CompactTimes:
@@ -231,7 +219,6 @@ def is_in(times: Times, known: Times) -> NDArray[np.bool_]:
     return known[np.minimum(np.searchsorted(known, times), len(known) - 1)] == times
 
 
-def _narrow(above: Times, highest: int) -> NDArray[np.uint8]:
-    """Return numbers from 0 to `highest` (n,) as the fewest bytes that hold each of them (n, bytes)."""
-    width = -(-highest.bit_length() // 8)
-    return above.view(np.uint8).reshape(-1, _WORD)[:, :width]
+def _planes(above: Times, width: int) -> NDArray[np.uint8]:
+    """Return the lowest `width` bytes of numbers, the lowest of each first, then the next of each."""
+    return np.ascontiguousarray(above.view(np.uint8).reshape(-1, _WORD)[:, :width].T).reshape(-1)

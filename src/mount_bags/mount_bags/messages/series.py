@@ -50,7 +50,10 @@ class Payloads:
 
 
 class Heads(NamedTuple):
-    """What is told of messages beside their bytes: when they came and were sent (ns), and their numbers."""
+    """What is told of messages beside their bytes: when they came and were sent (ns), and their numbers.
+
+    Of chosen columns alone `sent` is empty: it is read with the messages.
+    """
 
     received: CompactTimes
     sent: CompactTimes
@@ -77,7 +80,7 @@ class Series:
         self,
         topic: str,
         type_name: str,
-        payloads: Payloads | Callable[[], Payloads],
+        payloads: 'Payloads | Callable[[], Series]',
         heads: 'Heads',
         *,
         definition: Definition | None = None,
@@ -91,7 +94,7 @@ class Series:
 
         Without both the installed type tells the fields. `zero` (ns) is where `time` begins; `units` are
         those that the recording tells of fields that no registry knows. A function in
-        place of `payloads` is asked where something else than `columns` and `stamps`, read before, is wanted.
+        place of `payloads` reads the topic anew where something else than `columns` and `stamps` is wanted.
         """
         self.topic = topic
         self.type = type_name
@@ -117,6 +120,8 @@ class Series:
     @functools.cached_property
     def publish_times(self) -> Times:
         """When the messages were sent, ns."""
+        if len(self._heads.sent) < len(self):
+            self._read()
         return self._heads.sent.whole()
 
     @functools.cached_property
@@ -127,14 +132,19 @@ class Series:
     @property
     def payloads(self) -> Payloads:
         """The serialised messages."""
-        if not isinstance(self._payloads, Payloads):
-            self._payloads = self._payloads()
-        return self._payloads
+        return self._payloads if isinstance(self._payloads, Payloads) else self._read()
 
     @property
     def loaded(self) -> bool:
         """Whether the messages are in memory, not only `columns` of them."""
         return isinstance(self._payloads, Payloads)
+
+    def _read(self) -> Payloads:
+        """Read what is not yet there of the topic."""
+        if not isinstance(self._payloads, Payloads):
+            whole = self._payloads()
+            self._payloads, self._heads = whole.payloads, whole._heads
+        return self._payloads
 
     @functools.cached_property
     def stamps(self) -> Times:
@@ -312,6 +322,8 @@ class Series:
         return list(self.messages())
 
 
+# Recordings have the same few names, and of each it is asked again and again.
+@functools.lru_cache(maxsize=1024)
 def registered_topic(name: str, type_name: str) -> Topic | None:
     """Return the registered topic behind a full name with any namespace, None if there is none.
 

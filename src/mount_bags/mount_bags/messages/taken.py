@@ -1,4 +1,4 @@
-"""The compiled walk through the records of a chunk that picks wanted numbers of several topics' messages."""
+"""The compiled walk through the records of a chunk that finds messages, or picks wanted numbers of them."""
 
 from typing import NamedTuple
 
@@ -59,15 +59,11 @@ def _take_one(data, channels, begins, alike, marked, places, columns, counts):
     """Take the messages of one chunk behind the `counts` that are there; return False if one is another."""
     position, size = 0, len(data)
     while position + _HEAD <= size:
-        told = int(data[position + 1]) | int(data[position + 2]) << 8
-        told |= int(data[position + 3]) << 16 | int(data[position + 4]) << 24
-        longer = data[position + 5] | data[position + 6] | data[position + 7] | data[position + 8]
-        if longer or told > size - position - _HEAD:
+        told = _length(data, position)
+        if told < 0:
             return False
         if data[position] == _MESSAGE:
-            if told < _SHORTEST:
-                return False
-            channel = int(data[position + 9]) | int(data[position + 10]) << 8
+            channel = _channel(data, position)
             for topic in range(len(channels)):
                 if channels[topic] != channel:
                     continue
@@ -82,6 +78,50 @@ def _take_one(data, channels, begins, alike, marked, places, columns, counts):
                 counts[topic] += 1
         position += _HEAD + told
     return position == size
+
+
+@compiled
+def find(data, ends, wanted):
+    """Return how many chunks were walked through, and where in `data` their wanted messages begin, rising.
+
+    `data[:ends[-1]]` are the bytes of chunks, the end of each in `ends`; `wanted` tells by number of channel.
+    It ends before a chunk that is not records from first to last.
+    """
+    found = np.empty((ends[-1] if len(ends) else 0) // (_HEAD + _SHORTEST), np.int64)
+    count = 0
+    for chunk in range(len(ends)):
+        position, end, counted = ends[chunk - 1] if chunk > 0 else 0, ends[chunk], count
+        content = data[:end]
+        while position + _HEAD <= end:
+            told = _length(content, position)
+            if told < 0:
+                return chunk, found[:counted]
+            if data[position] == _MESSAGE and wanted[_channel(data, position)]:
+                found[count] = position
+                count += 1
+            position += _HEAD + told
+        if position != end:
+            return chunk, found[:counted]
+    return len(ends), found[:count]
+
+
+@compiled
+def _length(data, position):
+    """Return how many bytes stand behind the head of the record at `position`, -1 if that is none."""
+    told = np.int64(data[position + 1]) | np.int64(data[position + 2]) << 8
+    told |= np.int64(data[position + 3]) << 16 | np.int64(data[position + 4]) << 24
+    longer = data[position + 5] | data[position + 6] | data[position + 7] | data[position + 8]
+    if longer or told > len(data) - position - _HEAD:
+        return -1
+    if data[position] == _MESSAGE and told < _SHORTEST:
+        return -1
+    return told
+
+
+@compiled
+def _channel(data, position):
+    """Return the number of the channel of the message at `position`."""
+    return np.int64(data[position + 9]) | np.int64(data[position + 10]) << 8
 
 
 @compiled

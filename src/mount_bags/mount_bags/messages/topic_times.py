@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mount_bags.container.stored import HEAD, StoredMessages
 from mount_bags.messages.compact_times import CompactTimes, Times
@@ -104,11 +105,16 @@ def _begins_with_header(definition: Definition) -> bool:
 
 def _stamps_in(block: StoredMessages) -> Times | None:
     rows = block.beginnings(_STAMP_END)
-    if rows is None:
+    if rows is None or rows[:, 0].any() or (rows[:, 1] > 1).any():
         return None
-    for kind, order in ((1, '<'), (0, '>')):
-        if (rows[:, 0] == 0).all() and (rows[:, 1] == kind).all():
-            numbers = np.ascontiguousarray(rows[:, _STAMP_AT:])
-            seconds = numbers[:, :4].copy().view(f'{order}i4')[:, 0].astype(np.int64)
-            return seconds * 1_000_000_000 + numbers[:, 4:].copy().view(f'{order}u4')[:, 0]
-    return None
+    numbers = np.ascontiguousarray(rows[:, _STAMP_AT:])
+    little, big = _read(numbers, '<'), rows[:, 1] == 0
+    if big.any():
+        little[big] = _read(numbers[big], '>')
+    return little
+
+
+def _read(stamps: NDArray[np.uint8], order: str) -> Times:
+    """Return stamps (n, 8 bytes) in ns."""
+    seconds = stamps.view(f'{order}i4')[:, 0].astype(np.int64)
+    return seconds * 1_000_000_000 + stamps.view(f'{order}u4')[:, 1]

@@ -5,6 +5,7 @@ taking it does. A batch every few milliseconds loses nothing, and brings what a 
 message was sent and when it arrived.
 """
 
+import contextlib
 import operator
 import threading
 import time
@@ -16,7 +17,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from mount_ros.data_path import io_node
-from mount_ros.data_thread import DataThread, Work
+from mount_ros.data_thread import DataThread, DataThreadEndedError, Work
 from mount_ros.messages.types import message_class
 from mount_ros.private_rclpy import Taken, raw_taker
 from mount_ros.qos import publisher_qos, recording_qos
@@ -108,7 +109,9 @@ class Collector:
         if self._ending.is_set():
             return
         self._ending.set()
-        if self._shared_thread is not None:
+        if self._shared_thread is not None and self._attended:
+            with contextlib.suppress(DataThreadEndedError):
+                self._shared_thread.change(self._take_batch)
             for work in self._attended:
                 self._shared_thread.leave(work)
         if self._thread is not None:

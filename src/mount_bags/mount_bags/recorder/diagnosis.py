@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
-from mount_bags.messages.stamps import FARTHEST, StampWatch
+from mount_bags.messages.stamp_watch import StampWatch
+from mount_bags.messages.stamps import FARTHEST
 from mount_bags.recorder.recorder import RecorderFigures, Unobserved
 from mount_bags.recorder.snapshot import SnapshotFigures
 from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on

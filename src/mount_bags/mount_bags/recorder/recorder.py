@@ -1,4 +1,4 @@
-"""The core of the recorder: a queue between the thread that receives and the one that writes.
+"""The core of the recorder: one thread receives, one writes, and a queue is between them.
 
 Receiving is one append. Whatever the disk does, publishers never wait: the queue grows up to a limit
 in bytes, and what does not fit is lost, counted and reported. In lock-step one thread does both, in turn:
@@ -7,15 +7,13 @@ no time passes while it writes, and two that take turns in one process cost more
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Protocol
 
-from mount_bags.bag.statement import Reception
 from mount_bags.bag.writer import RecordingError
-from mount_bags.messages.stamps import StampWatch
+from mount_bags.messages.stamp_watch import StampWatch
+from mount_bags.recorder.queue import Item, ReceivedQueue
+from mount_bags.recorder.sink import Sink
 from mount_bags.recorder.space import SpaceGuard
 
 MEMORY_LIMIT = 64 * 1024 * 1024  # bytes, chosen: half a minute of a full drive with the simulator's truth
@@ -31,27 +29,6 @@ Receive = Callable[[bytes, int, int], None]
 
 Observe = Callable[[bytes, int], None]
 """Looks at (serialised message, time of arrival ns)."""
-
-_Item = tuple[str, bytes, int, int]  # topic, message, times of arrival and of sending
-
-
-class Sink(Protocol):
-    """Where the messages go: a `BagWriter` for all of them, a `Snapshot` for those around events."""
-
-    folder: Path
-
-    @property
-    def kept(self) -> int: ...
-    @property
-    def pending(self) -> int: ...
-    @property
-    def size(self) -> int: ...
-    def attach(self, receptions: dict[str, Reception]) -> None: ...
-    def unwritten(self, handed: int) -> int: ...
-    def write(self, topic: str, raw: bytes, receive_time: int, publish_time: int) -> None: ...
-    def flush(self) -> None: ...
-    def stop(self, why: str) -> None: ...
-    def close(self) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -99,17 +76,13 @@ class Recorder:
         self.unobserved: dict[str, Unobserved] = {}
         self.begun = False
         self._writer = writer
-        self._memory_limit = memory_limit
         self._space = space
         self._on_loss = on_loss
         self._observers: dict[str, Observe] = {}
-        self._receptions: dict[str, Reception] = {}
-        self._queue: deque[_Item] = deque()
+        self._queue = ReceivedQueue(memory_limit)
         self._open = False
         self._gate = threading.Lock()
-        self._latched: dict[str, _Item] = {}
-        self._received_bytes = 0  # changed by the receiving thread alone
-        self._drained_bytes = 0  # changed where the writing is done alone
+        self._latched: dict[str, Item] = {}
         self._handed = 0  # to the writer, or thrown away after it failed
         self._failure = ''
         self._turn_end = self._changed = self._looked = 0.0  # steady times, s
@@ -118,11 +91,11 @@ class Recorder:
         self._ending = threading.Event()
         self._threaded = threaded
         self._thread = threading.Thread(target=self._work, name='recorder', daemon=True)
-        writer.attach(self._receptions)
+        writer.attach(self._queue.receptions)
 
     def receiver(self, topic: str) -> Receive:
         """Return the function that takes the messages of `topic`; before `begin` it drops them."""
-        take = self._taker(topic)
+        take = self._queue.taker(topic)
 
         def receive(raw: bytes, received: int, sent: int) -> None:
             if self._open:
@@ -132,7 +105,7 @@ class Recorder:
 
     def latched_receiver(self, topic: str) -> Receive:
         """Return the same for a latched topic: the last message before `begin` is kept for it."""
-        take = self._taker(topic)
+        take = self._queue.taker(topic)
 
         def receive(raw: bytes, received: int, sent: int) -> None:
             item = (topic, raw, received, sent)
@@ -161,7 +134,7 @@ class Recorder:
         with self._gate:
             self.begun = True
             for item in sorted(self._latched.values(), key=lambda item: item[2]):
-                self._taker(item[0])(item)
+                self._queue.taker(item[0])(item)
             self._changed = self._looked = time.monotonic()
             self._open = True
         if self._threaded:
@@ -198,22 +171,22 @@ class Recorder:
     def figures(self) -> RecorderFigures:
         """Return what was done so far."""
         return RecorderFigures(
-            received=self._received(),
+            received=self._queue.received,
             kept=self._writer.kept,
             file_size=self._writer.size,
             queued=len(self._queue),
-            queued_bytes=self._received_bytes - self._drained_bytes,
-            lost=self._overflowed() + (self._writer.unwritten(self._handed) if self._failure else 0),
+            queued_bytes=self._queue.size,
+            lost=self._queue.overflowed + (self._writer.unwritten(self._handed) if self._failure else 0),
             failure=self._failure,
         )
 
     def overflowed(self) -> dict[str, int]:
         """Return how many messages of each topic did not fit into the queue, where there are any."""
-        return {name: entry.overflowed for name, entry in self._receptions.items() if entry.overflowed}
+        return {name: entry.overflowed for name, entry in self._queue.receptions.items() if entry.overflowed}
 
     def received_on(self, topic: str) -> int:
         """Return how many messages of `topic` came since `begin`."""
-        entry = self._receptions.get(topic)
+        entry = self._queue.receptions.get(topic)
         return entry.received if entry is not None else 0
 
     @property
@@ -221,43 +194,16 @@ class Recorder:
         """The latest stamp of all watched topics, ns."""
         return max((watch.last_stamp for watch in self.watches.values()), default=0)
 
-    def _taker(self, topic: str) -> Callable[[_Item], None]:
-        reception = self._receptions.setdefault(topic, Reception())
-        append = self._queue.append
-
-        def take(item: _Item) -> None:
-            reception.received += 1
-            size = len(item[1])
-            if self._received_bytes + size - self._drained_bytes > self._memory_limit:
-                reception.overflowed += 1
-                return
-            self._received_bytes += size
-            append(item)
-
-        return take
-
-    def _received(self) -> int:
-        return sum(entry.received for entry in self._receptions.values())
-
-    def _overflowed(self) -> int:
-        return sum(entry.overflowed for entry in self._receptions.values())
-
     def _settle(self) -> None:
         """Wait until messages cease, or until those come that arrived well after this call."""
         limit = time.monotonic() + _SETTLE_LIMIT
         latest = time.time_ns() + int(2e9 * _QUIET_PERIOD)
         before = -1
-        while self._received() != before and time.monotonic() < limit:
-            before = self._received()
+        while self._queue.received != before and time.monotonic() < limit:
+            before = self._queue.received
             self._ending.wait(_QUIET_PERIOD)
-            if self._newest_arrival() > latest:
+            if self._queue.newest_arrival > latest:
                 return
-
-    def _newest_arrival(self) -> int:
-        try:
-            return self._queue[-1][2]
-        except IndexError:  # the writing thread was faster
-            return 0
 
     # The writing.
 
@@ -275,7 +221,7 @@ class Recorder:
         if now - self._looked > _SPACE_PERIOD:
             self._looked = now
             self._guarded(self._look_at_space)
-        if (overflowed := self._overflowed()) > self._lost_before:
+        if (overflowed := self._queue.overflowed) > self._lost_before:
             self._on_loss(overflowed - self._lost_before)
             self._lost_before = overflowed
 
@@ -286,7 +232,7 @@ class Recorder:
             rest -= _BATCH
 
     def _write_batch(self, count: int) -> None:
-        take, write, observers = self._queue.popleft, self._writer.write, self._observers
+        take, write, observers = self._queue.pop, self._writer.write, self._observers
         taken = taken_bytes = 0
         try:
             for taken in range(1, count + 1):  # noqa: B007 - also read after an exception
@@ -301,18 +247,13 @@ class Recorder:
                         self._note_unobserved(topic, raw, error)
         finally:
             self._handed += taken
-            self._drained_bytes += taken_bytes
+            self._queue.free(taken_bytes)
 
     def _note_unobserved(self, topic: str, raw: bytes, error: Exception) -> None:
         before = self.unobserved.get(topic)
         count = 1 if before is None else before.count + 1
         why = f'{type(error).__name__}: {error}'.splitlines()[0]
         self.unobserved[topic] = Unobserved(count, len(raw), why)
-
-    def _discard_queued(self) -> None:
-        for _ in range(len(self._queue)):
-            self._drained_bytes += len(self._queue.popleft()[1])
-            self._handed += 1
 
     def _look_at_space(self) -> None:
         shortage = self._space.shortage() if self._space is not None else ''
@@ -322,7 +263,7 @@ class Recorder:
 
     def _note_missing(self) -> None:
         for name, watch in self.watches.items():
-            self._receptions.setdefault(name, Reception()).missing = watch.lost
+            self._queue.reception(name).missing = watch.lost
 
     def _guarded(self, step: Callable[[], None]) -> None:
         try:
@@ -333,4 +274,4 @@ class Recorder:
             known = isinstance(error, RecordingError)
             self._failure = str(error) if known else f'recording stopped: {type(error).__name__}: {error}'
         if self._failure:
-            self._discard_queued()
+            self._handed += self._queue.discard()

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mount_bags.bag.recording import ReadingError, Recording, open_recording
-from mount_bags.container.mcap_file import McapFile
+from mount_bags.container.mcap_reading.mcap_file import McapFile
+from mount_bags.container.mcap_reading.summary import hashed
 from mount_bags.container.stored import StoredFile
-from mount_bags.container.summary import hashed
 
 
 def open_run(path: Path) -> Recording:

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
+from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from mount_bags.container.chunk_table import ROW, ChunkTable, Kind
-from mount_bags.container.chunks import CRC_PLACE, LARGEST_CHUNK, SHORTEST_CHUNK
+from mount_bags.container.mcap_reading.chunk_table import ROW, ChunkTable, Kind
+from mount_bags.container.mcap_reading.chunks import CRC_PLACE, LARGEST_CHUNK, SHORTEST_CHUNK
 from mount_bags.container.stored import rows_at
 
 Bytes = NDArray[np.uint8]
@@ -21,6 +22,7 @@ _SIZES = np.dtype(
 _LAST = np.dtype([('packed', '<u8'), ('unpacked', '<u8')])  # bytes of the chunk's messages
 _SHORTEST = _FIRST.itemsize + _SIZES.itemsize + _LAST.itemsize
 _FARTHEST = np.uint64(1 << 61)  # bytes, chosen: sums of what is not larger are exact, and no file is as long
+_NEVER = 0xFFFFFFFF  # chosen: of bytes that are 0 it is another
 _AT_ONCE = 1 << 14  # records whose channels are in memory at once, chosen
 
 
@@ -75,8 +77,13 @@ def can_be_there(table: ChunkTable, size: int) -> bool:
 
 
 def take_checksums(data: Bytes, rows: np.ndarray) -> None:
-    """Note in rows of a table the checksums, which the heads of the chunks tell; they must be in `data`."""
+    """Note in rows of a table the checksums, which the heads of the chunks tell; they must be in `data`.
+
+    Where there is neither a chunk nor a checksum, as in the hole of an outline, it is one that never holds.
+    """
     rows['crc'] = _fields(data, rows['position'] + CRC_PLACE, np.dtype('<u4'))
+    missing = (rows['crc'] == 0) & (data[rows['position']] != Opcode.CHUNK)
+    rows['crc'][missing] = _NEVER
 
 
 def _fields(data: Bytes, places: Offsets, fields: np.dtype) -> np.ndarray:

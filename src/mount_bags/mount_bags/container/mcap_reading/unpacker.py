@@ -6,7 +6,7 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from mount_bags.container.chunk_table import ChunkTable, Places
+from mount_bags.container.mcap_reading.chunk_table import ChunkTable, Places
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.int64]

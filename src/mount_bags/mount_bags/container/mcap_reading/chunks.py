@@ -126,6 +126,11 @@ def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
             yield chunk
 
 
+def left_out(chunk: Chunk) -> str:
+    """Return the sentence on a chunk that is damaged."""
+    return f'the chunk at byte {chunk.position} is damaged and left out'
+
+
 def contents_of(data: mmap.mmap, chunk: Chunk) -> Contents | None:
     """Return what is in a chunk, None if it is damaged."""
     for end in chunk.ends:

@@ -6,7 +6,7 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.container.chunks import Chunk
+from mount_bags.container.mcap_reading.chunks import Chunk
 
 Places = NDArray[np.int64]
 """Numbers of chunks in their table, rising."""
@@ -85,6 +85,11 @@ class ChunkTable(Sequence[Chunk]):
     def unprotected(self) -> int:
         """How many of them hold something without a checksum."""
         return int(np.count_nonzero((self.rows['size'] > 0) & (self.rows['crc'] == 0)))
+
+    @property
+    def protected(self) -> int:
+        """How many of them carry a checksum."""
+        return int(np.count_nonzero(self.rows['crc']))
 
     @property
     def times(self) -> tuple[int, int] | None:

@@ -27,9 +27,9 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from mount_bags.container.chunk_index import indexed_chunks
-from mount_bags.container.chunk_table import ChunkTable, chunk_table, joined
-from mount_bags.container.chunks import RECORD
+from mount_bags.container.mcap_reading.chunk_index import indexed_chunks
+from mount_bags.container.mcap_reading.chunk_table import ChunkTable, chunk_table, joined
+from mount_bags.container.mcap_reading.chunks import RECORD
 from mount_bags.container.whole_files import forget
 
 T = TypeVar('T')

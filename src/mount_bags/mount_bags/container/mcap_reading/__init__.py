@@ -1,0 +1,1 @@
+"""Reads MCAP files, damaged ones included."""
