@@ -2,7 +2,8 @@
 
 import contextlib
 import difflib
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -32,12 +33,17 @@ class SettingError(ParameterError):
 def defaults_of_nodes() -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
     return {
-        'mount_driver': {**flattened(DriverParameters()), **flattened(SpecimenChoice())},
-        'mount_sim': {**flattened(SimParameters()), **flattened(NodeParameters())},
-        'mount_init': {**flattened(InitParameters()), **flattened(SpecimenChoice())},
-        'mount_control': control.defaults(),
-        'mount_recorder': flattened(RecorderParameters()),
+        'mount_driver': {**_defaults(DriverParameters), **_defaults(SpecimenChoice)},
+        'mount_sim': {**_defaults(SimParameters), **_defaults(NodeParameters)},
+        'mount_init': {**_defaults(InitParameters), **_defaults(SpecimenChoice)},
+        'mount_control': control.defaults(),  # not kept: a policy may be registered later
+        'mount_recorder': {**_defaults(RecorderParameters)},
     }
+
+
+@functools.cache
+def _defaults(parameters: Callable[[], Any]) -> Mapping[str, Any]:
+    return flattened(parameters())
 
 
 def settings_of_options(options: Sequence[str], known: Known | None = None) -> dict[str, dict[str, Any]]:

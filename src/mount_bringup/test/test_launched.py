@@ -3,15 +3,16 @@
 import os
 import signal
 import subprocess
+from types import SimpleNamespace
 
 import pytest
 
 from mount_bringup.graph import launched, siblings
 from mount_bringup.graph.errors import GraphError, Interrupted
 from mount_bringup.graph.launched import SUPERVISOR, LaunchedGraph, exit_error
-from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, VEHICLE, GraphSettings
+from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, SIM, SIMULATED, VEHICLE, GraphSettings
 from mount_bringup.graph.processes import NODES_OF_PROCESS
-from mount_bringup.graph.restarts import Loss, Remedy, Restart
+from mount_bringup.graph.restarts import Loss, NodesLostError, Remedy, Restart
 from mount_ros.testing import wait_until
 
 
@@ -106,6 +107,22 @@ def test_a_supervisor_knows_the_processes_of_its_starter_by_their_nodes_and_no_o
     assert child.wait(10) == -signal.SIGKILL
     assert sibling.ended
     sibling.close()
+
+
+def graph_without(node, limit):
+    graph = LaunchedGraph(SIMULATED, GraphSettings(restart_limit=limit))
+    graph._processes = [SimpleNamespace(nodes=(node,), pid=7, ended=True)]
+    return graph
+
+
+def test_the_end_of_a_process_is_told_by_the_supervisor_where_launch_starts_it_again():
+    with pytest.raises(NodesLostError, match='mount_control has ended'):
+        graph_without(CONTROL, limit=3).check_processes()
+
+
+@pytest.mark.parametrize(('node', 'limit'), [(CONTROL, 0), (SIM, 3)])
+def test_the_end_of_a_process_is_left_to_launch_where_that_ends_all_for_it(node, limit):
+    graph_without(node, limit).check_processes()
 
 
 def test_the_supervisor_of_a_launch_that_was_killed_ends(monkeypatch):

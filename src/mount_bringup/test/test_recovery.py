@@ -43,6 +43,10 @@ class Graph:
         self.next_words = dict(DRIVING)
         self.verdicts = SimpleNamespace(forget=lambda node: self.said[node.name].update(self.next_words))
         self.loses = {}
+        self.told = []
+
+    def tell_loss(self, reason):
+        self.told.append(reason)
 
     def figures(self, node):
         return self.said.get(node.name, {})
@@ -180,9 +184,19 @@ def test_a_node_lost_meanwhile_is_made_good_with_the_first(graph):
     assert graph.done.count('start mount_driver') == 2
     assert 'start mount_control' in graph.done
     assert graph.done[-3:] == INITIALISED
+    assert graph.told == [
+        f'{reason}; the mount is initialised anew' for reason in ('lost', 'mount_control ended')
+    ]
 
 
-def test_a_node_that_cannot_stay_alive_ends_the_graph(graph):
+def test_a_node_that_cannot_stay_alive_ends_the_graph_and_is_told_once_each_time(graph):
     graph.loses = {CONTROL.name: CONTROL}
-    with pytest.raises(GraphError, match='mount_control was lost 2 times'):
+    with pytest.raises(GraphError, match='mount_control ended; mount_control was lost 2 times'):
         made_good(graph, CONTROL, limit=1)
+    assert graph.told == ['lost; it is started again and activated with the table that holds']
+
+
+def test_without_restarts_a_loss_stands_in_the_error_alone(graph):
+    with pytest.raises(GraphError, match=r'^lost$'):
+        made_good(graph, CONTROL, limit=0)
+    assert graph.told == graph.done == []

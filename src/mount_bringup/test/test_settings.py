@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from mount_bringup.settings import SettingError, checked_settings, owned, settings_of_options
+from mount_bringup.settings import (
+    SettingError,
+    checked_settings,
+    defaults_of_nodes,
+    owned,
+    settings_of_options,
+)
+from mount_control.policy import continuous_viscous
+from mount_control.policy.registry import POLICIES
 from mount_models.damper import DamperError, damper_curve
 from mount_models.quantity import ParameterError
 
@@ -65,6 +73,20 @@ def test_a_name_that_is_no_ones_or_several_ones_is_refused_with_what_to_write(na
     with pytest.raises(ParameterError) as refusal:
         owned(name, known)
     assert sentence in str(refusal.value)
+
+
+def test_a_policy_that_is_registered_later_has_its_parameters(monkeypatch):
+    before = defaults_of_nodes()['mount_control']
+    monkeypatch.setitem(POLICIES, 'another', continuous_viscous)
+    assert {name for name in defaults_of_nodes()['mount_control'] if name not in before} == {
+        f'another.{name.partition(".")[2]}' for name in before if name.startswith('continuous_viscous.')
+    }
+
+
+def test_what_one_caller_changes_in_the_defaults_no_other_sees():
+    for values in defaults_of_nodes().values():
+        values.clear()
+    assert all(defaults_of_nodes().values())
 
 
 @pytest.mark.parametrize('option', ['seed', '=1', 'mount_sim.seed'])

@@ -2,21 +2,12 @@
 
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from itertools import groupby
 from typing import Any
 
-import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rclpy.client import Client
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from mount_bringup.graph.activation import Activation
 from mount_bringup.graph.errors import GraphError, Interrupted
@@ -24,13 +15,13 @@ from mount_bringup.graph.liveliness import silence_sentence
 from mount_bringup.graph.matches import crowded, waiting
 from mount_bringup.graph.nodes import (
     DRIVER,
-    RECORDER,
     SIM,
     GraphNode,
     GraphSettings,
     ending_order,
     groups,
 )
+from mount_bringup.graph.own_node import OwnNode
 from mount_bringup.graph.parameters import parameters_of
 from mount_bringup.graph.recovery import Recovery
 from mount_bringup.graph.reinitialisation import initialise_anew, offer
@@ -38,16 +29,12 @@ from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
 from mount_bringup.graph.transitions import TRANSITION_LIMIT, Transitions
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
-from mount_ros.messages.event import read_mark
-from mount_ros.nodes.leaving import Deadline, leave_middleware
+from mount_ros.nodes.leaving import Deadline
 from mount_ros.nodes.shared_memory import remove_abandoned
-from mount_ros.qos import publisher_qos, recording_qos
-from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION
 from mount_sim.diagnosis import FINISHED
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
 _MATCH_LIMIT = 20.0  # s, chosen
-_MOMENT = 0.05  # s, chosen
 _LONGEST_HANG = 30.0  # s, chosen: then the supervisor ends, and its nodes go to 0 A by themselves
 
 
@@ -67,12 +54,12 @@ class Bringup:
         """Whether `stop` has deactivated all nodes: then nothing depends on the order of their ends."""
         self.verdicts = Verdicts(nodes, settings.namespace)
         self.tell_loss: Callable[[str], None] = lambda text: None
+        """Takes the reason of each loss that is made good."""
         self._settings = settings
         self._groups = groups(nodes, settings.grouping)
         self._mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
         self._interrupted = False  # no lock: a second signal may come amid the first
-        self._context = Context()
-        self._clients: dict[str, Client] = {}
+        self._own = OwnNode(settings, self._mounts, self.verdicts)
         self._deadline = Deadline(code=1)
         self._transitions = Transitions(self)
         self._activation = Activation(self)
@@ -88,33 +75,14 @@ class Bringup:
     ) -> None:
         """Bring all nodes to life; `session` makes the session text of a mount from its nodes' parameters."""
         remove_abandoned()
-        rclpy.init(
-            context=self._context,
-            domain_id=self._settings.domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-        namespace = self._settings.namespace
-        self._node = Node('engine_mount_supervisor', namespace=namespace, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._node.create_subscription(
-            DiagnosticArray, DIAGNOSTICS.name, self.verdicts.take, recording_qos(DIAGNOSTICS)
-        )
-        for mount in dict.fromkeys(['', *self._mounts]):  # the recorder of several mounts marks for all
-            name, take = f'{mount}/{EVENT.name}'.lstrip('/'), partial(self._take_event, mount)
-            self._node.create_subscription(String, name, take, recording_qos(EVENT))
-        qos = publisher_qos(SESSION)
-        publishers = {
-            mount: self._node.create_publisher(String, f'{mount}/{SESSION.name}'.lstrip('/'), qos)
-            for mount in self._mounts
-        }
-        offer(self._node, self._mounts, self._begin_anew)
+        self._own.open()
+        offer(self._own.node, self._mounts, self._begin_anew)
         say('starting the nodes')
         self.start_nodes()
         self._transitions.configure(self._groups)
         self.parameters = {node.full_name: parameters_of(node.full_name, self.call) for node in self.nodes}
-        for mount, publisher in publishers.items():
-            publisher.publish(String(data=session(settings_of_mount(self.parameters, mount))))
+        for mount in self._mounts:
+            self._own.tell_session(mount, session(settings_of_mount(self.parameters, mount)))
         self.wait_for_matches()
         for _, side_by_side in groupby(self.nodes, lambda node: node.name):
             nodes = list(side_by_side)
@@ -155,7 +123,7 @@ class Bringup:
 
     def serve_once(self) -> None:
         """Serve what arrives within a moment, whatever it tells."""
-        self._executor.spin_once(_MOMENT)
+        self._own.serve_once()
 
     def serve_for(self, duration: float) -> None:
         """Serve the graph for so many s."""
@@ -205,7 +173,6 @@ class Bringup:
             raise NodesLostError(Loss((), reason))
 
     def _make_good(self, loss: Loss) -> None:
-        self.tell_loss(loss.reason)
         self._makes_good = False
         try:
             self._recovery.make_good(loss)
@@ -228,23 +195,9 @@ class Bringup:
             self._makes_good = True
             self.verdicts.liveliness.pause()
 
-    def _take_event(self, mount: str, message: String) -> None:
-        self.verdicts.witness.mark(mount, read_mark(message.data, 0))
-
     def mark_setter(self, say: Callable[[str], None]) -> Callable[[], None]:
         """Return the function that asks the recorder to mark this moment; `say` takes its answer."""
-        client = self.client(Trigger, f'{RECORDER.name}/mark')
-
-        def set_mark() -> None:
-            if client.service_is_ready():
-                client.call_async(Trigger.Request()).add_done_callback(lambda call: say(told(call.result())))
-            else:
-                say('no mark was set: the recorder is not there yet')
-
-        def told(answer: Trigger.Response) -> str:
-            return 'marked' if answer.success else f'no mark was set: {answer.message}'
-
-        return set_mark
+        return self._own.mark_setter(say)
 
     def transition(self, node: GraphNode, transition: int) -> None:
         """Take a node through a lifecycle transition, or raise `GraphError` with the node's own reason."""
@@ -260,15 +213,10 @@ class Bringup:
     def leave(self) -> list[str]:
         """End without a word to the nodes; return a sentence per unclean end."""
         self._deadline.close()
-        if self._context.ok() and not leave_middleware(self._take_down):
+        if not self._own.close():
             self.notes.append('the middleware of the supervisor did not come to an end and was left behind')
         remove_abandoned()
         return []
-
-    def _take_down(self) -> None:
-        self._executor.shutdown()
-        self._node.destroy_node()
-        rclpy.try_shutdown(context=self._context)
 
     def wait_for_service(self, node: GraphNode) -> Client:
         """Return the client of the transitions of a node when it is there."""
@@ -289,7 +237,7 @@ class Bringup:
         if client.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
             answer = client.call_async(request)
-            self._executor.spin_until_future_complete(answer, timeout_sec=2.0)
+            self._own.serve_until(answer, 2.0)
             done = answer.done() and answer.result().success
         return done
 
@@ -298,7 +246,7 @@ class Bringup:
         end = time.monotonic() + 0.5  # discovery of a running graph takes less with the shipped profile
         while time.monotonic() < end:
             self.serve_once()
-            if space := crowded(self.nodes, self._node, own):
+            if space := crowded(self.nodes, self._own.node, own):
                 raise GraphError(
                     f'{space} already runs in ROS domain {self._settings.domain}: end that graph, or choose '
                     'another domain or namespace'
@@ -308,7 +256,7 @@ class Bringup:
         """Return when every topic that a node needs has found its other side."""
 
         def alone() -> list[str]:
-            return waiting(self.nodes, self.figures, self._node.get_namespace())
+            return waiting(self.nodes, self.figures, self._own.node.get_namespace())
 
         try:
             self.wait_until(lambda: not alone(), _MATCH_LIMIT, 'connection of all topics')
@@ -316,13 +264,8 @@ class Bringup:
             raise GraphError(f'{error}: {"; ".join(alone())}') from None
 
     def client(self, kind: Any, service: str) -> Client:
-        """Return the client of a service, which stays until the end.
-
-        Fast DDS has been seen to wait for itself for ever where an endpoint was destroyed.
-        """
-        if service not in self._clients:
-            self._clients[service] = self._node.create_client(kind, service)
-        return self._clients[service]
+        """Return the client of a service, which stays until the end."""
+        return self._own.client(kind, service)
 
     def call(self, kind: Any, service: str, request: Any) -> Any:
         """Return the answer of a service."""

@@ -4,18 +4,27 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from types import FrameType
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _unheard: list[int] = []  # interrupts that came while nobody was there who can end in order
 
 
-def interrupt_and_remember(number: int, *_: Any) -> None:
+def interrupt_and_remember(number: int, frame: FrameType | None) -> None:
     """Raise `KeyboardInterrupt`, and hand it on if it is lost: a handler for SIGINT.
 
     Amid the import of a library it can be lost: some take every exception for something that is missing.
     """
     _unheard.append(number)
+    _interrupt(frame)
+
+
+def _interrupt(frame: FrameType | None) -> None:
+    """Raise `KeyboardInterrupt`, but not in a destructor: Python would print and drop it there."""
+    while frame is not None:
+        if frame.f_code.co_name == '__del__':
+            return
+        frame = frame.f_back
     raise KeyboardInterrupt
 
 
@@ -23,14 +32,14 @@ def interrupt_and_remember(number: int, *_: Any) -> None:
 def remembered_interrupts() -> Iterator[Callable[[], None]]:
     """Yield a function that raises `KeyboardInterrupt` if one came while the context lasts, and was lost.
 
-    Python drops an exception in a destructor. For who waits again and again in the main thread; in another
-    thread, or where SIGINT is ignored, nothing is changed.
+    None is raised in a destructor. For who waits again and again in the main thread; in another thread, or
+    where SIGINT is ignored, nothing is changed.
     """
     came: list[int] = []
 
-    def remember(number: int, *_: Any) -> None:
+    def remember(number: int, frame: FrameType | None) -> None:
         came.append(number)
-        raise KeyboardInterrupt
+        _interrupt(frame)
 
     def raise_lost() -> None:
         if came:

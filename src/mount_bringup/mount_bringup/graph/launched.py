@@ -17,7 +17,7 @@ from mount_bringup.graph.errors import GraphError, Interrupted
 from mount_bringup.graph.nodes import CONTROL, SIMULATED, GraphNode, GraphSettings, Grouping
 from mount_bringup.graph.order import LaunchOrder
 from mount_bringup.graph.player import Player
-from mount_bringup.graph.restarts import Loss, NodesLostError
+from mount_bringup.graph.restarts import Loss, NodesLostError, restartable
 from mount_bringup.graph.siblings import Sibling, sibling_of
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process
@@ -48,10 +48,11 @@ class LaunchedGraph(Bringup):
         self._processes = [process for process in found if process is not None]
 
     def check_processes(self) -> None:
+        """Raise `NodesLostError` for a process that launch starts again; for any other it ends all."""
         if self._starter.ended:
             raise GraphError('launch has ended')
         for process in self._processes:
-            if process.ended:
+            if process.ended and restartable(process.nodes, self._settings.restart_limit):
                 names = ' + '.join(node.name for node in process.nodes)
                 raise NodesLostError(Loss(process.nodes, f'{names} has ended (process {process.pid})'))
 
@@ -61,10 +62,10 @@ class LaunchedGraph(Bringup):
         say('playing the recording up to its force table')
         tables: list[Float64MultiArray] = []
         kind, qos = Float64MultiArray, recording_qos(CURRENT_FORCE_TABLE)
-        table = self._node.create_subscription(kind, CURRENT_FORCE_TABLE.name, tables.append, qos)
+        table = self._own.node.create_subscription(kind, CURRENT_FORCE_TABLE.name, tables.append, qos)
         self._player.begin()
         self.wait_until(lambda: bool(tables) or self.finished, float('inf'), 'the force table')
-        self._node.destroy_subscription(table)
+        self._own.node.destroy_subscription(table)
         if not tables:
             raise GraphError('the recording has ended, and no current_force_table came of it')
 

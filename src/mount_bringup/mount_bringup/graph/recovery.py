@@ -38,6 +38,7 @@ class Graph(Protocol):
     nodes: tuple[GraphNode, ...]
     parameters: dict[str, dict[str, object]]
     verdicts: Verdicts
+    tell_loss: Callable[[str], None]
 
     def figures(self, node: GraphNode) -> dict[str, str]: ...
     def start_again(self, nodes: Sequence[GraphNode]) -> None: ...
@@ -60,16 +61,24 @@ class Recovery:
     def make_good(self, loss: Loss) -> None:
         """Return when the graph works again; raise `GraphError` where it is given up."""
         begin, at = time.monotonic(), time.time_ns()
-        self._count.note(loss, begin)
+        self._take(loss, loss)
         active = [node for node in self._graph.nodes if self._graph.figures(node).get('state') == 'active']
         while True:
             try:
                 chosen = self._bring_back(loss, active)
                 break
             except NodesLostError as more:
-                self._count.note(more.loss, time.monotonic())
                 loss = loss.with_more(more.loss)
+                self._take(more.loss, loss)
         self.restarts.append(Restart(at, loss, chosen, time.monotonic() - begin))
+
+    def _take(self, loss: Loss, whole: Loss) -> None:
+        """Count a loss and tell it at once, with what follows from the `whole` of which it is the last part.
+
+        One for which the graph is given up stands in the error alone.
+        """
+        self._count.note(loss, time.monotonic())
+        self._graph.tell_loss(f'{loss.reason}; {remedy(whole, self._table_holds(whole)).value}')
 
     def _bring_back(self, loss: Loss, active: Sequence[GraphNode]) -> Remedy:
         graph = self._graph

@@ -30,8 +30,9 @@ class Supervisor(Bringup):
     def check_processes(self) -> None:
         for process in self._processes:
             if process.exit_code is not None:
-                said = f'{process.last_words().split("]: ", 1)[-1]} (log: {process.log_file})'
-                reason = f'{process.name} ended with code {process.exit_code}: {said}'
+                words = process.last_words().split(']: ', 1)[-1]
+                said = f'its last words were: {words} (log: {process.log_file})'
+                reason = f'{process.name} ended with code {process.exit_code}; {said}'
                 raise NodesLostError(Loss(process.nodes, reason))
 
     def start_again(self, nodes: Sequence[GraphNode]) -> None:
