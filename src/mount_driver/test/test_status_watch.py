@@ -19,7 +19,10 @@ def watch():
 @pytest.mark.parametrize(
     ('changes', 'sentence'),
     [
-        ({'over_current': True}, r'report over_current \(60\.0 degC, 14\.00 V\): check coil, cable'),
+        (
+            {'over_current': True},
+            r'report over_current \(is 1, must be 0; 60\.0 degC, 14\.00 V\): check coil, cable',
+        ),
         ({'over_temperature': True}, r'report over_temperature \(.*\): let the coil cool'),
         ({'under_voltage': True}, r'report under_voltage \(.*\): check battery'),
         ({'supply_voltage': 8.99}, r'supply voltage \(8\.99 V\) must lie within 9 \.\. 16 V: check'),
@@ -52,7 +55,7 @@ def test_what_lies_within_the_limits_changes_nothing(changes):
 def test_a_displacement_sensor_at_fault_keeps_0_ampere_for_as_long_as_it_is():
     health = watch()
     assert health.judge(SOUND._replace(displacement_sensor=True), 0) == ''
-    assert health.hold(99 * MS).startswith('the electronics report displacement_sensor: check the sensor')
+    assert 'displacement_sensor is 1, must be 0): check the sensor' in health.hold(99 * MS)
     health.judge(SOUND, 100 * MS)
     assert health.hold(101 * MS) == ''
 

@@ -257,7 +257,8 @@ class RippleWatch:
             return ''
         lasted = f'for {self._parameters.duration:g} s'
         if finding == 'missing':
-            return f'coil ripple is not valid {lasted}, gap and coil are not watched: check its measurement'
+            missing = f'coil ripple is not valid {lasted} (limit), gap and coil are not watched'
+            return f'{missing}: check its measurement'
         if finding == 'noise':
             return (
                 f'coil ripple scatters by {100.0 * self._noise:.0f} % {lasted}, limit '

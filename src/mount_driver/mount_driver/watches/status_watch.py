@@ -49,7 +49,8 @@ class StatusWatch:
         limits = self._limits
         for name, remedy in _OFF.items():
             if getattr(status, name):
-                return f'the electronics report {name} ({celsius:.1f} degC, {voltage:.2f} V): {remedy}'
+                values = f'is 1, must be 0; {celsius:.1f} degC, {voltage:.2f} V'
+                return f'the electronics report {name} ({values}): {remedy}'
         if voltage < limits.lowest_supply or voltage > limits.highest_supply:
             within = f'{limits.lowest_supply:g} .. {limits.highest_supply:g} V'
             return f'supply voltage ({voltage:.2f} V) must lie within {within}: check battery and generator'
@@ -66,5 +67,6 @@ class StatusWatch:
             missing = f'no status of the electronics for more than {self._limits.timeout:g} s'
             return f'{missing}: supply and coil temperature are not known; check bus and electronics'
         if self._status is not None and self._status.displacement_sensor:
-            return 'the electronics report displacement_sensor: check the sensor and its cable'
+            fault = 'a fault of the displacement sensor (displacement_sensor is 1, must be 0)'
+            return f'the electronics report {fault}: check the sensor and its cable'
         return ''
