@@ -3,6 +3,7 @@
 Times are those of the machine and are told, not asserted: what is asserted is what the graph does.
 """
 
+import faulthandler
 import json
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from mount_replay.faults.matrix import MATRIX
 from mount_ros.testing import free_domain
 
 THIRD = [case for case in MATRIX.values() if case.third]
-LIMIT = 600.0  # s: only a hang takes so long
+LIMIT = 1200.0  # s: it takes four minutes where nothing else runs; only a hang takes so long
 
 pytestmark = pytest.mark.real_time
 
@@ -23,6 +24,7 @@ pytestmark = pytest.mark.real_time
 @pytest.fixture(scope='session')
 def outcomes(tmp_path_factory):
     """The outcomes of the command, {fault: figures}."""
+    faulthandler.cancel_dump_traceback_later()  # the limit of a test that hangs; here LIMIT is
     folder = tmp_path_factory.mktemp('faults')
     with free_domain() as domain:
         ended = subprocess.run(

@@ -1,5 +1,8 @@
 """The judgement of a trial, from what was observed."""
 
+import time
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -7,7 +10,7 @@ from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.injections import Unchanged
 from mount_replay.faults.matrix import MATRIX
 from mount_replay.faults.observers import Heard, Observers, Seen, Told
-from mount_replay.faults.outcome import Course, judged
+from mount_replay.faults.outcome import Course, judged, tells
 from mount_replay.faults.page import write_page
 from mount_ros.nodes.diagnostics import Level
 from mount_sim.electronics.faults.kinds import FAULTS
@@ -23,10 +26,10 @@ def case(reaction: Reaction, **options) -> FaultCase:
 def observed(zero_at: float | None, until: float = 10.6, told: tuple[Told, ...] = ()) -> Observers:
     """What is seen of a graph that gives 1 A but for 0 A between two times (s)."""
     seen = Observers('')
-    for time in np.arange(9.0, 11.0, 1e-3):
-        off = zero_at is not None and zero_at <= time < until
-        seen.heard.append(Heard(float(time), 0.0 if off else 1.0))
-        seen.seen.append(Seen(float(time), 0.0 if off else 1.0, 0.0 if off else 1.0))
+    for at in np.arange(9.0, 11.0, 1e-3):
+        off = zero_at is not None and zero_at <= at < until
+        seen.heard.append(Heard(float(at), 0.0 if off else 1.0))
+        seen.seen.append(Seen(float(at), 0.0 if off else 1.0, 0.0 if off else 1.0))
     seen.told += told
     return seen
 
@@ -98,6 +101,23 @@ def test_what_the_electronics_follow_counts_where_frames_do_not_reach_them():
     assert not judged(case(Reaction.SAFE_WHILE), COURSE, seen).ok
 
 
+def test_a_trial_waits_for_the_end_of_what_would_pass_for_telling_of_its_fault():
+    now, well = time.monotonic(), 'link to the electronics is up'
+    picks = partial(tells, case(Reaction.SAFE_WHILE))
+    seen = observed(None, told=(told(now - 1.5), told(now - 0.5, well, Level.OK)))
+    assert seen.quiet(picks)
+    seen.told.append(Told(now - 0.2, 'mount_control', Level.WARN, SENTENCE))
+    assert not seen.quiet(picks)
+    seen.told.append(Told(now - 0.1, 'mount_control', Level.WARN, 'something else (1, limit 0); look'))
+    assert seen.quiet(picks)
+
+
+def test_a_graph_whose_driver_complains_or_is_silent_is_not_quiet():
+    now = time.monotonic()
+    assert not observed(None, told=(told(now - 60.0, 'well', Level.OK),)).quiet(lambda each: False)
+    assert not observed(None, told=(told(now - 0.5, 'anything', Level.WARN),)).quiet(lambda each: False)
+
+
 def test_every_fault_of_the_simulated_electronics_is_in_the_matrix():
     tried = {name.removesuffix('_at_start') for name in MATRIX}
     assert set(FAULTS) <= tried
@@ -110,11 +130,13 @@ def test_the_representative_third_is_about_a_third_and_has_every_reaction():
 
 
 def test_the_page_has_a_row_for_each_fault_and_says_what_is_wrong(tmp_path):
-    good = judged(case(Reaction.TOLD), COURSE, observed(None, told=(told(10.1, 'no frames: 1 | 2; look'),)))
+    sentence = 'no frames: 1 | 2; look (log: /home/me/runs/faults_12_3/log/mount_init.log)'
+    good = judged(case(Reaction.TOLD), COURSE, observed(None, told=(told(10.1, sentence),)))
     wrong = judged(case(Reaction.SAFE_WHILE), COURSE, observed(None))
     bad = FaultCase('other', 'meaning', Unchanged(), Reaction.SAFE_WHILE)
     write_page({case(Reaction.TOLD): good, bad: wrong}, tmp_path / 'faults.md')
     page = (tmp_path / 'faults.md').read_text()
     assert '| `name` | meaning | mount_driver | 100 |' in page
     assert '1 \\| 2' in page
+    assert '(log: bags/.../faults_12_3/log/mount_init.log)' in page  # not of the machine that wrote it
     assert 'NOT AS REQUIRED: nothing tells of it; the current does not stay at 0 A' in page

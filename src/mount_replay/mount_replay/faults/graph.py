@@ -14,8 +14,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from mount_bringup.graph.domain import DomainError, can_port, domain_lock
-from mount_bringup.graph.nodes import CONTROL, DRIVER, SIM, SIMULATED
-from mount_replay.faults.observers import Observers, since
+from mount_bringup.graph.nodes import CONTROL, SIM, SIMULATED
+from mount_replay.faults.observers import Observers, Told, since
 from mount_replay.faults.processes import (
     SHARED_MEMORY,
     Process,
@@ -23,7 +23,6 @@ from mount_replay.faults.processes import (
     process_of,
     shared_memory_of_others,
 )
-from mount_ros.nodes.diagnostics import Level
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
 START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws
@@ -139,11 +138,6 @@ class GraphUnderTest:
         enough = len(heard) > 0.8 * 1e3 * _SETTLED and len(seen) > 0.8 * 1e3 * _SETTLED
         return enough and min(each.current for each in heard) > 0.0 and seen[-1].followed > 0.0
 
-    def quiet(self) -> bool:
-        """Whether the node whose word counts for the link says that nothing is wrong any more."""
-        told = [each for each in self.observed.told if each.node == DRIVER.name]
-        return bool(told) and told[-1].level == Level.OK
-
     def wait_until(self, condition: Callable[[], bool], limit: float) -> bool:
         """Return whether `condition` came true within `limit` s; it cannot once the graph has ended."""
         end = time.monotonic() + limit
@@ -153,10 +147,14 @@ class GraphUnderTest:
             time.sleep(_LOOK_PERIOD)
         return True
 
-    def wait_for_damping(self, limit: float = START_PATIENCE) -> None:
-        """Return when it damps and nothing is wrong; raises `GraphUnderTestError` after `limit` s."""
-        if not self.wait_until(lambda: self.damping() and self.quiet(), limit):
-            what = 'has ended' if self.ended else f'does not damp within {limit:g} s'
+    def wait_for_damping(self, tells: Callable[[Told], bool], limit: float = START_PATIENCE) -> None:
+        """Return when it damps, nothing is wrong and no node tells what `tells` picks.
+
+        What an earlier fault has left in a verdict would pass for telling of the next one. Raises
+        `GraphUnderTestError` after `limit` s.
+        """
+        if not self.wait_until(lambda: self.damping() and self.observed.quiet(tells), limit):
+            what = 'has ended' if self.ended else f'does not damp without complaint within {limit:g} s'
             raise GraphUnderTestError(f'the graph {what}: {" ".join(self.output[-300:].split())}')
         self.note_what_it_holds()
 

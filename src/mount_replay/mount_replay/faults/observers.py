@@ -7,7 +7,7 @@ steady clock, s; those of frames are the kernel's.
 import bisect
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from operator import attrgetter
 from typing import NamedTuple, TypeVar
@@ -15,13 +15,16 @@ from typing import NamedTuple, TypeVar
 from rclpy.context import Context
 from rclpy.node import Node
 
+from mount_bringup.graph.nodes import DRIVER
 from mount_driver.bus import MULTICAST_GROUP, Reception, open_bus
 from mount_driver.codec import MountCodec, WrongCrcError, WrongLengthError
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.messages.verdicts import verdicts_of
+from mount_ros.nodes.diagnostics import Level
 from mount_ros.topics import AIR_GAP, DIAGNOSTICS, SIM_TRUTH
 
+_REPEATED = 3.0  # s, chosen: each node repeats its verdict once a second
 _LOOK_PERIOD = 0.1  # s: how often a listener looks whether it shall end
 
 
@@ -103,6 +106,13 @@ class Observers:
                 self.told.append(Told(now, node, told.level, told.sentence))
                 active = told.figures.get('state') == 'active'
                 (self.active.add if active else self.active.discard)(node)
+
+    def quiet(self, tells: Callable[[Told], bool]) -> bool:
+        """Whether the driver says that nothing is wrong, and no node tells any more what `tells` picks."""
+        latest = {each.node: each for each in since(self.told, time.monotonic() - _REPEATED)}
+        driver = latest.get(DRIVER.name)
+        well = driver is not None and driver.level == Level.OK
+        return well and not any(tells(each) for each in latest.values())
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from mount_replay.faults.outcome import AFTER_DETECTION, AFTER_OCCURRENCE, Outco
 
 Rows = Mapping[FaultCase, Outcome]
 
-_RUN_FOLDER = re.compile(r'/\S*_faults/')  # of the machine that wrote the page
+_RUN_FOLDER = re.compile(r'/\S*/(?=faults_\d+_\d+/)')  # of the machine that wrote the page
 HEADS = ('fault', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recovery')
 _INTRODUCTION = """# Faults
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 
 from rclpy.context import Context
 from rclpy.node import Node
@@ -16,12 +17,13 @@ from mount_replay.faults.graph import Ending, GraphUnderTest, GraphUnderTestErro
 from mount_replay.faults.injections import NonsenseTakenError, clock_environment
 from mount_replay.faults.kept import lost_while
 from mount_replay.faults.observers import observers
-from mount_replay.faults.outcome import Outcome
+from mount_replay.faults.outcome import Outcome, tells
 from mount_replay.faults.trial import tried
 from mount_ros.nodes.hosting import ros_context
+from mount_ros.nodes.sliding_window import WINDOW
 
 _TRIALS = 2  # chosen: a machine with other work is late now and then
-_PATIENCE = 6.0  # s, chosen: for damping in a graph that has seen faults
+_PATIENCE = WINDOW + 4.0  # s, chosen: for damping without complaint in a graph that has seen faults
 _CODES = (0, 1, 130)  # of `drive`: nothing wrong, something wrong, interrupted
 
 Progress = Callable[[float, str], None]
@@ -114,14 +116,14 @@ class _Session:
         if running is not None:
             try:
                 if running.kind == _kind(case):
-                    running.graph.wait_for_damping(_PATIENCE)
+                    running.graph.wait_for_damping(partial(tells, case), _PATIENCE)
                     return running
             except GraphUnderTestError:
                 pass  # what came before has spoiled it
             self.end_graph()
         running = self._running = self._started(case)
         if case.reaction is not Reaction.NOT_STARTED:
-            running.graph.wait_for_damping()
+            running.graph.wait_for_damping(partial(tells, case))
         return running
 
     def _started(self, case: FaultCase) -> _Running:
