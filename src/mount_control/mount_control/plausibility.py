@@ -12,7 +12,7 @@ import numpy as np
 
 from mount_control.parameters import ControlParameters
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
+from mount_models.arithmetic.record import record_bytes, record_dtype
 
 HOLD = 1.0
 """After the last implausible sample none is believed for so long, s; chosen."""
@@ -21,7 +21,6 @@ _LEAST_NOISE = 0.5e-6  # m, chosen: five steps of the signal; a sensor with less
 _ORDER = 4  # of the difference that leaves noise and takes motion away: at 50 Hz 1 % of it remains
 _NOISE_OF_DIFFERENCE = math.sqrt(70.0 * 2.0 / math.pi)  # mean of |4th difference| of white noise of 1
 _SHARE = 10.0  # 1/s, chosen: of each sample in the mean, over about 0.1 s
-_KEPT = 64  # samples, chosen: the memory is kept so often, to go back to before the first in doubt
 _CUT = 4.0  # chosen: of the limit; no single reading counts for more
 
 
@@ -45,14 +44,23 @@ class Limits(NamedTuple):
     hold: int
 
 
+class Known(NamedTuple):
+    """The newest displacements (m), how many are `known`, their noise (m); the last doubt and its value."""
+
+    newest: float
+    second: float
+    third: float
+    fourth: float
+    noise: float
+    value: float
+    known: int
+    repeats: int
+    held: int
+    doubt: int
+
+
 LIMITS = record_dtype(Limits)
-MEMORY = record_type(
-    [
-        *((name, 'f8') for name in ('newest', 'second', 'third', 'fourth', 'noise', 'value')),
-        *((name, 'i8') for name in ('known', 'repeats', 'held', 'doubt')),
-    ]
-)
-"""The newest displacements (m), how many are `known`, their noise (m); the last doubt and its value."""
+MEMORY = record_dtype(Known)
 
 
 class Plausibility:
@@ -119,54 +127,75 @@ def doubt_of(limits, memory, displacement, missing):
     `limits` and `memory` are the bytes of their records. A doubt lasts for `Limits.hold` samples from the
     last reason on. More missing samples than displacements are kept leave nothing to compare with.
     """
-    law, now = limits.view(LIMITS)[0], memory.view(MEMORY)[0]
-    now.held = max(0, now.held - 1 - missing)
-    if missing > 0:
-        now.known = min(now.known, 1)
-    _compare(law, now, displacement, missing)
-    now.fourth, now.third, now.second, now.newest = now.third, now.second, now.newest, displacement
-    now.known = min(now.known + 1, _ORDER)
+    now = _taken(limits.view(LIMITS)[0], _known(memory), displacement, missing)
+    _keep(memory, now)
     return now.held > 0
 
 
 @compiled
-def _compare(law, now, displacement, missing):
-    if now.known == 0:
-        return
-    velocity = abs(displacement - now.newest) / ((missing + 1) * law.sample_time)
-    if velocity > law.velocity:
-        _raise(law, now, _STEP, velocity)
-    if displacement == now.newest:
-        now.repeats += 1
-        if now.repeats >= law.stuck and now.noise >= _LEAST_NOISE:
-            _raise(law, now, _STUCK, displacement)
-        return
-    now.repeats = 0
-    if now.known == _ORDER:
-        difference = displacement - 4.0 * (now.newest + now.third) + 6.0 * now.second + now.fourth
-        noise = min(abs(difference) / _NOISE_OF_DIFFERENCE, _CUT * law.noise)
-        now.noise += law.share * (noise - now.noise)
-        if now.noise > law.noise:
-            _raise(law, now, _NOISE, now.noise)
+def _taken(law, before, displacement, missing):
+    """Return what is known after one more displacement (m)."""
+    known = min(before.known, 1) if missing > 0 else before.known
+    noise, repeats = before.noise, before.repeats
+    doubt = max(0, before.held - 1 - missing), before.doubt, before.value
+    if known > 0:
+        velocity = abs(displacement - before.newest) / ((missing + 1) * law.sample_time)
+        if velocity > law.velocity:
+            doubt = _raised(law, doubt, _STEP, velocity)
+        if displacement == before.newest:
+            repeats += 1
+            if repeats >= law.stuck and noise >= _LEAST_NOISE:
+                doubt = _raised(law, doubt, _STUCK, displacement)
+        else:
+            repeats = 0
+            if known == _ORDER:
+                noise += law.share * (_noise(law, before, displacement) - noise)
+                if noise > law.noise:
+                    doubt = _raised(law, doubt, _NOISE, noise)
+    held, reason, value = doubt
+    newest = displacement, before.newest, before.second, before.third
+    return Known(*newest, noise, value, min(known + 1, _ORDER), repeats, held, reason)
 
 
 @compiled
-def _raise(law, now, doubt, value):
-    """Note a doubt; while one lasts, the first is told."""
-    if now.held == 0:
-        now.doubt, now.value = doubt, value
-    now.held = law.hold
+def _noise(law, before, displacement):
+    """Return the noise (m) that one more displacement tells, no more than a single reading counts for."""
+    difference = displacement - 4.0 * (before.newest + before.third) + 6.0 * before.second + before.fourth
+    return min(abs(difference) / _NOISE_OF_DIFFERENCE, _CUT * law.noise)
+
+
+@compiled
+def _raised(law, doubt, reason, value):
+    """Return (samples for which it is held, reason, value) of a doubt; while one lasts, the first is told."""
+    held, told, its_value = doubt
+    return (law.hold, told, its_value) if held > 0 else (law.hold, reason, value)
 
 
 @compiled
 def _believed(limits, memory, displacements):
-    before, begin = memory.copy(), 0
+    law, now = limits.view(LIMITS)[0], _known(memory)
     for index in range(len(displacements)):
-        if index == begin + _KEPT:
-            before[:], begin = memory, index
-        if doubt_of(limits, memory, displacements[index], 0):
-            memory[:] = before
-            for known in range(begin, index):
-                doubt_of(limits, memory, displacements[known], 0)
+        after = _taken(law, now, displacements[index], 0)
+        if after.held > 0:
+            _keep(memory, now)
             return index
+        now = after
+    _keep(memory, now)
     return len(displacements)
+
+
+@compiled
+def _known(memory):
+    """Return what the bytes `memory` hold."""
+    now = memory.view(MEMORY)[0]
+    displacements = now.newest, now.second, now.third, now.fourth
+    return Known(*displacements, now.noise, now.value, now.known, now.repeats, now.held, now.doubt)
+
+
+@compiled
+def _keep(memory, known):
+    """Let the bytes `memory` hold what is known."""
+    now = memory.view(MEMORY)[0]
+    now.newest, now.second, now.third, now.fourth = known.newest, known.second, known.third, known.fourth
+    now.noise, now.value, now.known = known.noise, known.value, known.known
+    now.repeats, now.held, now.doubt = known.repeats, known.held, known.doubt

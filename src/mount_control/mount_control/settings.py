@@ -24,6 +24,10 @@ FRICTION = {'friction': FrictionCoefficients(), 'contact': FrictionContact()}
 """The sets of parameters that a specimen may know better, by their prefixes."""
 
 
+class NoEffectError(ParameterError):
+    """A parameter belongs to another policy than the chosen one; the text names both."""
+
+
 class ControlSettings(NamedTuple):
     """Parameters, the policy and what it made of its own, and the friction that the controller assumes."""
 
@@ -105,13 +109,13 @@ def without_effect(names: Iterable[str], chosen: str) -> str:
 
 
 def check_effect(values: Mapping[str, Any], chosen: str = '') -> None:
-    """Raise `ParameterError` if {parameter: value} name one of another policy than the chosen one.
+    """Raise `NoEffectError` if {parameter: value} name one of another policy than the chosen one.
 
     That is the one that they name, else `chosen`, else the default.
     """
     policy = values.get('policy') or chosen or ControlParameters().policy
     if sentence := without_effect(values, policy):
-        raise ParameterError(sentence)
+        raise NoEffectError(sentence)
 
 
 def check_fits(parameters: ControlParameters, specimen: Specimen) -> None:

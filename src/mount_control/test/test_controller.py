@@ -8,12 +8,8 @@ from hypothesis import given
 from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
 
-from mount_control.controller import (
-    FARTHEST_DISPLACEMENT,
-    ControlLaw,
-    Controller,
-    compiled_with,
-)
+from mount_control.compiled_steps import FARTHEST_DISPLACEMENT, compiled_with
+from mount_control.controller import ControlLaw, Controller
 from mount_control.force_maker import FADE_TIME
 from mount_control.policy import switched_viscous
 from mount_control.policy.contract import trace_fields
@@ -303,6 +299,30 @@ def test_a_table_or_a_law_that_is_no_number_never_becomes_a_current(make_control
     assert (traces['current'] == 0.0).all()
     assert (traces['damping_active'] == 0.0).all()
     assert controller.faults > 0
+
+
+def _window_ahead(memory):
+    place = int(memory.state.view(PAPER.state)['policy']['switching']['place'][0])
+    memory.window[(place + 100) % len(memory.window)] = math.nan
+
+
+def _highest_currents(memory):
+    memory.tables.current[len(memory.tables.current) // 4 :] = math.nan
+
+
+@pytest.mark.parametrize('spoil', [_window_ahead, _highest_currents])
+def test_a_run_in_which_the_memory_is_spoiled_equals_single_steps(make_controller, sine, spoil):
+    displacement = sine(8.0, 1e-3, 1.2)
+    single, whole = make_controller(), make_controller()
+    for controller in (single, whole):
+        controller.run(displacement[:507])
+        spoil(controller.memory)
+    traces = whole.run(displacement[507:])
+    for x, trace in zip(displacement[507:], traces, strict=True):
+        single.step(x)
+        assert single.trace_bytes == trace.tobytes()
+    assert whole.faults == single.faults > 0
+    assert (traces['damping_active'][:100] == 1.0).any()  # it is spoiled later, within a run
 
 
 # Another law while the controller works.

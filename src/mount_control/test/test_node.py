@@ -422,12 +422,11 @@ def test_a_refusal_is_not_the_end(configured, around):
 def test_a_message_that_is_no_table_takes_the_old_one_away(configured, around):
     control = configured()
     around.initialise()
+    wait_until(lambda: control._activation.table is not None, 'the table')
     message = to_message(ACTIVATION, [[0.47, 3.0], [0.0, 300.0]])
     message.layout.dim[1].label = 'of yesterday'
     around.send_raw_table(serialised(message))
-    wait_until(
-        lambda: control._activation.air_gap is not None and control._activation.table is None, 'the message'
-    )
+    wait_until(lambda: control._activation.table is None, 'the message')
     assert control.trigger_activate() == FAILURE
     assert 'no current_force_table was received' in control._refusal
 
