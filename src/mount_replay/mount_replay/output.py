@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mount_bags.bag.writer import BagWriter
+from mount_bags.container.writer import LONG_CHUNK_SIZE
 from mount_bags.run.session import session_message, session_text
 from mount_replay.core import OFF, ControlAnswers, Replayed
 from mount_replay.given.input import ReplayInput
@@ -32,7 +33,7 @@ _Entry = tuple[int, int, Topic, bytes]  # log time ns, place among equals, topic
 
 def write_replay(folder: Path, given: ReplayInput, replayed: Replayed, session: dict[str, Any]) -> None:
     """Write the recording; the same replay gives the same messages at the same log times every time."""
-    writer = BagWriter(folder)
+    writer = BagWriter(folder, chunk_size=LONG_CHUNK_SIZE)
     prefix = given.messages[topics.DISPLACEMENT.name].name.removesuffix(topics.DISPLACEMENT.name)
     for topic in _WRITTEN:
         writer.add_topic(prefix + topic.name, topic.type)

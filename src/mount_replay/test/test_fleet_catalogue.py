@@ -15,13 +15,13 @@ import pytest
 
 import mount_bags
 from mount_bags.messages.compact_times import compact
+from mount_bags.messages.packed_column import packed
 from mount_replay.fleet.catalogue.columns import BANDS, EVENTS, RECORDINGS, band_name
 from mount_replay.fleet.catalogue.in_bands import in_bands
 from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.journal import Journal
 from mount_replay.fleet.catalogue.places import places
-from mount_replay.fleet.catalogue.reading import read_place
-from mount_replay.fleet.catalogue.rows import rows_of
+from mount_replay.fleet.catalogue.reading import read_place, rows_at
 from mount_replay.fleet.catalogue.stored import CatalogueError, read_catalogue
 from mount_replay.fleet.columns import schema_of
 
@@ -198,7 +198,7 @@ def test_a_copy_elsewhere_has_the_same_row_but_for_its_address(drives, tmp_path)
             shutil.copy(drives / recording, copy)
         else:
             shutil.copytree(drives / recording, copy)
-        assert rows_of(copy, place) == rows_of(drives / recording, place)
+        assert rows_at(copy, place) == rows_at(drives / recording, place)
 
 
 def test_pieces_of_one_recording_are_one_place_and_files_of_their_own_are_several(tmp_path):
@@ -231,7 +231,7 @@ def test_a_sine_is_in_its_own_band_alone():
     stamps = compact(np.arange(40_000) * 1_000_000)
     values = 1e-3 * np.sin(2 * np.pi * 8.0 * time) + 5e-3
     values[1000:1003] = np.nan
-    found = dict(zip(BANDS, in_bands(stamps, values, 1000.0, BANDS), strict=True))
+    found = dict(zip(BANDS, in_bands(stamps, packed(values), 1000.0, BANDS), strict=True))
     own = found.pop((3.0, 14.0))
     assert own.rms == pytest.approx(1e-3 / np.sqrt(2), rel=0.01)
     assert own.peak == pytest.approx(1e-3, rel=0.2)
@@ -240,14 +240,14 @@ def test_a_sine_is_in_its_own_band_alone():
 
 def test_the_length_of_a_piece_does_not_change_what_is_in_bands(monkeypatch):
     stamps = compact(np.arange(5_000) * 1_000_000)
-    values = np.random.default_rng(1).normal(size=5_000)
+    values = packed(np.random.default_rng(1).normal(size=5_000))
     whole = in_bands(stamps, values, 1000.0, BANDS)
     monkeypatch.setattr('mount_replay.fleet.catalogue.in_bands._PIECE', 333)
     assert np.allclose(in_bands(stamps, values, 1000.0, BANDS), whole, rtol=1e-12)
 
 
 def test_too_short_a_signal_is_in_no_band():
-    assert np.isnan(in_bands(compact(np.arange(10) * 1_000_000), np.ones(10), 1000.0, BANDS)).all()
+    assert np.isnan(in_bands(compact(np.arange(10) * 1_000_000), packed(np.ones(10)), 1000.0, BANDS)).all()
 
 
 def test_every_column_has_a_meaning_and_what_has_a_unit_says_it():

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mount_bags.bag.recording import Recording
 from mount_replay.fleet import before_and_after as pictures
 from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.places import places
@@ -123,6 +124,16 @@ def test_without_a_mapping_file_only_a_file_that_is_named_is_looked_at(drives, t
 def test_tables_of_a_fleet_and_what_lies_in_a_run_are_no_files_of_others(drives, said, tmp_path, inside):
     indexed([drives], drives / 'catalogue', said)
     assert len(indexed([drives], tmp_path / 'catalogue', said).recordings) == 7
+
+
+def test_a_recording_of_this_project_is_opened_once(drives, said, tmp_path, inside, monkeypatch):
+    opened, opens = [], Recording._open
+    monkeypatch.setattr(Recording, '_open', lambda self: (opened.append(self.path), opens(self))[1])
+    indexed([drives / 'run'], tmp_path / 'catalogue', said)
+    assert opened == [drives / 'run' / 'recording']
+    opened.clear()
+    replayed(FleetOrder([str(drives / 'run')], CHANGES, said=said), tmp_path / 'result')
+    assert opened == [drives / 'run' / 'recording']
 
 
 def test_an_array_with_its_times_is_one_place(tmp_path):

@@ -36,6 +36,16 @@ def test_a_wrong_table_is_told_with_those_that_exist(catalogue):
         query(catalogue, 'select * from events')
 
 
+def test_a_question_that_names_no_table_is_told_the_tables_alone(catalogue):
+    with pytest.raises(QueryError, match=r'syntax error.*; tables: recordings$'):
+        query(catalogue, 'selct uri')
+
+
+def test_a_file_in_place_of_its_folder_is_refused_with_the_folder(catalogue):
+    with pytest.raises(QueryError, match=f'is a file; name the folder that it is in, {catalogue}$'):
+        query(catalogue / 'recordings.parquet', 'select uri from recordings')
+
+
 @pytest.mark.parametrize(
     'sql',
     [

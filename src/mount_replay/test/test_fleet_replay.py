@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mount_bags.container.writer import LONG_CHUNK_SIZE
+from mount_bags.edit.cut import cut
 from mount_bags.run.place import open_run
 from mount_bags.run.session import session_text
 from mount_bringup.sample_rate import with_sample_rate
@@ -65,6 +67,12 @@ def driven(tmp_path_factory):
     parameters = {'mount_sim': {'scenario': 'motorway', 'timeline.duration': 5.0}}
     record_core(folder, parameters, session_text({'parameters': parameters}))
     return folder
+
+
+def test_what_can_be_made_again_is_written_in_long_chunks(driven, tmp_path):
+    cut(open_run(driven), tmp_path / 'piece', 1.0, 4.0)
+    for folder in (driven, tmp_path / 'piece'):
+        assert open_run(folder).files[0].chunks.rows['size'].max() >= LONG_CHUNK_SIZE
 
 
 @pytest.mark.parametrize('length', [700, 1500])
@@ -122,6 +130,24 @@ def test_a_damaged_recording_is_a_row_with_its_reason(fleet, tmp_path, serial):
     assert str(tmp_path) not in table[0]['reason']
 
 
+def test_a_recording_with_another_policy_is_told_apart_from_one_that_failed(fleet, tmp_path, serial):
+    changes = parsed_changes({'continuous_viscous.full_amplitude': 0.0006})
+    outcome = replay_fleet(FleetOrder([str(fleet)], changes), tmp_path / 'result')
+    rows = outcome.table.to_pylist()
+    assert [row['outcome'] for row in rows] == ['failed', 'another policy', 'replayed', 'another policy']
+    assert 'of the policy continuous_viscous would have no effect' in rows[1]['reason']
+    assert [bool(row['sha256']) for row in rows] == [True, False, True, False]  # not read through
+    figures = outcome.figures()
+    names = ('recordings', 'replayed', 'another_policy', 'failed')
+    assert [figures[name] for name in names] == [4, 1, 2, 1]
+
+
+def test_a_recording_of_several_mounts_counts_once_as_failed_before_replayed():
+    outcomes = ('another policy', 'replayed', 'failed', 'replayed', 'another policy', 'another policy')
+    rows = [{'recording': name, 'outcome': each} for name, each in zip('aabbcc', outcomes, strict=True)]
+    assert run._outcomes(rows) == {'another policy': 1, 'replayed': 1, 'failed': 1}
+
+
 def test_another_order_into_the_same_result_is_refused(fleet, tmp_path, serial):
     replay_fleet(order_of(fleet), tmp_path / 'result')
     other = FleetOrder([str(fleet)], parsed_changes({'highest_current': 0.8}))
@@ -134,7 +160,7 @@ def test_the_same_order_again_reads_nothing_again(fleet, tmp_path, serial):
     content = first.result.read_bytes()
     serial.clear()
     again = replay_fleet(order_of(fleet), tmp_path / 'result')
-    assert (serial, again.before, again.failed) == ([], 4, 1)
+    assert (serial, again.before, again.figures()['failed']) == ([], 4, 1)
     assert again.result.read_bytes() == content
 
 

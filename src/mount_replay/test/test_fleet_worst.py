@@ -87,6 +87,8 @@ def test_recordings_that_were_moved_are_told(result):
 def test_a_column_without_numbers_is_refused_with_those_that_have_some(result):
     with pytest.raises(QueryError, match=r'is no column of numbers of result; there are size_bytes, '):
         worst(result, 'recording')
+    with pytest.raises(QueryError, match=r'of result; did you mean pad_energy_j or pad_energy_changed_j\?$'):
+        worst(result, 'pad_energi_j')
 
 
 def test_an_unfinished_result_says_how_to_go_on(result):

@@ -9,7 +9,7 @@ from mount_replay.drive.recorded_file import recorded_acceleration
 from mount_sim.excitation.recorded import acceleration_at
 from mount_sim.excitation.recorded import recorded_acceleration as read_by_simulator
 
-MOTORWAY = Path(__file__).parents[4] / '../shared/data/motorway_i280'
+MOTORWAY = Path(__file__).resolve().parents[4] / 'shared' / 'data' / 'motorway_i280'
 
 
 def driven(tmp_path, file, columns, **more):

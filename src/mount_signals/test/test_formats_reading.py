@@ -62,6 +62,7 @@ def test_the_provenance_tells_the_bytes(made):
             for one in sorted(file.path.rglob('*')) if one.is_file()
         ]  # fmt: skip
         assert told.sha256 == hashlib.sha256(''.join(lines).encode()).hexdigest()
+        assert told.size == sum(one.stat().st_size for one in file.path.rglob('*') if one.is_file())
 
 
 def test_a_column_that_is_not_there_is_refused_with_those_that_are(made):

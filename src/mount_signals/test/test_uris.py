@@ -11,6 +11,7 @@ WITH_SECRETS = [
     f'sftp://driver:{SECRET}@host/drives/a.mcap',
     f'sftp://driver:{SECRET}@host',
     f's3://key:{SECRET}@bucket/a.mcap',
+    f's3://bucket/a.mcap?X-Amz-Signature={SECRET}',
     f'https://host/a.mcap?X-Amz-Signature={SECRET}&X-Amz-Date=1',
     f'https://host/a.mcap?name=a&token={SECRET}',
     f'HTTPS://driver:{SECRET}@host/a.mcap',

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.run.place import open_mount
-from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from mount_replay.fleet.what_if.closed_loop import both_motions
 from mount_replay.fleet.what_if.compared import recorded_in
 from mount_replay.given.taken import ReplayError
@@ -69,7 +69,7 @@ def before_and_after(
 
 @contextlib.contextmanager
 def _as_recording(path: Path, said: Said, closed_loop: bool) -> Iterator[Path]:
-    if is_of_others(path, said):
+    if own_recording(path, said) is None:
         with as_recording(mapped_in(path, said), closed_loop=closed_loop) as made:
             yield made
     else:

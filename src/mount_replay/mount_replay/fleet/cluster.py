@@ -119,6 +119,8 @@ def _configuration(scratch: str) -> dict[str, Any]:
         'distributed.scheduler.allowed-failures': 0,  # the runner counts them
         'distributed.scheduler.worker-saturation': 1.0,
         'distributed.worker.profile.enabled': False,  # its samples cost some per cent, and nothing reads them
+        # Dask's own limit lets each array of more than 128 KiB be mapped anew, page by page.
+        'distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_': None,
         'distributed.worker.multiprocessing-method': 'spawn',  # this process may hold threads of middleware
         # Nothing is kept at a worker, so there is nothing to spill; a worker that is too large is replaced.
         'distributed.worker.memory.target': False,

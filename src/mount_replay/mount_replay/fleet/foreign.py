@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import ReadingError
+from mount_bags.bag.recording import Recording
 from mount_bags.run.place import open_run
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading
@@ -102,22 +102,22 @@ class Mapped:
         return replace(self.mapping, columns=columns, others={})
 
 
-def is_of_others(path: Path, said: Said) -> bool:
-    """Return whether `path` is read by a mapping: a file of others, or a bag with what a mapping file names.
+def own_recording(path: Path, said: Said) -> Recording | None:
+    """Return the recording of this project at `path`, None for what is read by a mapping.
 
-    A recording with the displacement of a mount is one of this project.
+    That is a file of others, or a bag with what a mapping file names and without the displacement of a mount.
+    Raises `ReadingError` for a recording of which nothing is readable.
     """
     if is_foreign(path):
-        return True
-    if not said.mappings:
-        return False
+        return None
+    recording = open_run(path)
+    if recording.mounts or not said.mappings:
+        return recording
     try:
-        if open_run(path).mounts:
-            return False
         mapped_in(path, said)
-    except (ReadingError, ValueError):
-        return False
-    return True
+    except ValueError:
+        return recording
+    return None
 
 
 def columns_in(path: Path, said: Said) -> tuple[Heading, ...]:

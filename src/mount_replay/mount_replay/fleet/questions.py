@@ -57,6 +57,8 @@ def tables_of(folder: str | os.PathLike[str]) -> dict[str, 'pyarrow.dataset.Data
     `QueryError`.
     """
     dataset = required('pyarrow.dataset', TABLES)
+    if Path(folder).is_file():
+        raise QueryError(f'{folder} is a file; name the folder that it is in, {Path(folder).parent}')
     there = _files(Path(folder))
     if not there and (Path(folder) / ORDER).is_file():
         raise QueryError(f'{folder} is not finished; the same engine-mount fleet replay goes on with it')
@@ -117,8 +119,7 @@ def _sentence(reason: str, sql: str, tables: dict[str, 'pyarrow.dataset.Dataset'
     first = reason.split('\n')[0].rstrip(' !.')
     if 'file system operations are disabled' in reason or 'disabled through configuration' in reason:
         first = 'a question reads the tables of its folder and nothing else'
-    asked = [name for name in tables if name in sql] or list(tables)
-    there = [f'{name} has {", ".join(tables[name].schema.names)}' for name in asked]
-    if 'Table with name' in reason:
+    there = [f'{name} has {", ".join(table.schema.names)}' for name, table in tables.items() if name in sql]
+    if 'Table with name' in reason or not there:
         there = [f'tables: {", ".join(tables)}']
     return '; '.join([first, *there])

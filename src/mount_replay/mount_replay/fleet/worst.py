@@ -1,5 +1,6 @@
 """Which recordings of a fleet to look at: those with the largest values in a column."""
 
+import difflib
 import json
 import os
 import shlex
@@ -141,4 +142,6 @@ def _order_of(folder: str | os.PathLike[str]) -> dict[str, Any]:
 def _check_column(schema: Any, table: str, by: str) -> None:
     numbers = [field.name for field in schema if str(field.type) in ('double', 'int64')]
     if by not in numbers:
-        raise QueryError(f'{by!r} is no column of numbers of {table}; there are {", ".join(numbers)}')
+        near = difflib.get_close_matches(by, numbers, n=3)
+        hint = f'did you mean {" or ".join(near)}?' if near else f'there are {", ".join(numbers)}'
+        raise QueryError(f'{by!r} is no column of numbers of {table}; {hint}')

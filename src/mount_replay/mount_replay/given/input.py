@@ -127,7 +127,7 @@ def recorded_gaps(recording: Recording, without: MeasuredGap | None = None) -> l
     if not gaps:
         raise ReplayError(
             f'{recording.path} holds no air_gap with its current_force_table, so no current can be told; '
-            'give one of another recording with --table RECORDING, or --table default'
+            'engine-mount replay takes one of another recording with --table RECORDING, or --table default'
         )
     return gaps
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mount_bags.bag.split import WHOLE, SplitRule
 from mount_bags.bag.writer import BagWriter
+from mount_bags.container.writer import LONG_CHUNK_SIZE
 from mount_bags.run.session import session_message
 from mount_bringup.chosen import Parameters
 from mount_replay.loop.car import run_car_into
@@ -35,7 +36,8 @@ def record_core(
     `session` is the text of the session message; `progress` takes the share that is done. `excitation`
     is that of the scenario where it is built already.
     """
-    writer, begin = BagWriter(folder, split=split), time.time_ns() if begin is None else begin
+    writer = BagWriter(folder, split=split, chunk_size=LONG_CHUNK_SIZE)
+    begin = time.time_ns() if begin is None else begin
     mount = _MountWriter(writer, namespace, begin, set())
     try:
         mount.begin(session)
@@ -60,7 +62,8 @@ def record_car(
     `sessions` are the texts of the session messages by the names of the mounts, which are namespaces within
     `namespace`.
     """
-    writer, begin = BagWriter(folder, split=split), time.time_ns() if begin is None else begin
+    writer = BagWriter(folder, split=split, chunk_size=LONG_CHUNK_SIZE)
+    begin = time.time_ns() if begin is None else begin
     declared: set[str] = set()
     mounts = {name: _MountWriter(writer, f'{namespace}/{name}', begin, declared) for name in sessions}
     sinks: dict[str, CoreMessages] = {}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.writer import BagWriter
+from mount_bags.container.writer import LONG_CHUNK_SIZE
 from mount_bags.run.session import session_message, session_text
 from mount_bags.signals.signal import FloatArray
 from mount_ros.topics import SESSION
@@ -35,7 +36,7 @@ def write_channels(
     progress: Callable[[float], None] = lambda share: None,
 ) -> None:
     """Write the recording `folder`; log times are the stamps. `progress` takes the share that is done."""
-    writer = BagWriter(folder)
+    writer = BagWriter(folder, chunk_size=LONG_CHUNK_SIZE)
     begin = min(int(channel.stamps[0]) for channel in channels)
     end = max(int(channel.stamps[-1]) for channel in channels)
     try:

@@ -45,7 +45,7 @@ def checked(uri: str) -> str:
     if inside:
         raise SourceError(
             f'{shown(uri)} holds {inside}, which the history of the shell and the list of processes '
-            'tell others; leave it out: keys belong into the configuration of fsspec, of AWS or of ssh '
+            'tell others; leave it out: keys belong in the configuration of fsspec, of AWS or of ssh '
             '(README of mount_signals)'
         )
     return uri

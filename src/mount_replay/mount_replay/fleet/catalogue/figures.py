@@ -56,7 +56,7 @@ def state_figures(part: Recording, audits: Mapping[str, TopicAudit]) -> Figures:
             figures[column] = float(gap[name][-1])
     if _count(part, COIL_TEMPERATURE.name):
         figures['coil_temperature_degc'] = _highest(part[COIL_TEMPERATURE.name]['temperature'])
-    peak, trace, motion = PeakCurrent(part, audits), Trace(), Motion(_count(part, DISPLACEMENT.name))
+    peak, trace, motion = PeakCurrent(part, audits), Trace(), Motion()
     columns, takers = dict(peak.columns), dict.fromkeys(peak.columns, peak.add)
     for topic, taker in ((CONTROL_TRACE, trace), (DISPLACEMENT, motion)):
         if _count(part, topic.name):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mount_bags.messages.compact_times import compact
+from mount_bags.messages.packed_column import packed
 from mount_bags.signals.signal import SECOND, Signal
 from mount_models.sampling import SAMPLE_RATE
 from mount_replay.fleet.catalogue.columns import FOREIGN
@@ -80,4 +81,7 @@ def _of(signals: Mapping[str, Signal]) -> Figures:
     values = channels[0].values
     if ACCELERATION in signals:
         return {'rms_acceleration_m_s2': float(np.std(values))}
-    return {'samples': values.size, **motion_figures(compact(channels[0].stamps), values, SAMPLE_RATE)}
+    return {
+        'samples': values.size,
+        **motion_figures(compact(channels[0].stamps), packed(values), SAMPLE_RATE),
+    }

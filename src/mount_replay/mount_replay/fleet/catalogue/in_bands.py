@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mount_bags.messages.compact_times import CompactTimes
+from mount_bags.messages.packed_column import PackedColumn
 from mount_replay.fleet.catalogue.band_pass import BandPass, FloatArray
 
 _PIECE = 1 << 18  # samples, chosen
@@ -20,24 +21,21 @@ class InBand(NamedTuple):
 
 
 def in_bands(
-    stamps: CompactTimes, values: FloatArray, rate: float, bands: Sequence[tuple[float, float]]
+    stamps: CompactTimes, values: PackedColumn, rate: float, bands: Sequence[tuple[float, float]]
 ) -> list[InBand]:
     """Return peak and rms of a signal (n,) in each band (Hz), NaN where it is too short for one.
 
     The stamps (ns) rise. The signal is taken at even steps of `rate` (Hz), unknown and missing samples on a
     straight line between their neighbours, less its first value; it passes a causal Butterworth band-pass.
     """
-    known = np.isfinite(values)
-    ends = np.array([0, np.argmax(known), len(known) - 1 - np.argmax(known[::-1])])
-    times = stamps.at(ends)
-    first, last = ((times[1:] - times[0]) * 1e-9).tolist()
+    first, last, zero = _ends(stamps, values)
     count = math.floor((last - first) * rate + 0.5) + 1 if last > first else 0
     passes = [_Pass(band, rate) if count >= rate / band[0] else None for band in bands]
     if any(passes):
         for moved in _evenly(_samples(stamps, values), first, rate, count):
             for each in passes:
                 if each is not None:
-                    each.take(moved - values[ends[1]])
+                    each.take(moved - zero)
     # less than one period of its lowest frequency is too short
     return [InBand(math.nan, math.nan) if each is None else each.found(count) for each in passes]
 
@@ -57,12 +55,21 @@ class _Pass:
         return InBand(self._peak, math.sqrt(self._square / count))
 
 
-def _samples(stamps: CompactTimes, values: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _ends(stamps: CompactTimes, values: PackedColumn) -> tuple[float, float, float]:
+    """Return when the first and the last known sample are (s from the first stamp), and the first one."""
+    first = last = zero = math.nan
+    for times, known in _samples(stamps, values):
+        if len(known):
+            if math.isnan(first):
+                first, zero = float(times[0]), float(known[0])
+            last = float(times[-1])
+    return first, last, zero
+
+
+def _samples(stamps: CompactTimes, values: PackedColumn) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield times (s from the first stamp) and values of the samples that are known."""
-    begin, zero = 0, stamps.block(0)[0]
-    for block in stamps.blocks():
-        piece = values[begin : begin + len(block)]
-        begin += len(block)
+    zero = stamps.block(0)[0]
+    for block, piece in zip(stamps.blocks(), values.blocks(), strict=True):
         known = np.isfinite(piece)
         yield ((block - zero) * 1e-9)[known], piece[known]
 

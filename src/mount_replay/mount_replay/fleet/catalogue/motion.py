@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mount_bags.bag.column_parts import ColumnPart
-from mount_bags.messages.columns import FillingColumn
-from mount_bags.messages.compact_times import BLOCK, CompactTimes, compact
+from mount_bags.messages.compact_times import CompactTimes, compact
+from mount_bags.messages.packed_column import PackedColumn, packed
 from mount_bags.messages.stamps import FARTHEST, misdated
 from mount_replay.fleet.catalogue.columns import BANDS, band_name
 from mount_replay.fleet.catalogue.in_bands import FloatArray, in_bands
@@ -16,14 +16,13 @@ from mount_ros.topics import DISPLACEMENT
 
 
 class Motion:
-    """Stamps and displacement of all samples: some 10 bytes each."""
+    """Stamps and displacement of all samples: some 4 bytes each of what comes by CAN, at most 10."""
 
     COLUMNS = DISPLACEMENT.names
 
-    def __init__(self, expected: int = 0):
-        """Make room for the samples that are expected; more may come."""
+    def __init__(self) -> None:
         self._stamps = CompactTimes()
-        self._values = FillingColumn(expected, np.float64)
+        self._values = PackedColumn()
 
     def add(self, part: ColumnPart) -> None:
         """Take a part of the topic."""
@@ -34,23 +33,27 @@ class Motion:
         """Return peak and rms, of the whole displacement and in bands, {} where none is known."""
         return motion_figures(*self._by_stamps(), rate)
 
-    def _by_stamps(self) -> tuple[CompactTimes, FloatArray]:
+    def _by_stamps(self) -> tuple[CompactTimes, PackedColumn]:
         """Return the samples in the order of their stamps, of several with the same stamp the first.
 
         Those that are misdated are left out: between them and the others there is nothing to look at.
         """
-        stamps, values = self._stamps.finished(), self._values.filled
+        stamps, values = self._stamps.finished(), self._values.finished()
         if stamps.longest_step > FARTHEST:
             told = stamps.whole()
             sound = ~misdated(told)
-            stamps, values = compact(told[sound]), values[sound]
+            stamps, values = compact(told[sound]), packed(values.whole()[sound])
         if stamps.strictly_rising:
             return stamps, values
-        found, first = np.unique(stamps.whole(), return_index=True)
-        return compact(found), values[first]
+        rising, theirs = CompactTimes(), PackedColumn()
+        for numbers in stamps.overlapping():
+            found, first = np.unique(stamps.whole(numbers), return_index=True)
+            rising.add(found)
+            theirs.add(values.whole(numbers)[first])
+        return rising.finished(), theirs.finished()
 
 
-def motion_figures(stamps: CompactTimes, values: FloatArray, rate: float) -> dict[str, Any]:
+def motion_figures(stamps: CompactTimes, values: PackedColumn, rate: float) -> dict[str, Any]:
     """Return peak and rms of displacements (m) with rising stamps, as a whole and in bands; `rate` in Hz."""
     count = sum(map(len, _known(values)))
     if not count:
@@ -66,7 +69,6 @@ def motion_figures(stamps: CompactTimes, values: FloatArray, rate: float) -> dic
     return figures
 
 
-def _known(values: FloatArray) -> Iterator[FloatArray]:
+def _known(values: PackedColumn) -> Iterator[FloatArray]:
     """Yield the numbers among the values, piece by piece."""
-    pieces = (values[begin : begin + BLOCK] for begin in range(0, len(values), BLOCK))
-    return (piece[np.isfinite(piece)] for piece in pieces)
+    return (piece[np.isfinite(piece)] for piece in values.blocks())

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+from mount_bags.bag.recording import ReadingError
 from mount_replay.fleet.catalogue.columns import DRIVE, REPLAY
 from mount_replay.fleet.catalogue.places import Place
-from mount_replay.fleet.catalogue.rows import Rows, rows_of, unreadable
-from mount_replay.fleet.foreign import NOTHING_SAID, Said, is_of_others
+from mount_replay.fleet.catalogue.rows import Rows, named, rows_of, unreadable
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, own_recording
 from mount_signals.sources.source import StoreAwayError
 from mount_signals.sources.stores import local_copy
 
@@ -19,7 +20,7 @@ def read_place(place: Place, said: Said = NOTHING_SAID) -> Rows:
     """
     try:
         with local_copy(place.uri) as path:
-            rows = _rows_of_others(path, place, said) if is_of_others(path, said) else rows_of(path, place)
+            rows = rows_at(path, place, said)
     except StoreAwayError:
         raise
     except OSError as error:
@@ -29,7 +30,14 @@ def read_place(place: Place, said: Said = NOTHING_SAID) -> Rows:
     return rows
 
 
-def _rows_of_others(path: Path, place: Place, said: Said) -> Rows:
+def rows_at(path: Path, place: Place, said: Said = NOTHING_SAID) -> Rows:
+    """Return the rows of the recording, or file of others, at `path`, a copy of what lies at `place`."""
+    try:
+        recording = own_recording(path, said)
+    except ReadingError as error:
+        return unreadable(place, named(str(error), path, place), place.fingerprint)
+    if recording is not None:
+        return rows_of(recording, path, place)
     from mount_replay.fleet.catalogue.foreign import foreign_rows  # loads the simulator
 
     return foreign_rows(path, place, said)

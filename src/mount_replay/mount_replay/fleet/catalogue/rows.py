@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from mount_bags.bag.recording import ReadingError, Recording
+from mount_bags.container.free_memory import give_back
 from mount_bags.events.recorded_events import event_time, recorded_events
 from mount_bags.messages.series import SeriesError
-from mount_bags.run.place import open_run
 from mount_bags.run.session import session_parameters
 from mount_bags.run.told import duration_of, started_of, told_session, versions_told
 from mount_bringup.changed_parameters import changed_parameters
@@ -41,14 +41,11 @@ def unreadable(place: Place, reason: str, fingerprint: str) -> Rows:
     return Rows([row | {'fingerprint': fingerprint}])
 
 
-def rows_of(path: Path, place: Place) -> Rows:
-    """Return the rows of the recording at `path`, one for each of its mounts."""
-    try:
-        recording = open_run(path)
-    except ReadingError as error:
-        return unreadable(place, named(str(error), path, place), place.fingerprint)
+def rows_of(recording: Recording, path: Path, place: Place) -> Rows:
+    """Return the rows of a recording, which lies at `path`, one for each of its mounts."""
     rows = Rows()
     for part in recording.by_mount():
+        give_back()
         reasons: list[str] = []
         row = {**place_of(place), 'mount': part.mount, 'messages': recording.message_count}
         content = told_session(part)
@@ -132,6 +129,7 @@ def _guarded(part: Recording, reasons: list[str], events: list[Row], row: Row) -
     try:
         figures, audits = lost_figures(part)
         yield figures
+        give_back()
         yield state_figures(part, audits)
         events += _events_of(part, row)
     except (ReadingError, SeriesError, ValueError, KeyError, IndexError) as error:

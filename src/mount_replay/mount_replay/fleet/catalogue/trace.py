@@ -7,7 +7,7 @@ import numpy as np
 
 from mount_bags.bag.column_parts import ColumnPart
 from mount_bags.events.switching_trace import SwitchingTrace
-from mount_bags.messages.compact_times import BLOCK
+from mount_bags.messages.packed_column import BLOCK
 
 
 class Trace:

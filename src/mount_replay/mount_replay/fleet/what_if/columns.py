@@ -5,15 +5,21 @@ from mount_replay.fleet.columns import COUNT, FLAG, NUMBER, TEXT, Column
 SETPOINTS, DISPLACEMENT = 'setpoints', 'displacement'
 """What a row answers: other setpoints to the recorded displacement, or another displacement."""
 
+REPLAYED, ANOTHER_POLICY, FAILED = 'replayed', 'another policy', 'failed'
+"""What came of a recording; the change does not concern one whose policy lacks a changed parameter."""
+
 _CHANGED = 'the same with the change'
 
 _RECORDING = (
     Column('recording', TEXT, '', 'path of the recording below what was asked for'),
     Column('mount', TEXT, '', 'which of several mounts, empty where there is one'),
     Column('reason', TEXT, '', 'why this recording has no figures, empty where it has'),
+    Column(
+        'outcome', TEXT, '', 'replayed, another policy (which does not have a changed parameter) or failed'
+    ),
     Column('asked', TEXT, '', 'setpoints (replayed) or displacement (simulated anew: --closed-loop)'),
     Column('size_bytes', COUNT, 'B', 'size of its files'),
-    Column('sha256', TEXT, '', 'SHA-256 of its MCAP files'),
+    Column('sha256', TEXT, '', 'SHA-256 of its MCAP files; null where all its mounts have another policy'),
     Column('recorded_with', TEXT, '', 'version of this project that made the recording, where it tells'),
     Column('replayed_with', TEXT, '', 'versions of the project and of the libraries that replayed it, JSON'),
     Column('mapping_file', TEXT, '', 'mapping file of a file of others; empty: read by titles and units'),

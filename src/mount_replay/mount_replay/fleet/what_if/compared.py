@@ -45,17 +45,22 @@ class Recorded:
 
 
 def recorded_in(recording: Recording) -> Recorded:
-    """Read what a recording says beside its samples; raises a `ValueError`."""
-    recording.load(topic.name for topic in _SELDOM if topic.name in recording)
+    """Read what a recording says beside its samples, not the whole of it; raises a `ValueError`."""
+    recording.load_alone(topic.name for topic in _SELDOM if topic.name in recording)
     notes = Notes()
     session = session_of(recording, notes)
     return Recorded(recording, session, parameters_of(session, notes))
 
 
-def changed_parameters(recorded: Recorded, changes: Parameters) -> dict[str, dict[str, Any]]:
-    """Return the parameters with the changes; raises a `ValueError` where a node would refuse them."""
+def check_concerned(recorded: Recorded, changes: Parameters) -> None:
+    """Raise `NoEffectError` where the policy lacks what is changed, or a `ValueError` for another rate."""
     refuse_other_rate(recorded.parameters, changes)
     check_effect(changes.get('mount_control', {}), control_parameters(recorded.parameters).policy)
+
+
+def changed_parameters(recorded: Recorded, changes: Parameters) -> dict[str, dict[str, Any]]:
+    """Return the parameters with the changes; raises a `ValueError` where a node would refuse them."""
+    check_concerned(recorded, changes)
     parameters = with_changes(recorded.parameters, changes)
     check_parameters(parameters)
     return parameters

@@ -1,5 +1,6 @@
 """One recording of a fleet: fetched, replayed as recorded and with the change, told as rows."""
 
+import functools
 import json
 import os
 import platform
@@ -9,13 +10,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import Recording, open_recording
+from mount_bags.bag.recording import open_recording
 from mount_bags.run.place import recording_hash, recording_place
 from mount_bags.run.versions import versions
+from mount_control.settings import NoEffectError
 from mount_replay.fleet.catalogue.places import Place
-from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, is_of_others, mapped_in
-from mount_replay.fleet.what_if.columns import DISPLACEMENT, SETPOINTS
-from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in
+from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
+from mount_replay.fleet.what_if.columns import ANOTHER_POLICY, DISPLACEMENT, FAILED, REPLAYED, SETPOINTS
+from mount_replay.fleet.what_if.compared import (
+    Recorded,
+    check_concerned,
+    compared_setpoints,
+    recorded_in,
+)
 from mount_signals.sources.source import StoreAwayError
 from mount_signals.sources.stores import local_copy
 
@@ -51,17 +58,12 @@ def replay_one(
     common = {'recording': asked.recording, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
     try:
         with local_copy(asked.uri) as path:
-            found = (
-                [_foreign_row(asked, path, changes, closed_loop, said)]
-                if is_of_others(path, said)
-                else _rows(asked, path, changes, closed_loop)
-            )
-            rows = tuple({**common, **row} for row in found)
+            rows = tuple({**common, **row} for row in _rows(asked, path, changes, closed_loop, said))
         fetched = True
     except StoreAwayError:
         raise
     except OSError as error:
-        rows, fetched = ({**common, 'mount': '', 'reason': str(error)},), False
+        rows, fetched = ({**common, 'mount': '', 'reason': str(error), 'outcome': FAILED},), False
     return Replayed(rows, fetched, time.process_time() - begin, worker)
 
 
@@ -82,44 +84,51 @@ def _foreign_row(asked: Place, path: Path, changes: Changes, closed_loop: bool, 
         mapped = mapped_in(path, said)
         row |= mapped.told
         with as_recording(mapped, closed_loop=closed_loop) as place:
-            row |= _figures(open_recording(place), changes, closed_loop) | {'recorded_with': ''}
+            row |= _figures(recorded_in(open_recording(place)), changes, closed_loop) | {'recorded_with': ''}
     except ValueError as error:
-        row['reason'] = _told(error, asked, path)
+        row |= _without_figures(error, asked, path)
     return row
 
 
-def _rows(asked: Place, path: Path, changes: Changes, closed_loop: bool) -> list[Row]:
-    place = recording_place(path)
+def _rows(asked: Place, path: Path, changes: Changes, closed_loop: bool, said: Said) -> list[Row]:
     try:
-        opened = open_recording(place)
+        opened = own_recording(path, said)
     except ValueError as error:
-        return [{'sha256': recording_hash(place), 'mount': '', 'reason': _told(error, asked, path)}]
-    whole = {'sha256': recording_hash(place, opened.files)}
+        unread = {'sha256': recording_hash(recording_place(path)), 'mount': ''}
+        return [unread | _without_figures(error, asked, path)]
+    if opened is None:
+        return [_foreign_row(asked, path, changes, closed_loop, said)]
+    whole = functools.cache(lambda: recording_hash(opened.path, opened.files))  # once, and where it is needed
     rows = []
     for recording in opened.by_mount():
-        row = {**whole, 'mount': recording.mount}
+        row: Row = {'mount': recording.mount}
         try:
-            row |= _figures(recording, changes, closed_loop)
+            recorded = recorded_in(recording)
+            check_concerned(recorded, changes)
+            whole()  # the checksum of the file is taken in the same pass
+            row |= _figures(recorded, changes, closed_loop)
         except ValueError as error:
-            row['reason'] = _told(error, asked, path)
+            row |= _without_figures(error, asked, path)
         rows.append(row)
+    if any(row['outcome'] != ANOTHER_POLICY for row in rows):
+        rows = [{'sha256': whole(), **row} for row in rows]
     return rows
 
 
-def _figures(recording: Recording, changes: Changes, closed_loop: bool) -> Row:
-    recorded = recorded_in(recording)
+def _figures(recorded: Recorded, changes: Changes, closed_loop: bool) -> Row:
     if closed_loop:
         from mount_replay.fleet.what_if.closed_loop import compared_motion  # loads the simulator
 
         figures = compared_motion(recorded, changes)
     else:
         figures = compared_setpoints(recorded, changes)
-    return {'reason': '', 'recorded_with': recorded.version, **figures}
+    return {'reason': '', 'outcome': REPLAYED, 'recorded_with': recorded.version, **figures}
 
 
-def _told(error: ValueError, asked: Place, path: Path) -> str:
-    """Return the reason with the path below what was asked for: the same from whatever store it comes."""
-    return str(error).replace(str(path), asked.recording)
+def _without_figures(error: ValueError, asked: Place, path: Path) -> Row:
+    """Return the reason, with the path below what was asked for: the same from whatever store it comes."""
+    outcome = ANOTHER_POLICY if isinstance(error, NoEffectError) else FAILED
+    return {'reason': str(error).replace(str(path), asked.recording), 'outcome': outcome}
 
 
 def _json(content: Mapping[str, Any]) -> str:

@@ -2,7 +2,8 @@
 
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,6 +16,7 @@ from mount_replay.fleet.cluster import LOCAL, processes_for
 from mount_replay.fleet.foreign import NOTHING_SAID, Said
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.fleet.what_if.asked import recordings_asked
+from mount_replay.fleet.what_if.columns import ANOTHER_POLICY, FAILED, REPLAYED
 from mount_replay.fleet.what_if.one import Replayed, Row, replay_one, told_of
 from mount_replay.fleet.what_if.result import Result
 from mount_signals.sources.uris import shown
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 _WRITTEN_AFTER = 5.0  # s, chosen: what a run that is killed does again
 _WRITTEN_TOGETHER = 200  # recordings, chosen
+_OF_SEVERAL = (ANOTHER_POLICY, REPLAYED, FAILED)  # the last of these that a mount has is its recording's
 _OF_A_WORKER = ('mount_bringup', 'numpy', 'numba', 'python')
 
 
@@ -71,6 +74,7 @@ class Advance:
 class FleetOutcome:
     """What came of an order; times in s, `busy` those of the processors. `before`: done by earlier runs.
 
+    `outcomes`: how many recordings were replayed, with another policy, and failed.
     `starting`: until the first recording was done, in which processes start and load libraries and laws.
     """
 
@@ -78,7 +82,7 @@ class FleetOutcome:
     result: Path
     recordings: int
     before: int
-    failed: int
+    outcomes: Mapping[str, int]
     wall: float
     starting: float
     busy: float
@@ -90,7 +94,9 @@ class FleetOutcome:
         """Return what `--json` writes; rates are those of this run, unknown is null."""
         return {
             'recordings': self.recordings,
-            'failed': self.failed,
+            'replayed': self.outcomes[REPLAYED],
+            'another_policy': self.outcomes[ANOTHER_POLICY],
+            'failed': self.outcomes[FAILED],
             'done_before': self.before,
             'wall_s': self.wall,
             'starting_s': self.starting,
@@ -130,7 +136,7 @@ def replay_fleet(
         result=result.table,
         recordings=len(asked),
         before=len(asked) - len(left),
-        failed=len({row['recording'] for row in table.to_pylist() if row['reason']}),
+        outcomes=_outcomes(table.select(['recording', 'outcome']).to_pylist()),
         wall=time.monotonic() - begin,
         starting=run.starting,
         busy=run.busy,
@@ -138,6 +144,16 @@ def replay_fleet(
         workers=run.at_a_time,
         not_fetched=run.not_fetched,
     )
+
+
+def _outcomes(rows: Iterable[Row]) -> dict[str, int]:
+    """Return how many recordings have each outcome."""
+    found: dict[str, str] = {}
+    for row in rows:
+        outcomes = (row['outcome'], found.get(row['recording'], row['outcome']))
+        found[row['recording']] = max(outcomes, key=_OF_SEVERAL.index)
+    counts = Counter(found.values())
+    return {outcome: counts[outcome] for outcome in _OF_SEVERAL}
 
 
 class _Run:
@@ -198,13 +214,14 @@ class _Run:
                 'mount': '',
                 'size_bytes': asked.size,
                 'reason': reason_of(done),
+                'outcome': FAILED,
             }
             row |= told_of(self._order.changes, self._order.closed_loop)
             replayed = Replayed((row,), False, 0.0, '')
         self.busy += replayed.busy
         self._processes |= {replayed.worker} - {''}
         self.replayed += max((row.get('duration_s') or 0.0 for row in replayed.rows), default=0.0)
-        self._failed += any(row['reason'] for row in replayed.rows)
+        self._failed += any(row['outcome'] == FAILED for row in replayed.rows)
         if not replayed.fetched:
             self.not_fetched += replayed.rows
             return
