@@ -13,7 +13,9 @@ from std_msgs.msg import String
 from mount_bags.bag.writer import BagWriter
 from mount_cli.command import main
 from mount_identification.rack.columns import RackRecordingError
-from mount_identification.rack.recordings import GivenValues, read_force, read_ripple
+from mount_identification.rack.force_points import read_force
+from mount_identification.rack.given import GivenValues
+from mount_identification.rack.ripple_recordings import read_ripple
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import evaluate

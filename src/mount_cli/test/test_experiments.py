@@ -18,7 +18,8 @@ from mount_experiments.inductance_map import experiment as inductance_map
 from mount_experiments.ramp_and_hold import experiment as ramp_and_hold
 from mount_experiments.registry import NAMES, experiment_named
 from mount_experiments.sawtooth import experiment as sawtooth
-from mount_identification.rack.recordings import GivenValues, read_ripple
+from mount_identification.rack.given import GivenValues
+from mount_identification.rack.ripple_recordings import read_ripple
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
 

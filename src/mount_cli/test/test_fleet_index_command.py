@@ -1,6 +1,7 @@
 """`fleet index`: what it says, its exit codes, its figures."""
 
 import json
+import shlex
 import shutil
 from pathlib import Path
 
@@ -24,6 +25,9 @@ def test_a_damaged_recording_is_counted_and_ends_nothing(tmp_path):
     assert done.exit_code == 0, done.output
     lines = done.output.split()
     assert lines[:8] == ['read', '2', 'unchanged', '0', 'vanished', '0', 'unreadable', '1']
+    assert '\nnote why 1 is unreadable: engine-mount fleet query ' in done.output
+    asked = shlex.split(done.output.rpartition('engine-mount ')[2])
+    assert 'second.mcap' in RUNNER.invoke(app, asked).output
     told = json.loads(figures.read_text())
     assert told.pop('wall_s') > 0.0
     assert told == {

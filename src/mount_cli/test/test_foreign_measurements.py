@@ -10,7 +10,9 @@ from mount_identification.friction.channels import said
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.recording import IdentificationError
 from mount_identification.rack.columns import RackRecordingError
-from mount_identification.rack.recordings import GivenValues, read_force, read_ripple
+from mount_identification.rack.force_points import read_force
+from mount_identification.rack.given import GivenValues
+from mount_identification.rack.ripple_recordings import read_ripple
 from mount_signals.units.mapping import Mapping, mapping_in_file
 
 POUND, INCH = 4.4482216152605, 0.0254

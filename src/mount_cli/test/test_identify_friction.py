@@ -18,7 +18,7 @@ from mount_identification.friction.channels import said
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.looks.force_zero import zeroed
 from mount_identification.friction.recording import IdentificationError
-from mount_identification.rack.recordings import described
+from mount_identification.rack.given import described
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen, load_specimen

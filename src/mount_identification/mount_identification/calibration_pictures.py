@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from mount_identification.actuator.points import gap_groups
 from mount_identification.coil.inductance import GapOrder, InductanceResult
-from mount_identification.rack.recordings import ForcePoints
+from mount_identification.rack.force_points import ForcePoints
 from mount_models.actuator.law import ForceLaw, checked_force
 from mount_models.coil.gap import evaluate
 

@@ -15,7 +15,7 @@ from mount_identification.coil.gap_calibration import GapCalibration
 from mount_identification.friction.found import Identification, chosen_fit
 from mount_identification.friction.recording import IdentificationError
 from mount_identification.rack.columns import RackRecordingError
-from mount_identification.rack.recordings import described
+from mount_identification.rack.given import described
 from mount_models.coil.temperature import TemperatureCompensation
 from mount_models.specimen import Specimen, checked_specimen
 

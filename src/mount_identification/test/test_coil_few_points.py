@@ -11,7 +11,8 @@ from mount_identification.coil.gap_point import RippleRecording, in_steps, measu
 from mount_identification.coil.inductance import GapOrder, calibrate_inductance
 from mount_identification.coil.unique_region import unique_region
 from mount_identification.rack.columns import RackRecordingError
-from mount_identification.rack.recordings import GivenValues, read_ripple
+from mount_identification.rack.given import GivenValues
+from mount_identification.rack.ripple_recordings import read_ripple
 from mount_identification.specimen import with_gap_curves
 from mount_models.coil.gap import GapCurvesRefusedError, evaluate
 from mount_models.specimen import default_specimen

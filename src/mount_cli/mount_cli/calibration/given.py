@@ -68,7 +68,7 @@ def per_file(settings: list[str], files: list[Path], option: str, factor: float)
 
 def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str], stated: 'Stated') -> Any:
     """Return what the caller says of gaps (um) and temperatures (degC) as `GivenValues`."""
-    from mount_identification.rack.recordings import GivenValues
+    from mount_identification.rack.given import GivenValues
 
     single = [setting for setting in temperatures if '=' in setting]
     common = [_number(text, f'--coil-temperature {text}') for text in temperatures if '=' not in text]

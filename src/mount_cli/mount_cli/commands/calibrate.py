@@ -106,7 +106,8 @@ def actuator(
     """
     from mount_cli.screen import progress_bar
     from mount_identification.actuator.fit import fit_force_law
-    from mount_identification.rack.recordings import GivenValues, read_force
+    from mount_identification.rack.force_points import read_force
+    from mount_identification.rack.given import GivenValues
     from mount_identification.specimen import check_targets, with_force_law
     from mount_models.specimen import chosen_specimen
     from mount_signals.units.columns import stated_with
@@ -207,7 +208,7 @@ def inductance(
     """
     from mount_cli.screen import TerminalScreen, progress_bar
     from mount_identification.coil.inductance import GapOrder, calibrate_inductance
-    from mount_identification.rack.recordings import read_ripple
+    from mount_identification.rack.ripple_recordings import read_ripple
     from mount_identification.specimen import check_targets, with_gap_curves
     from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
     from mount_models.specimen import chosen_specimen

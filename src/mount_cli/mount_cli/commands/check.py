@@ -81,7 +81,7 @@ def check(
     screen = TerminalScreen(console)
     results = run_trials(trials, jobs, screen, Told(order, screen))
     verdicts = all_verdicts(chosen, results, through)
-    screen.table(table_of(verdicts))
+    screen.table(table_of(results, verdicts))
     if json_file is not None:
         write_json(figures_of(order, results, verdicts), json_file)
     write_page(order, results, verdicts, folder / PAGE)

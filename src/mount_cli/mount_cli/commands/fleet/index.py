@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mount_cli.commands.fleet.reasons import tell_question
 from mount_cli.commands.fleet.resuming import resumable
 from mount_cli.commands.options import Dbc, JsonFile, MapFiles, Scheduler, Workers
 from mount_cli.terminal import terminal
@@ -72,5 +73,8 @@ def index(
     for name in ('read', 'unchanged', 'vanished', 'unreadable'):
         console.print(f'{name:<12}{figures[name]}', soft_wrap=True)
     console.print(f'{"catalogue":<12}{out}', soft_wrap=True)
+    if found.unreadable:
+        what = f'{found.unreadable} {"is" if found.unreadable == 1 else "are"} unreadable'
+        tell_question(console, what, out, 'recordings', "kind = 'unreadable'")
     if json_file is not None:
         write_json(figures, json_file)

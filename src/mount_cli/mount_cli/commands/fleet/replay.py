@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mount_cli.commands.fleet.reasons import tell_question
 from mount_cli.commands.fleet.resuming import resumable
 from mount_cli.commands.options import Dbc, JsonFile, MapFiles, Scheduler, Workers
 from mount_cli.commands.other_than_recorded import OtherThanRecorded, changes_of
@@ -27,7 +28,8 @@ Examples:
 `engine-mount fleet replay catalogue --map rack_2.yaml --set highest_current=2.0 --out result` - files of
 others too
 
-An interrupted run goes on with the same command. The table is result.parquet in the folder of the result;
+Recordings are told as replayed, with another policy (which does not have a changed parameter), or failed. An
+interrupted run goes on with the same command. The table is result.parquet in the folder of the result;
 setpoints are compared for the recorded displacement, with --closed-loop the displacement is simulated anew.
 """
 
@@ -74,7 +76,9 @@ def replay(
 
         outcome = replay_fleet(order, out, scheduler=scheduler, workers=workers, told=told)
     figures = outcome.figures()
-    _print(figures, console)
+    _print(figures, out, console)
+    if figures['failed']:
+        tell_question(console, f'{figures["failed"]} failed', out, 'result', "outcome = 'failed'")
     if json_file is not None:
         write_json(figures, json_file)
     for row in outcome.not_fetched[:_TOLD]:
@@ -87,13 +91,15 @@ def replay(
 
 def _progress_text(progress: Any) -> str:
     text = f'{progress.done} of {progress.of}, {progress.rate:.1f} recordings/s, {progress.left:.0f} s left'
-    return text + (f', {progress.failed} without figures' if progress.failed else '')
+    return text + (f', {progress.failed} failed' if progress.failed else '')
 
 
-def _print(figures: dict[str, Any], console: Any) -> None:
+def _print(figures: dict[str, Any], out: Path, console: Any) -> None:
     before = f' ({figures["done_before"]} done before)' if figures['done_before'] else ''
+    others = f'{figures["another_policy"]} with another policy, ' if figures['another_policy'] else ''
     console.print(
-        f'recordings {figures["recordings"]}{before}, {figures["failed"]} of them without figures',
+        f'recordings {figures["recordings"]}{before}: {figures["replayed"]} replayed, {others}'
+        f'{figures["failed"]} failed',
         soft_wrap=True,
     )
     if figures['workers']:
@@ -102,4 +108,4 @@ def _print(figures: dict[str, Any], console: Any) -> None:
             f'{figures["real_time_factor_per_core"]:.0f} x real time on each of {figures["workers"]} cores',
             soft_wrap=True,
         )
-    console.print(f'result     {figures["result"]}', soft_wrap=True)
+    console.print(f'result     {out}', soft_wrap=True)
