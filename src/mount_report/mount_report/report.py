@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mount_bags.bag.recording import Recording
-from mount_bags.compare.alignment import ComparisonError, align
+from mount_bags.compare.alignment import ComparisonError, share_stamps
+from mount_bags.container.scratch import put_away
 from mount_report.drawing.page import page
 from mount_report.sections import overview, run_sections, signal_sections
 from mount_report.sections.section import Section
@@ -63,6 +64,7 @@ class Report:
             on_picture(f'drawing {chart.name}.png', place / len(charts))
             files.append(folder / f'{chart.name}.png')
             draw_chart(chart, files[-1])
+            put_away()
         return files
 
 
@@ -78,12 +80,15 @@ def subjects_of(
         raise ReportError(
             f'{len(recordings)} recordings in one report are too many to tell apart; at most {_TOGETHER}'
         )
-    first = Signals(recordings[0], _names(recordings)[0])
-    all_signals = [first]
-    for recording, name in zip(recordings[1:], _names(recordings)[1:], strict=True):
-        zero = first.zero if _shares_stamps(recordings[0], recording) else None
-        all_signals.append(Signals(recording, name, zero))
-    return [Subject(signals, facts(signals)) for signals in all_signals]
+    subjects: list[Subject] = []
+    for recording, name in zip(recordings, _names(recordings), strict=True):
+        signals = Signals(recording, name)
+        if subjects and _shares_stamps(recordings[0], recording):
+            signals.zero = subjects[0].signals.zero
+        put_away()
+        subjects.append(Subject(signals, facts(signals)))
+        put_away()
+    return subjects
 
 
 def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda what, share: None) -> Report:
@@ -93,6 +98,7 @@ def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda what, shar
     for place, make in enumerate(SECTIONS):
         on_step(make.__name__, place / len(SECTIONS))
         made += _section_or_reason(make, subjects, failures)
+        put_away()
     # Last, because it also says what the others did not find.
     first = _section_or_reason(overview.overview, subjects, failures)
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)
@@ -125,6 +131,6 @@ def _names(recordings: Sequence[Recording]) -> list[str]:
 
 def _shares_stamps(first: Recording, other: Recording) -> bool:
     try:
-        return align(first, other).first.same_stamps
+        return share_stamps(first, other)
     except ComparisonError:
         return False

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.recording import ReadingError, Recording
+from mount_bags.container.scratch import kept
 from mount_bags.events.recorded_events import recorded_marks
 from mount_bags.events.switching_changes import switching_times
 from mount_bags.messages.compact_times import Times, each_once
 from mount_bags.messages.series import Series, SeriesError
 from mount_bags.run.session import recorded_sample_rate, recorded_session
 from mount_report.drawing.chart import Array
+from mount_report.drive.signals import DRIVE_COLUMNS
 from mount_ros.messages.event import Mark
 from mount_ros.topics import (
     COIL_RIPPLE,
@@ -30,11 +32,8 @@ _SHOWN = {
     DISPLACEMENT.name: ('mount',),
     COIL_RIPPLE.name: ('coil_current',),
     CURRENT_SETPOINT.name: ('coil_current',),
-    CONTROL_TRACE.name: (CONTROL_TRACE.names[0], 'damping_active', 'current'),
-    SIM_TRUTH.name: (
-        *('displacement', 'velocity', 'mount_force', 'friction_force'),
-        *('coil_current', 'road_height', 'chassis_acceleration'),
-    ),
+    CONTROL_TRACE.name: (CONTROL_TRACE.names[0], *DRIVE_COLUMNS[CONTROL_TRACE.name]),
+    SIM_TRUTH.name: DRIVE_COLUMNS[SIM_TRUTH.name],
     SIM_MOUNT_FORCE.name: ('wrench.force.z',),
     SIM_CHASSIS_ACCELERATION.name: ('linear_acceleration.z',),
 }
@@ -59,8 +58,8 @@ class _Order(NamedTuple):
 class Signals:
     """The signals of one recording. What is asked for and not there is noted in `missing`, in words."""
 
-    def __init__(self, recording: Recording, name: str = '', zero: int | None = None):
-        """Take a recording and what to call it; `zero` (ns): where time begins, if not as its axis says."""
+    def __init__(self, recording: Recording, name: str = ''):
+        """Take a recording and what to call it."""
         self.recording = recording
         self.name = name or recording.short_name
         self.missing: list[str] = []
@@ -68,7 +67,8 @@ class Signals:
         self._orders: dict[str, _Order] = {}
         recording.load_columns({topic: names for topic, names in _SHOWN.items() if topic in recording})
         self.axis = recording.time_axis
-        self.zero = self.axis.zero if zero is None else zero
+        self.zero = self.axis.zero
+        """The stamp (ns) at which time begins; another may be set before the first signal is asked for."""
 
     @property
     def session(self) -> str:
@@ -126,11 +126,16 @@ class Signals:
             alike = (order for order in self._orders.values() if order.stamps is series.stamps)
             self._orders[series.topic] = next(alike, None) or self._order_of(series.stamps)
         order = self._orders[series.topic]
-        return Signal(order.time, np.asarray(values, np.float64)[order.places])
+        found = np.asarray(values, np.float64)[order.places]
+        return Signal(order.time, found if isinstance(order.places, slice) else kept(found))
 
     def _order_of(self, stamps: Times) -> '_Order':
         rising, places = each_once(stamps)
-        return _Order(stamps, (rising - self.zero) / 1e9, places)
+        return _Order(
+            stamps,
+            kept((rising - self.zero) / 1e9),
+            places if isinstance(places, slice) else kept(places),
+        )
 
     def _absence(self, topic: str) -> str:
         alike = [name for name in self.recording if name.endswith(f'/{topic}')]

@@ -97,7 +97,27 @@ def test_the_page_tells_what_was_asked_what_failed_and_what_did_not_move():
         'other parameters, another version, or losses',
     )
     assert 'No picture: away' in sections['look_2'].words
-    assert sections['failures'].tables[0].rows == [('1', '.../<b> is no MCAP file', 'broken')]
+    assert sections['failures'].tables[0].rows == [('1', 'broken/<b> is no MCAP file', 'broken')]
+
+
+def test_recordings_with_another_policy_are_no_failures():
+    rows = result().to_pylist()
+    told = dict.fromkeys(NUMBERS) | {'reason': 'fifth: no effect', 'outcome': 'another policy'}
+    more = pyarrow.Table.from_pylist([{**rows[0], **told, 'recording': 'fifth'}])
+    page = fleet_report(pyarrow.concat_tables([result(), more], promote_options='permissive'), [], '', 'F')
+    sections = {section.name: section for section in page.sections}
+    text = [str(getattr(cell, 'text', cell)) for cell in sections['overview'].findings[0].text]
+    assert ' '.join(text) == '5 recordings: 3 replayed (10 s), 1 with another policy and 1 failed'
+    assert sections['another_policy'].tables[0].rows == [('1', 'fifth: no effect', 'fifth')]
+    assert sections['failures'].tables[0].rows == [('1', 'broken/<b> is no MCAP file', 'broken')]
+
+
+def test_a_reason_of_several_recordings_stands_once_with_all_of_them():
+    row = {**result().to_pylist()[2], 'reason': 'sixth/<b> is no MCAP file', 'recording': 'sixth'}
+    more = pyarrow.Table.from_pylist([row])
+    page = fleet_report(pyarrow.concat_tables([result(), more], promote_options='permissive'), [], '', 'F')
+    failures = next(section for section in page.sections if section.name == 'failures')
+    assert failures.tables[0].rows == [('2', '.../<b> is no MCAP file', 'broken\nsixth')]
 
 
 def test_the_picture_shows_the_stretch_around_the_largest_difference():

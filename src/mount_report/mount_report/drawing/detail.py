@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mount_bags.container.scratch import put_away
 from mount_report.drawing.chart import Array, Chart, Curve, Dots, Panel
 from mount_report.drawing.style import SPAN_COLOUR
 
@@ -91,7 +92,9 @@ def _numbers(curve: Curve, budget: int) -> dict[str, Any]:
     rising = len(x) > 1 and bool(np.all(np.diff(x) > 0.0))
     if len(x) <= _LONG or not rising or not np.isfinite(y).any():
         return {'rising': rising, 'points': _points(x, y)}
-    return {'even': even_numbers(x, y, budget)}
+    even = even_numbers(x, y, budget)
+    put_away()
+    return {'even': even}
 
 
 def even_numbers(x: Array, y: Array, budget: int) -> dict[str, Any]:

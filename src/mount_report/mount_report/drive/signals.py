@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bags.bag.recording import Recording
+from mount_bags.container.scratch import kept
 from mount_bags.messages.compact_times import Times, each_once, is_in
 from mount_bags.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_TIME
@@ -55,6 +56,15 @@ class Truth:
         return Truth(**{field.name: getattr(self, field.name)[kept] for field in fields(self)})
 
 
+_TRUE = tuple(field.name for field in fields(Truth) if field.name != 'time')
+DRIVE_COLUMNS = {
+    DISPLACEMENT.name: DISPLACEMENT.names,
+    CONTROL_TRACE.name: (*_TRACED, _OF_SOME),
+    SIM_TRUTH.name: (*_TRUE, *_EXCITED, *_AT_THE_END),
+}
+"""What is read of a drive, {topic: columns}."""
+
+
 @dataclass(frozen=True)
 class DriveSignals:
     """The signals of one drive; times are in s from the stamp `zero` (ns) on."""
@@ -72,14 +82,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
     With `excitation_start` (s from the plant's first sample) time begins there. Raises `ReadingError` where
     a topic is missing.
     """
-    scalars = [field.name for field in fields(Truth) if field.name != 'time']
-    recording.load_columns(
-        {
-            DISPLACEMENT.name: DISPLACEMENT.names,
-            CONTROL_TRACE.name: (*_TRACED, _OF_SOME),
-            SIM_TRUTH.name: (*scalars, *_EXCITED, *_AT_THE_END),
-        }
-    )
+    recording.load_columns(DRIVE_COLUMNS)
     zero = recording.time_axis.zero
     if excitation_start is not None:
         zero = excitation_stamp(recording, excitation_start)
@@ -89,7 +92,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
         recording=recording.path,
         zero=zero,
         seen=_seen(recording, zero),
-        truth=Truth((stamps - zero) * 1e-9, *(truth[name][order] for name in scalars)),
+        truth=Truth(kept((stamps - zero) * 1e-9), *(truth[name][order] for name in _TRUE)),
         sample_time=1.0 / recorded_sample_rate(recording),
     )
 
@@ -106,12 +109,14 @@ def _seen(recording: Recording, zero: int) -> Seen:
     # of samples that came twice the first
     places = np.flatnonzero(is_in(stamps, known) & (np.diff(stamps, prepend=stamps[:1] - 1) > 0))
     of_trace = np.searchsorted(known, stamps[places])
-    traced = {name: np.full(len(stamps), np.nan) for name in (*_TRACED, _OF_SOME)}
-    for name, values in traced.items():
+    traced = {}
+    for name in (*_TRACED, _OF_SOME):
+        values = np.full(len(stamps), np.nan)
         if name in trace.columns or name != _OF_SOME:
             values[places] = trace[name][of_known][of_trace]
+        traced[name] = kept(values)
     return Seen(
-        time=(stamps - zero) / _SECOND,
+        time=kept((stamps - zero) / _SECOND),
         displacement=displacement['mount'][order],
         damping_active=traced['damping_active'] > 0.0,
         current=np.nan_to_num(traced['current'], copy=False),

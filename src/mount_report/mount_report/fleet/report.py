@@ -1,4 +1,4 @@
-"""The page about the result of a fleet: what was asked, how figures are spread, the worst, what failed."""
+"""The page about the result of a fleet: what was asked, how figures are spread, the worst, what has none."""
 
 import json
 from collections.abc import Sequence
@@ -9,13 +9,15 @@ from mount_report.fleet.looks import Look, look_section
 from mount_report.fleet.readable import length_of_time, quantity
 from mount_report.fleet.worst_table import worst_section
 from mount_report.report import Report
-from mount_report.sections.section import BAD, GOOD, LOOK, UNKNOWN, Finding, Link, Section, Table
+from mount_report.sections.section import BAD, GOOD, LOOK, UNKNOWN, Cell, Finding, Link, Section, Table
 
 if TYPE_CHECKING:
     import pyarrow
 
 SETPOINTS, DISPLACEMENT = 'setpoints', 'displacement'
 """What a result answers, in its column `asked`."""
+ANOTHER_POLICY = 'another policy'
+"""Recordings that the change does not concern, in the column `outcome`."""
 
 _ASKED = {
     SETPOINTS: (
@@ -48,6 +50,7 @@ def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, name: 
         worst_section(looks, by, result.schema),
         *map(spread, _ordered(pairs_of(result))),
         *(look_section(number, look) for number, look in enumerate(looks, 1)),
+        *_with_another_policy(rows),
         _failures(rows),
     ]
     return Report(f'Fleet {name}: {question}', sections)
@@ -78,12 +81,19 @@ def _overview(rows: Sequence[dict], asked: set[str]) -> Section:
 
 def _recordings(rows: Sequence[dict], done: str) -> Finding:
     names = {row['recording'] for row in rows}
-    failed = {row['recording'] for row in rows if row['reason']}
+    failed = {row['recording'] for row in rows if _is_failed(row)}
+    replayed = {row['recording'] for row in rows if not row['reason']} - failed
+    others = names - failed - replayed
     length = length_of_time(sum(row['duration_s'] or 0.0 for row in rows))
-    text = [f'{len(names)} recordings, {length} of them {done};']
-    if not failed:
-        return Finding('Recordings', GOOD, [*text, 'none failed'])
-    return Finding('Recordings', LOOK, [*text, Link(f'{len(failed)} failed', 'failures')])
+    text: list[Cell] = [f'{len(names)} recordings: {len(replayed)} {done} ({length}),']
+    if others:
+        text += [Link(f'{len(others)} with another policy', 'another_policy'), 'and']
+    text.append(Link(f'{len(failed)} failed', 'failures') if failed else 'none failed')
+    return Finding('Recordings', LOOK if failed or not replayed else GOOD, text)
+
+
+def _is_failed(row: dict) -> bool:
+    return bool(row['reason']) and row.get('outcome') != ANOTHER_POLICY
 
 
 def _differing(rows: Sequence[dict]) -> Finding:
@@ -137,18 +147,29 @@ def _motion(rows: Sequence[dict]) -> Finding:
     return Finding(what, LOOK, [f'{text}; grows most in {most}: {quantity(grown[most], "m", signed=True)}'])
 
 
+def _with_another_policy(rows: Sequence[dict]) -> list[Section]:
+    others = [row for row in rows if row.get('outcome') == ANOTHER_POLICY]
+    words = ['The change does not concern these: their policy does not have a parameter that was changed.']
+    return [Section('another_policy', 'Another policy', words, tables=[_reasons(others)])] if others else []
+
+
 def _failures(rows: Sequence[dict]) -> Section:
-    failed = [row for row in rows if row['reason']]
+    failed = [row for row in rows if _is_failed(row)]
     if not failed:
         return Section('failures', 'Failed', ['Nothing failed.'])
-    reasons: dict[str, list[str]] = {}
-    for row in failed:
-        reasons.setdefault(row['reason'].replace(row['recording'], '...'), []).append(_named(row))
+    return Section('failures', 'Failed', tables=[_reasons(failed)])
+
+
+def _reasons(rows: Sequence[dict]) -> Table:
+    """Return why rows have no figures, each reason once with its recordings."""
+    reasons: dict[str, list[dict]] = {}
+    for row in rows:
+        reasons.setdefault(row['reason'].replace(row['recording'], '...'), []).append(row)
     told = [
-        (str(len(names)), reason, _listed(names))
-        for reason, names in sorted(reasons.items(), key=lambda item: -len(item[1]))
+        (str(len(of_it)), of_it[0]['reason'] if len(of_it) == 1 else reason, _listed([*map(_named, of_it)]))
+        for reason, of_it in sorted(reasons.items(), key=lambda item: -len(item[1]))
     ]
-    return Section('failures', 'Failed', tables=[Table(('rows', 'reason', 'recordings'), told)])
+    return Table(('rows', 'reason', 'recordings'), told)
 
 
 def _named(row: dict) -> str:

@@ -9,6 +9,7 @@ from itertools import cycle
 
 import numpy as np
 
+from mount_bags.container.scratch import kept
 from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Chart, Curve, Dots, Level, Panel, Span
 from mount_report.drawing.style import COLOUR_OF, COLOURS, DIFFERENCE_COLOUR, UNDAMPED_COLOUR
 
@@ -75,7 +76,7 @@ def _difference(series: Sequence[Named], label: str, factor: float = 1.0) -> lis
         return []
     first, other = series[0], series[-1]
     y = other.y - np.interp(other.x, first.x, first.y, np.nan, np.nan)
-    return [Panel(label, [Curve('B - A', other.x, factor * y, DIFFERENCE_COLOUR)], share=0.7)]
+    return [Panel(label, [Curve('B - A', other.x, kept(factor * y), DIFFERENCE_COLOUR)], share=0.7)]
 
 
 def hysteresis_loops(
@@ -186,7 +187,7 @@ def tracking(
         for place, series in enumerate(wanted)
     ]
     errors = [
-        _curve(Named(one.name, other.x, other.y - np.interp(other.x, one.x, one.y)), place, 'error')
+        _curve(Named(one.name, other.x, kept(other.y - np.interp(other.x, one.x, one.y))), place, 'error')
         for place, (one, other) in enumerate(zip(wanted, actual, strict=True))
     ]
     panels = [Panel('friction force (N)', forces, share=1.6), Panel('true minus wanted (N)', errors)]
@@ -217,7 +218,12 @@ def _curve(
     steps: bool = False,
 ) -> Curve:
     colour = series.colour or COLOURS[place % len(COLOURS)]
-    return Curve(f'{what}{_of(series)}', x_factor * series.x, factor * series.y, colour, SOLID, steps)
+    x, y = _scaled(x_factor, series.x), _scaled(factor, series.y)
+    return Curve(f'{what}{_of(series)}', x, y, colour, SOLID, steps)
+
+
+def _scaled(factor: float, values: Array) -> Array:
+    return values if factor == 1.0 else kept(factor * values)
 
 
 def _of(series: Named) -> str:

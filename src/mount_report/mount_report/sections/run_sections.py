@@ -9,6 +9,7 @@ from mount_bags.audit.report import sentences as audit_sentences
 from mount_bags.compare.quantity_text import quantity_text, time_text
 from mount_bags.compare.words import by_importance
 from mount_bags.compare.words import sentences as comparison_sentences
+from mount_bags.container.scratch import put_away
 from mount_bags.run.session import session_values
 from mount_report.sections import charts
 from mount_report.sections.charts import Named
@@ -41,6 +42,7 @@ def coil(subjects: Sequence[Subject]) -> Section:
         for stretch, inside in _stretches(subject, current):
             load = _load(subject, current, inside, setpoint)
             rows.append((f'{prefix}{stretch}', *_load_cells(load)))
+            put_away()
     head = (
         '', 'time (s)', 'rms current (A)', 'highest (A)', 'heat R i² (W)', 'heat (J)', 'at the limit (%)',
     )  # fmt: skip

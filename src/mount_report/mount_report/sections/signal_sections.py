@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 
 from mount_bags.compare.quantity_text import quantity_text
+from mount_bags.container.scratch import put_away
 from mount_report.drawing.chart import Array
 from mount_report.sections import charts, periodic
 from mount_report.sections.charts import Levels, Named
@@ -180,6 +181,7 @@ def spectra(subjects: Sequence[Subject]) -> Section:
         for subject in subjects:
             signal = of(subject)
             density = None if signal is None else _density(subject, signal)
+            put_away()
             if density is None:
                 continue
             frequency, values, made_up = density

@@ -151,7 +151,8 @@ function builtPanel(chart, told) {
     line.chip.type = 'button';
     line.chip.title = 'show or hide';
     line.chip.setAttribute('aria-pressed', 'true');
-    add(line.chip, 'i', line.dash === 'solid' ? 'stroke' : `stroke ${line.dash}`);
+    const sign = told.dots.includes(line) ? 'point' : line.dash === 'solid' ? 'stroke' : `stroke ${line.dash}`;
+    add(line.chip, 'i', sign);
     line.chip.append(line.name);
     line.number = add(line.chip, 'output', '');
     line.chip.onclick = () => {
