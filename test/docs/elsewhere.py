@@ -19,7 +19,7 @@ ELSEWHERE = {
     'rosdep install': _INSTALLATION,
     'python3 -m pip install': _INSTALLATION,
     'colcon build': _INSTALLATION,
-    'ip link set': _HARDWARE,
+    'sudo ip link set': _HARDWARE,
     'ip -details': _HARDWARE,
     'candump': _HARDWARE,
     'ros2 run mount_driver': _HARDWARE,

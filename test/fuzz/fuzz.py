@@ -4,8 +4,9 @@
     .venv/bin/python test/fuzz/fuzz.py --guided 600 --only frames
 
 The inputs are numbered: a failure names the number, which as an `@example` of its test is a regression test.
-One that computes for longer than 2 s, or waits for longer than a minute, is a failure too. With `--guided`
-and the package `atheris` in the environment, code coverage chooses the inputs for so many seconds.
+One that computes for longer than 2 s, waits for longer than a minute, or makes numpy warn (of a number that
+overflows) is a failure too. With `--guided` and the package `atheris` in the environment, code coverage
+chooses the inputs for so many seconds.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import signal
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -181,6 +183,7 @@ def main() -> int:
 
     signal.signal(signal.SIGPROF, hang)
     signal.signal(signal.SIGALRM, hang)
+    warnings.simplefilter('error', RuntimeWarning)
     failures = 0
     with all_targets() as targets:
         for name in given.only or targets:

@@ -5,7 +5,7 @@ import io
 import json
 import math
 import re
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from mount_experiments.check.page import write_page
 from mount_experiments.check.session import CheckError, CheckOrder, run_trials, trials_of
 from mount_experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
 from mount_experiments.check.telling import Told, figures_of, table_of
-from mount_experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples
+from mount_experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples, broken_down
 from mount_models.plain_yaml import plain_yaml
 from mount_report.drive.signals import Truth
 
@@ -170,7 +170,7 @@ def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, mon
     monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(error))
     made = trials(tmp_path, through=GRAPH)[0]
     broken = trial.run_trial(made)
-    assert (broken.figures, broken.remarks) == ({}, (str(error),))
+    assert (broken.figures, broken.broke_down) == ({}, str(error))
     monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(Interrupted()))
     with pytest.raises(Interrupted):
         trial.run_trial(made)
@@ -250,8 +250,9 @@ def test_a_limit_holds_up_to_its_value_and_what_is_not_known_fails():
     assert judged(peak_over_undamped=0.7001)['peak_over_undamped'] is Judged.FAILED
     assert judged(peak_over_undamped=math.nan)['peak_over_undamped'] is Judged.FAILED
     assert judged(faults=1.0)['faults'] is Judged.FAILED
-    broken = replace(result(), figures={})  # a graph that broke down
-    assert not passed(verdicts_of(suite_of(content())[0], broken, GRAPH))
+    broken = verdicts_of(suite_of(content())[0], broken_down('no gap'), GRAPH)
+    assert {verdict.judged for verdict in broken} == {Judged.NOT_JUDGED}
+    assert not passed(broken)
 
 
 def test_a_limit_from_below_fails_below_it():
@@ -286,16 +287,38 @@ def told(**figures):
 
 
 def test_a_common_limit_that_holds_everywhere_is_told_once_and_one_that_fails_by_its_manoeuvre():
-    rows = [row[:3] for row in table_of(told()[2]).rows]
+    rows = [row[:3] for row in table_of(*told()[1:]).rows]
     assert rows == [
         ('ok', 'first', 'peak_over_undamped'),
         ('ok', 'second', 'peak_over_undamped'),
         ('ok', 'all 2', 'faults'),
     ]
-    table = table_of(told(faults=2.0)[2])
+    table = table_of(*told(faults=2.0)[1:])
     assert table.rows[0][:4] == ('fail', 'second', 'faults', '2')
     assert table.marked == {0}
     assert table.caption == '1 of 2 manoeuvres within their 4 limits; not second.'
+
+
+def test_a_manoeuvre_that_broke_down_is_one_row_with_its_reason_and_how_much_is_not_judged():
+    suite = suite_of(content())
+    results = {'first': result(), 'second': broken_down('mount_sim ended with code 1')}
+    verdicts = all_verdicts(suite, results, CORE)
+    table = table_of(results, verdicts)
+    assert table.rows[0] == (
+        'fail', 'second', 'broke down: mount_sim ended with code 1; not judged: 2 limits', '', '', '',
+    )  # fmt: skip
+    assert [row[1] for row in table.rows] == ['second', 'first', 'first']
+    assert table.marked == {0}
+    assert table.caption == '1 of 2 manoeuvres within their 2 limits; not second.'
+    figures = figures_of(CheckOrder(suite), results, verdicts)
+    assert not figures['passed']
+    second = figures['manoeuvres']['second']
+    assert second['broke_down'] == 'mount_sim ended with code 1'
+    assert [each['verdict'] for each in second['verdicts']] == ['not judged'] * 2
+    screen = Seen()
+    Told(CheckOrder(suite), screen)('second', results['second'], 1.0)
+    assert screen.texts[1].split()[:4] == ['fail', 'second', 'broke', 'down']
+    assert screen.texts[2] == 'second mount_sim ended with code 1'
 
 
 def test_figures_are_plain_json_with_null_for_what_is_not_known():
@@ -316,7 +339,7 @@ def test_figures_are_plain_json_with_null_for_what_is_not_known():
 
 def test_the_page_leads_from_each_verdict_to_its_manoeuvre_and_survives_a_graph_that_broke_down(tmp_path):
     order, results, verdicts = told(peak_over_undamped=0.9)
-    results['first'] = Result({}, ('mount_sim ended with code 1 <b>',), Shown())
+    results['first'] = broken_down('mount_sim ended with code 1 <b>')
     verdicts = all_verdicts(order.manoeuvres, results, CORE)
     write_page(order, results, verdicts, tmp_path / 'check.html')
     text = (tmp_path / 'check.html').read_text(encoding='utf-8')

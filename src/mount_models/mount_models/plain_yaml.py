@@ -4,10 +4,13 @@ Scanner, parser and the rules of scalars are PyYAML's. What changes a meaning un
 time without bound (references to references, numbers of a million digits, nesting) is refused, with its line.
 """
 
+import functools
 from pathlib import Path
 from typing import Any
 
 import yaml
+from yaml.constructor import SafeConstructor
+from yaml.resolver import Resolver
 
 LONGEST_TEXT = 1 << 20
 """Characters, chosen: the `metadata.yaml` of a recording of 1000 files has a quarter of it."""
@@ -21,6 +24,7 @@ _WHOLE_NUMBERS = 1 << 63  # the range of an int64, in which every number of a me
 _TAG = 'tag:yaml.org,2002:'
 _NUMBERS = (_TAG + 'int', _TAG + 'float')
 _SCALARS = (*_NUMBERS, _TAG + 'str', _TAG + 'bool', _TAG + 'null', _TAG + 'timestamp')
+_SHORT = 100  # characters, chosen: of scalars that are remembered; nearly all are shorter
 # The same rules in C, many times as fast.
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
@@ -138,20 +142,37 @@ class _Composition:
     def _scalar(self, event: Any) -> Any:
         if self._words:
             return event.value
-        tag = event.tag
-        if tag is None or tag == '!':
-            tag = self._loader.resolve(yaml.ScalarNode, event.value, event.implicit)
-        if tag not in _SCALARS:
-            raise _refused(event, f'{_told(event.value)} ({tag!r}) is not known here; put it in quotes')
-        if tag in _NUMBERS and len(event.value) > _LONGEST_NUMBER:
-            raise _refused(event, f'a number of {len(event.value)} characters; at most {_LONGEST_NUMBER}')
+        value_of = _short_value if len(event.value) <= _SHORT else _value
         try:
-            value = _LOADER.yaml_constructors[tag](self._loader, yaml.ScalarNode(tag, event.value))
-        except (ValueError, LookupError) as error:  # a date that is none; `!!int x`, `!!int ''`
-            raise _refused(event, f'{_told(event.value)} is no value ({error}); put it in quotes') from error
-        if isinstance(value, int) and not -_WHOLE_NUMBERS <= value < _WHOLE_NUMBERS:
-            raise _refused(event, f'{_told(event.value)} does not fit into 64 bits; write 1.0e+30 for 1e30')
-        return value
+            return value_of(event.tag, event.value, event.implicit)
+        except ValueError as error:
+            raise _refused(event, str(error)) from error
+
+
+class _Rules(SafeConstructor, Resolver):
+    """What PyYAML takes a scalar for, apart from the text in which it stands."""
+
+
+def _value(tag: str | None, text: str, implicit: tuple[bool, bool]) -> Any:
+    """Return what a scalar means, which depends on nothing else; raises `ValueError` with the remedy."""
+    rules = _Rules()
+    if tag is None or tag == '!':
+        tag = rules.resolve(yaml.ScalarNode, text, implicit)
+    if tag not in _SCALARS:
+        raise ValueError(f'{_told(text)} ({tag!r}) is not known here; put it in quotes')
+    if tag in _NUMBERS and len(text) > _LONGEST_NUMBER:
+        raise ValueError(f'a number of {len(text)} characters; at most {_LONGEST_NUMBER}')
+    try:
+        value = _LOADER.yaml_constructors[tag](rules, yaml.ScalarNode(tag, text))
+    except (ValueError, LookupError) as error:  # a date that is none; `!!int x`, `!!int ''`
+        raise ValueError(f'{_told(text)} is no value ({error}); put it in quotes') from error
+    if isinstance(value, int) and not -_WHOLE_NUMBERS <= value < _WHOLE_NUMBERS:
+        raise ValueError(f'{_told(text)} does not fit into 64 bits; write 1.0e+30 for 1e30')
+    return value
+
+
+# Recordings tell the same names and parameters again and again; what is returned cannot be changed.
+_short_value = functools.lru_cache(maxsize=4096)(_value)
 
 
 def _refused(event: Any, sentence: str) -> YamlError:

@@ -16,6 +16,7 @@ class Judged(Enum):
     FAILED = 'fail'
     PASSED = 'ok'
     LEFT_OUT = 'none'
+    NOT_JUDGED = 'not judged'  # the manoeuvre broke down
 
 
 @dataclass(frozen=True)
@@ -29,11 +30,16 @@ class Verdict:
     margin: float
     common: bool
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether the manoeuvre does not pass for it."""
+        return self.judged in (Judged.FAILED, Judged.NOT_JUDGED)
+
 
 def verdicts_of(manoeuvre: Manoeuvre, result: Result, through: str) -> list[Verdict]:
     """Return the verdicts on one manoeuvre in the order of its limits."""
     return [
-        _verdict(manoeuvre.name, limit, result.figures.get(limit.measure, math.nan), through, common)
+        _verdict(manoeuvre.name, limit, result, through, common)
         for limits, common in ((manoeuvre.limits, False), (manoeuvre.common, True))
         for limit in limits
         if manoeuvre.seat in MEASURES[limit.measure].seats
@@ -42,7 +48,7 @@ def verdicts_of(manoeuvre: Manoeuvre, result: Result, through: str) -> list[Verd
 
 def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
     """Return the verdicts with those that failed first, then by the margin that is left."""
-    order = {Judged.FAILED: 0, Judged.PASSED: 1, Judged.LEFT_OUT: 2}
+    order = {Judged.NOT_JUDGED: 0, Judged.FAILED: 1, Judged.PASSED: 2, Judged.LEFT_OUT: 3}
 
     def key(verdict: Verdict) -> tuple[int, float]:
         unknown = -math.inf if verdict.judged is Judged.FAILED else math.inf
@@ -52,8 +58,8 @@ def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
 
 
 def passed(verdicts: Sequence[Verdict]) -> bool:
-    """Return whether no limit is exceeded."""
-    return not any(verdict.judged is Judged.FAILED for verdict in verdicts)
+    """Return whether no limit is exceeded, and none could not be judged."""
+    return not any(verdict.has_failed for verdict in verdicts)
 
 
 def all_verdicts(
@@ -63,9 +69,12 @@ def all_verdicts(
     return {each.name: verdicts_of(each, results[each.name], through) for each in suite}
 
 
-def _verdict(manoeuvre: str, limit: Limit, value: float, through: str, common: bool) -> Verdict:
+def _verdict(manoeuvre: str, limit: Limit, result: Result, through: str, common: bool) -> Verdict:
     if MEASURES[limit.measure].clock and through != GRAPH:
         return Verdict(manoeuvre, limit, math.nan, Judged.LEFT_OUT, math.nan, common)
+    if result.broke_down:
+        return Verdict(manoeuvre, limit, math.nan, Judged.NOT_JUDGED, math.nan, common)
+    value = result.figures.get(limit.measure, math.nan)
     left = limit.value - value if limit.bound == 'at_most' else value - limit.value
     judged = Judged.PASSED if left >= 0.0 else Judged.FAILED  # a value that is not known fails
     margin = left / abs(limit.value) if limit.value else math.nan

@@ -9,7 +9,16 @@ from mount_experiments.check.judgement import Judged, Verdict, passed, worst_fir
 from mount_experiments.check.measures import MEASURES, RACK
 from mount_experiments.check.session import CheckOrder
 from mount_experiments.check.suite import Manoeuvre
-from mount_experiments.check.telling import HEADS, Verdicts, cells, number, sentence_of, told_once
+from mount_experiments.check.telling import (
+    HEADS,
+    Verdicts,
+    cells,
+    not_judged,
+    number,
+    sentence_of,
+    texts_of,
+    told_once,
+)
 from mount_experiments.check.trial import MODES, Result, Shown
 from mount_models.sampling import SAMPLE_TIME
 from mount_report.drawing.chart import Array, Chart, Curve, Panel, Span
@@ -41,8 +50,8 @@ def _overview(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdic
         + (f'set: {", ".join(changed)}.' if changed else 'all parameters as in the suite.'),
     ]
     rows = told_once(verdicts)
-    told = [_linked(cells(row, len(verdicts)), row) for row in rows]
-    failed = sum(1 for row in rows if row.judged is Judged.FAILED)
+    told = [_linked(texts, row) for texts, row in zip(texts_of(rows, results, verdicts), rows, strict=True)]
+    failed = sum(row.has_failed for row in rows)
     tables = [Table(HEADS, told[:failed], 'Exceeded', frozenset(range(failed)))] if failed else []
     tables.append(Table(HEADS, told, 'all limits, the worst first', frozenset(range(failed)), folded=True))
     findings = [_finding(each, results[each.name], verdicts[each.name]) for each in order.manoeuvres]
@@ -56,6 +65,9 @@ def _linked(row: Sequence[str], verdict: Verdict) -> list[Cell]:
 
 
 def _finding(manoeuvre: Manoeuvre, result: Result, verdicts: Sequence[Verdict]) -> Finding:
+    if result.broke_down:
+        words: list[Cell] = [f'{result.broke_down};', not_judged(verdicts)]
+        return Finding(manoeuvre.name, BAD, [Link('broke down:', manoeuvre.name), *words])
     worst = worst_first([each for each in verdicts if not each.common] or verdicts)
     failed = [each for each in worst_first(verdicts) if each.judged is Judged.FAILED]
     text: list[Cell] = [Link('exceeded:' if failed else 'least left:', manoeuvre.name)]
@@ -68,6 +80,12 @@ def _finding(manoeuvre: Manoeuvre, result: Result, verdicts: Sequence[Verdict]) 
 
 
 def _section(manoeuvre: Manoeuvre, result: Result, verdicts: Sequence[Verdict]) -> Section:
+    if result.broke_down:
+        words = [
+            f'{manoeuvre.about} It broke down: {result.broke_down}',
+            f'{not_judged(verdicts)}.'.capitalize(),
+        ]
+        return Section(manoeuvre.name, manoeuvre.name, words)
     ordered = worst_first(verdicts)
     rows = [_without_name(cells(each)) for each in ordered]
     marked = frozenset(place for place, each in enumerate(ordered) if each.judged is Judged.FAILED)

@@ -61,11 +61,15 @@ class Shown:
 
 @dataclass(frozen=True)
 class Result:
-    """The figures of a manoeuvre by the names of their measures, and what was not as it should be."""
+    """The figures of a manoeuvre by the names of their measures, and what was not as it should be.
+
+    `broke_down`: why there are no figures, empty where there are.
+    """
 
     figures: Mapping[str, float]
     remarks: tuple[str, ...]
     shown: Shown
+    broke_down: str = ''
 
 
 def run_trial(trial: Trial, screen: Screen | None = None) -> Result:
@@ -90,7 +94,7 @@ def run_trial(trial: Trial, screen: Screen | None = None) -> Result:
 
 def broken_down(reason: str) -> Result:
     """Return the result of a manoeuvre of which no figure is known."""
-    return Result({}, (reason,), Shown())
+    return Result({}, (), Shown(), reason)
 
 
 def _result(trial: Trial, recording: Recording, run: dict[str, Any], complaints: list[str]) -> Result:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from geometry_msgs.msg import WrenchStamped
 
 from mount_bags.bag.writer import BagWriter
+from mount_bags.container.writer import LONG_CHUNK_SIZE
 from mount_bags.run.session import new_session, session_message, session_text
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME_NS
@@ -41,7 +42,7 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
     The rack has no elastomer, so its `sim/mount_force` is the friction force alone. `session` says what was
     done; times and versions are added.
     """
-    writer = BagWriter(folder)
+    writer = BagWriter(folder, chunk_size=LONG_CHUNK_SIZE)
     begin = time.time_ns()
     try:
         for topic in _TOPICS:
