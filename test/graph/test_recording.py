@@ -76,8 +76,8 @@ def samples(publishers, indices):
 
 
 @pytest.mark.real_time
-def test_record_holds_all_that_was_published_in_several_files_with_the_mark(source, command):
-    process, publishers = start_record(command, source, '--split', '500MB', '--split', '1s')
+def test_record_holds_all_that_was_published_in_several_files_with_the_mark(domain_source, command):
+    process, publishers = start_record(command, domain_source, '--split', '500MB', '--split', '1s')
     samples(publishers, range(COUNT))
     publishers[EVENT].publish(String(data='a bump'))
     code, output = end_record(process)
@@ -93,25 +93,25 @@ def test_record_holds_all_that_was_published_in_several_files_with_the_mark(sour
     assert [mark.text for mark in read_marks(recording['event'])] == ['a bump']
 
 
-def test_record_ends_with_code_1_where_samples_are_missing(source, command):
-    process, publishers = start_record(command, source)
+def test_record_ends_with_code_1_where_samples_are_missing(domain_source, command):
+    process, publishers = start_record(command, domain_source)
     samples(publishers, [0, 1, 4])
     code, output = end_record(process)
     assert code == 1, output
     assert 'Lost: 2 of ' in output
 
 
-def test_a_snapshot_without_an_event_saves_nothing_and_says_so(source, command):
-    process, _ = start_record(command, source, '--snapshot', '5s')
+def test_a_snapshot_without_an_event_saves_nothing_and_says_so(domain_source, command):
+    process, _ = start_record(command, domain_source, '--snapshot', '5s')
     code, output = end_record(process)
     assert code == 0, output
     assert 'no event came, so no snapshot was saved' in output
     assert not (command.folder / 'bag').exists()
 
 
-def test_a_key_press_marks_and_sets_a_snapshot_off(source, command):
+def test_a_key_press_marks_and_sets_a_snapshot_off(domain_source, command):
     keys, terminal = pty.openpty()
-    process, publishers = start_record(command, source, '--snapshot', '60s', stdin=terminal)
+    process, publishers = start_record(command, domain_source, '--snapshot', '60s', stdin=terminal)
     samples(publishers, range(10))
     os.write(keys, b'xm')
     wait_until(lambda: (command.folder / 'bag').exists(), 'the snapshot')

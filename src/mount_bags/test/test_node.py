@@ -166,8 +166,8 @@ def test_recorder_that_never_began_leaves_nothing_behind(make_recorder, tmp_path
     assert not (tmp_path / 'bag').exists()
 
 
-def test_sigint_closes_the_recording_and_exits_with_code_0(context, source, tmp_path):
-    publishers = {topic: source.publisher(topic) for topic in STREAMS}
+def test_sigint_closes_the_recording_and_exits_with_code_0(domain, domain_source, tmp_path):
+    publishers = {topic: domain_source.publisher(topic) for topic in STREAMS}
     process = subprocess.Popen(
         [
             sys.executable,
@@ -179,7 +179,7 @@ def test_sigint_closes_the_recording_and_exits_with_code_0(context, source, tmp_
             '-p',
             f'topics:={[topic.name for topic in STREAMS]}',
         ],
-        env={**os.environ, 'ROS_DOMAIN_ID': str(context.get_domain_id())},
+        env={**os.environ, 'ROS_DOMAIN_ID': str(domain)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

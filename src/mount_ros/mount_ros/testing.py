@@ -3,7 +3,8 @@
 A participant that was killed stays in its domain's graph for some seconds, and other tests may run at
 the same time; so tests take domains that no other process on this machine holds. Creating and removing DDS
 participants by the hundred is slow and now and then stalls within the middleware; so the nodes of all
-tests of a process live in one context, one after the other.
+tests of a process live in one context, one after the other. A test that starts processes has a domain and a
+context of its own: what those leave behind in the middleware when they end is none of the next test's.
 """
 
 import contextlib
@@ -93,17 +94,39 @@ def domain() -> Iterator[int]:
 @pytest.fixture
 def context(_observer: 'Node') -> Iterator['Context']:
     """Return the context of this process's tests; fails if a test leaves a node behind."""
+    from mount_ros.nodes.present import present_nodes
+
     yield _observer.context
     alone = [(_observer.get_name(), _observer.get_namespace())]
     wait_until(
-        lambda: _observer.get_node_names_and_namespaces() == alone,
-        f'that only {alone} is left of {_observer.get_node_names_and_namespaces()}',
+        lambda: present_nodes(_observer) == alone,
+        f'that only {alone} is left of {present_nodes(_observer)}',
     )
+
+
+@pytest.fixture
+def domain_context(domain: int) -> Iterator['Context']:
+    """Return a context of one test, in the domain of the processes that it starts."""
+    with _context(domain) as made:
+        yield made
 
 
 @pytest.fixture
 def source(context: 'Context') -> Iterator['DataPath']:
     """Return a data path whose node publishes, beside the node that is tested."""
+    with _source(context) as path:
+        yield path
+
+
+@pytest.fixture
+def domain_source(domain_context: 'Context') -> Iterator['DataPath']:
+    """Return a data path whose node publishes, beside the processes that a test starts."""
+    with _source(domain_context) as path:
+        yield path
+
+
+@contextlib.contextmanager
+def _source(context: 'Context') -> Iterator['DataPath']:
     from rclpy.node import Node
 
     from mount_ros.data_path import DataPath
@@ -116,18 +139,25 @@ def source(context: 'Context') -> Iterator['DataPath']:
     node.destroy_node()
 
 
-@pytest.fixture(scope='session')
-def _observer() -> Iterator['Node']:
-    """A node in a context and domain of this process that sees which others are there."""
+@contextlib.contextmanager
+def _context(domain: int) -> Iterator['Context']:
     import rclpy
 
     from mount_ros.environment import prepare_environment
 
     prepare_environment()
     context = rclpy.Context()
-    with free_domain() as number:
-        rclpy.init(context=context, domain_id=number)
-        node = rclpy.create_node('observer', context=context, namespace='test', enable_rosout=False)
+    rclpy.init(context=context, domain_id=domain)
+    yield context
+    rclpy.try_shutdown(context=context)
+
+
+@pytest.fixture(scope='session')
+def _observer() -> Iterator['Node']:
+    """A node in a context and domain of this process that sees which others are there."""
+    from rclpy.node import Node
+
+    with free_domain() as number, _context(number) as context:
+        node = Node('observer', context=context, namespace='test', enable_rosout=False)
         yield node
         node.destroy_node()
-        rclpy.try_shutdown(context=context)

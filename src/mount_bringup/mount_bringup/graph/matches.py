@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from rclpy.node import Node
 
 from mount_bringup.graph.nodes import RECORDER, GraphNode
+from mount_ros.nodes.present import present_nodes
 from mount_ros.topics import SESSION
 
 
@@ -19,7 +20,7 @@ def waiting(
 def crowded(nodes: Sequence[GraphNode], seen_by: Node, own: int) -> str:
     """Return name and namespace of the first of `nodes` that is there more than `own` times; '' if none."""
     space = seen_by.get_namespace().rstrip('/')
-    present = seen_by.get_node_names_and_namespaces()
+    present = present_nodes(seen_by)
     for node in nodes:
         own_space = f'{space}/{node.mount}'.rstrip('/') or '/'
         if present.count((node.name, own_space)) > own:

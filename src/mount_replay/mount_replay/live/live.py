@@ -29,6 +29,7 @@ from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import stamp_of
 from mount_ros.messages.types import message_class
 from mount_ros.nodes.hosting import ros_context
+from mount_ros.nodes.present import present_nodes
 from mount_ros.topics import Delivery, Topic
 
 _SHOWN = (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)
@@ -260,7 +261,7 @@ def _refuse_beside_a_graph(owner: Node) -> None:
     names = {node.name for node in SIMULATED}
     end = time.monotonic() + _LOOK
     while time.monotonic() < end:
-        for name, space in owner.get_node_names_and_namespaces():
+        for name, space in present_nodes(owner):
             if name in names and space == owner.get_namespace():
                 raise ReplayError(
                     f'{name} runs in this ROS domain and namespace {space}: a replay would mix with its '
