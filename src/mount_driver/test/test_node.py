@@ -458,10 +458,11 @@ def test_a_parameter_outside_its_range_is_refused(make_driver):
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_sends_0_ampere_and_ends_the_process_with_code_0(domain, domain_context, multicast, far, number):
+def test_a_signal_sends_0_ampere_and_ends_the_process_with_code_0(multicast, domain_context, far, number):
     command = [sys.executable, '-m', 'mount_driver.node', '--ros-args', '-p', 'lockstep:=true']
     command += ['-p', f'channel:={multicast[0]}', '-p', f'port:={multicast[1]}']
-    process = subprocess.Popen(command, env=os.environ | {'ROS_DOMAIN_ID': str(domain)})
+    domain = str(domain_context.get_domain_id())
+    process = subprocess.Popen(command, env=os.environ | {'ROS_DOMAIN_ID': domain})
     commander = Node('commander', context=domain_context)
     try:
         change(commander, Transition.TRANSITION_CONFIGURE)
