@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from itertools import product
 from typing import Annotated
 
 import typer
@@ -67,15 +66,11 @@ def _top(
 
 
 def prepare() -> None:
-    """Compile the laws for this machine, so that the first drive need not wait; done by the set-up."""
-    from mount_control.policy.registry import POLICIES
-    from mount_replay.loop.run import run_core
+    """Compile the laws for this machine, for drives and workers of a fleet; done by the set-up."""
+    from mount_replay.prepare import prepare
 
-    console = terminal()
-    with console.status('compiling the laws for this machine (once, about half a minute)'):
-        for scenario, policy in product(('bench', 'motorway'), POLICIES):
-            sim = {'scenario': scenario, 'timeline.duration': 0.5}
-            run_core({'mount_sim': sim, 'mount_control': {'policy': policy}}, lambda *_: None)
+    with terminal().status('compiling the laws for this machine (once, about half a minute)'):
+        prepare()
 
 
 _COMMANDS: tuple[tuple[str, str, Callable[..., None], str | None], ...] = (

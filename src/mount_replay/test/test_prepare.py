@@ -1,0 +1,41 @@
+"""What is compiled ahead is what a fleet's index and replay would compile."""
+
+import subprocess
+import sys
+
+_AFTER = """
+import gc, sys
+from numba.core.dispatcher import Dispatcher
+from mount_bags.run.session import session_text
+from mount_replay.fleet.catalogue.places import places
+from mount_replay.fleet.catalogue.reading import read_place
+from mount_replay.fleet.what_if.one import replay_one
+from mount_replay.loop import recording
+from mount_replay.prepare import prepare
+
+def loaded():
+    found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+    return {(each.__qualname__, str(kinds)) for each in found for kinds in each.overloads}
+
+prepare(scenarios=['motorway'], policies=['switched_viscous'])
+before = loaded()
+recording.LONG_CHUNK_SIZE = 4000  # bytes: many chunks, as in a recording of a car
+sim = {'scenario': 'motorway', 'timeline.duration': 4.0, 'seed': 3}
+parameters = {'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}
+session = session_text({'parameters': parameters})
+recording.record_core(recording.Path(sys.argv[1]) / 'drive', parameters, session)
+for place in places([sys.argv[1]]).values():
+    row, = read_place(place).recordings
+    replayed, = replay_one(place, {'mount_control': {'highest_current': 0.7}}).rows
+    print(row['reason'] or 'indexed', replayed['outcome'], len(before), sorted(loaded() - before))
+"""
+
+
+def test_a_worker_of_a_fleet_finds_everything_compiled_that_it_needs(tmp_path):
+    run = subprocess.run(
+        [sys.executable, '-c', _AFTER, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    outcome = run.stdout.strip().split(' ', 3)
+    assert outcome[:2] == ['indexed', 'replayed']
+    assert int(outcome[2]) > 0
+    assert outcome[3] == '[]'
