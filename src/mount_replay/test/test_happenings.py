@@ -117,6 +117,16 @@ def test_losses_are_counted_over_the_nodes(happenings):
     assert happenings.present == 'no damping yet; 7 samples or messages lost'
 
 
+def test_samples_that_are_missing_between_the_stamps_are_lost_and_counted_once(told):
+    happenings = Happenings(of_mounts(SIMULATED, ('left', 'right')), told.append)
+    missing = {'missing./left/displacement': '5', 'missing./right/displacement': '0'}
+    missing |= {'missing./left/coil_ripple': '5', 'missing./left/control_trace': '90'}
+    happenings.told('left/mount_driver', DRIVER | {'lost': '3'})
+    happenings.told('left/mount_control', off_at(7_500_000_000) | {'bridged': '4'})
+    happenings.told('mount_recorder', {'level': '1', 'sentence': 'missing', 'lost': '0'} | missing)
+    assert happenings.present == 'no damping yet; 5 samples or messages lost'
+
+
 def test_a_warning_is_told_when_it_begins_and_not_with_each_count(happenings, told, clock):
     happenings.told('mount_driver', DRIVER | {'level': '1', 'sentence': 'is mount_control active?'})
     for node in SIMULATED:

@@ -197,7 +197,18 @@ def test_a_loop_that_misses_most_of_its_periods_ends_it(system, missed, kept):
         said += looks(whole, system, 1)
     assert (not said) == kept
     if not kept:
-        assert 'the loop missed 750 of 1000 periods (limit 50 %)' in said[0]
+        assert 'the loop missed 2250 of 3000 periods (limit 50 % for 3 s)' in said[0]
+
+
+def test_a_loop_that_catches_up_after_a_stall_of_the_machine_keeps_it(system):
+    whole, loop = shared(system), Loop()
+    whole.begin(loop)
+    said = []
+    for missed in 10 * [*[400] * 12, 0]:  # a stall, and looks until all is made up for
+        loop.kept = Beats(loop.kept.periods + 400, loop.kept.missed + missed)
+        said += looks(whole, system, 1)
+    assert said == []
+    assert system.urgent() == ALL
 
 
 def test_a_thread_that_the_system_says_does_not_sleep_ends_it_at_once(system):

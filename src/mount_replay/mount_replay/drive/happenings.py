@@ -2,19 +2,20 @@
 
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from mount_bags.events.automatic_marks import MarkKind, Ration, of_mount
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphNode
 from mount_bringup.graph.verdicts import Witness
 from mount_ros.messages.event import BY_HAND, Mark
 from mount_ros.nodes.diagnostics import Level
+from mount_ros.topics import DISPLACEMENT
 
 _STARTING, _ACTIVATING = 'starting', 'activating'
 _NAMED = 5  # chosen: more nodes are counted
 _NUMBERS = re.compile(r'[\d.]+')
 _SETTLING = 1.0  # s, chosen: before that a node may rightly complain of one that is not yet active
-_LOSSES = {DRIVER.name: 'lost', RECORDER.name: 'lost', CONTROL.name: 'bridged'}
+_MISSING = {DRIVER.name: 'lost', CONTROL.name: 'bridged'}
 
 
 def line(label: str, text: str) -> str:
@@ -45,7 +46,8 @@ class Happenings(Witness):
         self._mounts = {node.mount for node in nodes if node.mount}
         self._damping: dict[str, int] = {}  # mount -> stamp since which it damps, ns
         self._times_on = 0
-        self._losses: dict[str, int] = {}
+        self._lost = 0  # messages, by the recorder
+        self._missing: dict[str, dict[str, int]] = {}  # mount -> samples that are missing, by whom
         self._rations: dict[str, Ration] = {}
 
     def begin(self) -> None:
@@ -69,7 +71,7 @@ class Happenings(Witness):
         """Damping and losses at this moment, in one line."""
         times = '' if self._times_on == 1 else f', switched on {self._times_on} times'
         damping = f'damping {"on" if self._damping else "off"}{times}' if self._times_on else 'no damping yet'
-        lost = sum(self._losses.values())
+        lost = self._lost + sum(max(counts.values()) for counts in self._missing.values())
         return f'{damping}; {f"{lost} samples or messages lost" if lost else "nothing lost"}'
 
     def state(self, node: GraphNode, state: str) -> None:
@@ -86,8 +88,12 @@ class Happenings(Witness):
             self._find_zero(figures)
         elif node == CONTROL.name and figures.get('damping_active') == 'False':
             self._end_damping(mount, figures.get('last_stamp', ''))
-        if node in _LOSSES:
-            self._losses[name] = _number(figures.get(_LOSSES[node], ''))
+        if node in _MISSING:
+            self._note_missing(mount, node, figures.get(_MISSING[node], ''))
+        elif node == RECORDER.name:
+            self._lost = _number(figures.get('lost', ''))
+            for topic, count in _missing_displacements(figures):
+                self._note_missing(next((m for m in self._mounts if f'/{m}/' in topic), mount), node, count)
         self._tell_sentence(name, node, figures)
 
     def mark(self, mount: str, mark: Mark) -> None:
@@ -107,6 +113,10 @@ class Happenings(Witness):
         if self._zero is None and samples:
             steps = samples + _number(figures.get('lost', '')) - 1
             self._zero = last - round(steps * 1e9 / float(figures['sample_rate']))
+
+    def _note_missing(self, mount: str, teller: str, count: str) -> None:
+        """Note what one of the nodes misses; a sample that is lost on its way all behind it miss too."""
+        self._missing.setdefault(mount, {})[teller] = _number(count)
 
     def _end_damping(self, mount: str, stamp: str) -> None:
         if _number(stamp) > self._damping.get(mount, _number(stamp)):
@@ -139,6 +149,14 @@ class Happenings(Witness):
 
 def _short(name: str) -> str:
     return name.replace('mount_', '')
+
+
+def _missing_displacements(figures: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Yield topic and number of the samples that are missing between the stamps that the recorder saw."""
+    for name, count in figures.items():
+        kind, _, topic = name.partition('.')
+        if kind == 'missing' and topic.endswith(f'/{DISPLACEMENT.name}'):
+            yield topic, count
 
 
 def _gaps(figures: Mapping[str, str]) -> str:

@@ -10,7 +10,7 @@ A watch gives the priority back, for all of them until an activation after 30 s 
 
 - one of them used more than its share of a core (a loop that spins, or more work than the machine carries);
 - an ordinary thread of the process wanted to run and could not (the loops of all graphs take the machine);
-- a loop with a clock of its own missed most of its periods (it gains nothing by its priority).
+- a loop with a clock of its own missed most of its periods for 3 s (it gains nothing by its priority).
 
 The watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that,
 or threads in C spin on all cores while another one has it, the system's own bound (RLIMIT_RTTIME) ends the
@@ -34,7 +34,8 @@ HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
 WATCH_PERIOD = 0.2  # s, chosen
 _WINDOW = 5  # periods, chosen: 1 s
 _SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
-_MISSED = 0.5  # of the periods of a window, chosen: a stall of the machine for 0.2 s is not meant
+_MISSED = 0.5  # of the periods between two looks, chosen
+_LATE = 15  # looks in a row, chosen: 3 s; to catch up after a stall of the machine takes less
 _REST = 30.0  # s, chosen: no activation takes it again meanwhile, else restarts keep the machine busy
 _PATIENCE = (
     3  # periods of the watch without a pulse, chosen: 0.6 s; Linux leaves 50 ms of each second at least
@@ -96,6 +97,7 @@ class RealTime:
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
         self._past: deque[_Look] = deque(maxlen=_WINDOW + 1)
+        self._late: list[Beats] = []  # of each of the last looks since which most periods were missed
         self._waiting: tuple[float, int] = (math.nan, 0)  # processor time of the ordinary thread; periods
 
     @property
@@ -227,13 +229,17 @@ class RealTime:
         return f'an ordinary thread had to wait for a processor for {limit:g} s (limit {limit:g} s)'
 
     def _missed(self) -> str:
-        if len(self._past) <= _WINDOW:
+        if len(self._past) < 2:
+            self._late = []
             return ''
-        before, now = self._past[0].beats, self._past[-1].beats
-        periods, missed = now.periods - before.periods, now.missed - before.missed
-        if periods <= 0 or missed <= _MISSED * periods:
+        before, now = self._past[-2].beats, self._past[-1].beats
+        lately = Beats(now.periods - before.periods, now.missed - before.missed)
+        self._late = [*self._late, lately] if lately.missed > _MISSED * lately.periods else []
+        if len(self._late) < _LATE:
             return ''
-        return f'the loop missed {missed} of {periods} periods (limit {100 * _MISSED:g} %)'
+        periods, missed = (sum(each) for each in zip(*self._late, strict=True))
+        limits = f'{100 * _MISSED:g} % for {_LATE * WATCH_PERIOD:g} s'
+        return f'the loop missed {missed} of {periods} periods (limit {limits})'
 
 
 class _Look(NamedTuple):
