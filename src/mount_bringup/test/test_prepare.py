@@ -4,27 +4,22 @@ import subprocess
 import sys
 
 _AFTER = """
-import gc
-from numba.core.dispatcher import Dispatcher
 from mount_bringup.prepare import prepare
 from mount_control.node import MountControl
 from mount_init.node import MountInit
 from mount_ros.nodes.hosting import ros_context, transition
+from mount_ros.testing import compiled_so_far
 from mount_sim.node import MountSim
 
-def loaded():
-    found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
-    return {(each.__qualname__, str(kinds)) for each in found for kinds in each.overloads}
-
 prepare(scenarios=['motorway'], policies=['continuous_viscous'])
-before = loaded()
+before = compiled_so_far()
 with ros_context({domain}) as context:
     for kind in (MountSim, MountInit, MountControl):
         node = kind(context=context)
         transition(node.trigger_configure, node, 'node')
         node.close()
         node.destroy_node()
-print(len(before), sorted(loaded() - before))
+print(len(before), sorted(compiled_so_far() - before))
 """
 
 

@@ -21,7 +21,7 @@ _SCENARIOS = ('bench', 'motorway')
 def prepare(scenarios: Sequence[str] = _SCENARIOS, policies: Sequence[str] = tuple(POLICIES)) -> None:
     """Compile for these scenarios and policies, or load what is compiled already.
 
-    A worker of a fleet that compiles by itself takes some 80 MB more while it does.
+    A worker of a fleet that compiles by itself takes some 45 MiB more.
     """
     with tempfile.TemporaryDirectory() as folder:
         for number, (scenario, policy) in enumerate(product(scenarios, policies)):

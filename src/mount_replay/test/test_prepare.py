@@ -4,21 +4,17 @@ import subprocess
 import sys
 
 _AFTER = """
-import gc, sys
-from numba.core.dispatcher import Dispatcher
+import sys
 from mount_bags.run.session import session_text
 from mount_replay.fleet.catalogue.places import places
 from mount_replay.fleet.catalogue.reading import read_place
 from mount_replay.fleet.what_if.one import replay_one
 from mount_replay.loop import recording
 from mount_replay.prepare import prepare
-
-def loaded():
-    found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
-    return {(each.__qualname__, str(kinds)) for each in found for kinds in each.overloads}
+from mount_ros.testing import compiled_so_far
 
 prepare(scenarios=['motorway'], policies=['switched_viscous'])
-before = loaded()
+before = compiled_so_far()
 recording.LONG_CHUNK_SIZE = 4000  # bytes: many chunks, as in a recording of a car
 sim = {'scenario': 'motorway', 'timeline.duration': 4.0, 'seed': 3}
 parameters = {'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}
@@ -27,7 +23,7 @@ recording.record_core(recording.Path(sys.argv[1]) / 'drive', parameters, session
 for place in places([sys.argv[1]]).values():
     row, = read_place(place).recordings
     replayed, = replay_one(place, {'mount_control': {'highest_current': 0.7}}).rows
-    print(row['reason'] or 'indexed', replayed['outcome'], len(before), sorted(loaded() - before))
+    print(row['reason'] or 'indexed', replayed['outcome'], len(before), sorted(compiled_so_far() - before))
 """
 
 

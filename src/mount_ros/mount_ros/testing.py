@@ -9,6 +9,7 @@ context of its own: what those leave behind in the middleware when they end is n
 
 import contextlib
 import fcntl
+import gc
 import os
 import random
 import tempfile
@@ -82,6 +83,14 @@ def wait_until(condition: Callable[[], Found], what: str, limit: float = LIMIT) 
             pytest.fail(f'{what} did not happen within {limit:g} s')
         time.sleep(0.002)
     return found
+
+
+def compiled_so_far() -> set[tuple[str, str]]:
+    """Return name and argument types of all that numba has compiled or loaded in this process."""
+    from numba.core.dispatcher import Dispatcher
+
+    found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+    return {(each.py_func.__qualname__, str(kinds)) for each in found for kinds in each.overloads}
 
 
 @pytest.fixture
