@@ -66,6 +66,24 @@ def test_what_is_not_as_required_is_said(zero_at, until, sentences, wrong):
     assert wrong in outcome.wrong
 
 
+def test_a_coil_that_carries_current_though_none_is_wanted_is_said_where_the_graph_can_take_it_away():
+    seen = observed(10.02, told=(told(10.1),))
+    seen.seen = [each._replace(coil_current=0.2) for each in seen.seen]
+    wrong = judged(case(Reaction.SAFE_WHILE), COURSE, seen).wrong
+    assert 'the coil carries 0.2 A at the end of the fault; the limit is 0.05 A' in wrong
+    assert judged(case(Reaction.SAFE_WHILE, coil_apart=True), COURSE, seen).ok
+    seen.seen.clear()
+    assert 'nobody has seen' in judged(case(Reaction.SAFE_WHILE), COURSE, seen).wrong
+
+
+def test_the_current_of_the_coil_is_the_last_that_was_seen_of_it_however_late_the_others_came():
+    seen = observed(10.02, told=(told(10.1),))
+    last = [each for each in seen.seen if each.time < 10.6]
+    held_up = [each._replace(time=10.59, coil_current=1.0) for each in last[-100:-1]]  # all came at once
+    seen.seen = [*last[:-100], *held_up, last[-1]]
+    assert judged(case(Reaction.SAFE_WHILE), COURSE, seen).coil_current == 0.0
+
+
 def test_a_fault_that_must_be_tolerated_may_not_switch_off_or_tell_an_error():
     assert judged(case(Reaction.TOLERATED), COURSE, observed(None)).ok
     assert 'damping should go on' in judged(case(Reaction.TOLERATED), COURSE, observed(10.1)).wrong

@@ -4,7 +4,7 @@ import threading
 import time
 from collections.abc import Mapping
 
-from mount_sim.loop import LOCKSTEP_WAIT, ElectronicsLoop, NoAnswerError, OwnWork
+from mount_sim.loop import LOCKSTEP_WAIT, ElectronicsLoop, NoAnswerError, OwnWork, until_ending
 
 
 class CarLoop:
@@ -20,23 +20,25 @@ class CarLoop:
         """Sample all mounts by the electronics' clock, as `ElectronicsLoop` does for one."""
         period = 1.0 / self._sample_rate / (1.0 + self._clock_drift)
         own = OwnWork(period)
-        begin, taken = time.monotonic(), 0
-        while not ending.is_set():
+        begin = time.monotonic()
+        for number, _ in enumerate(until_ending(ending, self._discharged), 1):
             for _, loop in self._loops:
                 loop.send_sample()
             for _, loop in self._loops:
-                loop.wait_for_answer(own.latest_begin(begin + (taken + 1) * period))
+                loop.wait_for_answer(own.latest_begin(begin + number * period))
             with own:
                 for _, loop in self._loops:
                     loop.go_on()
-            taken += 1
             now = time.monotonic()
-            remaining = begin + taken * period - now
+            remaining = begin + number * period - now
             for _, loop in self._loops:
                 loop.figures.wall_time = now - begin
                 loop.figures.overruns += remaining <= 0.0  # the next samples follow at once: none is skipped
             if remaining > 0.0:
                 time.sleep(remaining)
+
+    def _discharged(self) -> bool:
+        return all(loop.discharged() for _, loop in self._loops)
 
     def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
         """Sample as fast as all answers come; raise `NoAnswerError` after `patience` s without one."""

@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from mount_driver.codec import Status
@@ -18,7 +18,8 @@ LOCKSTEP_WAIT = 0.1
 
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
-
+_DISCHARGED = 0.01  # A, chosen: a coil with less carries no current
+_DISCHARGE_LIMIT = 0.1  # s, chosen: the setpoint timeout, then several times what a sound coil needs
 
 _FORGOTTEN = 0.01  # chosen: of the longest time that the work took, from one sample to the next
 _RESERVE = 1.5  # chosen: times the work's longest time are kept for it
@@ -26,6 +27,18 @@ _RESERVE = 1.5  # chosen: times the work's longest time are kept for it
 
 class NoAnswerError(RuntimeError):
     """In lock-step a sample was not answered in time."""
+
+
+def until_ending(ending: threading.Event, discharged: Callable[[], bool]) -> Iterator[None]:
+    """Yield for each sample until `ending` is set and the coils are `discharged`, or 0.1 s after `ending`.
+
+    Electronics outlive the graph: its last setpoint is followed, and the truth shows that the current goes.
+    """
+    while not ending.is_set():
+        yield
+    limit = time.monotonic() + _DISCHARGE_LIMIT
+    while not discharged() and time.monotonic() < limit:
+        yield
 
 
 @dataclass
@@ -92,14 +105,15 @@ class ElectronicsLoop:
         self.last_latency = math.nan
 
     def run_in_real_time(self, ending: threading.Event) -> None:
-        """Sample by the electronics' clock until `ending` is set, behind the end of the run too.
+        """Sample by the electronics' clock until `ending` is set and the coil is discharged.
 
-        Electronics do not fall silent when a drive is over; if they did, the control would rightly report it.
+        So it goes on behind the end of the run: electronics do not fall silent when a drive is over; if they
+        did, the control would rightly report it.
         """
         period = 1.0 / self._mount.sample_rate / (1.0 + self._electronics.clock_drift)
         own = OwnWork(period)
         begin = time.monotonic()
-        while not ending.is_set():
+        for _ in until_ending(ending, self.discharged):
             self.send_sample()
             self.wait_for_answer(own.latest_begin(begin + (self._mount.sample + 1) * period))
             with own:
@@ -115,6 +129,10 @@ class ElectronicsLoop:
         """Take the next sample with the newest setpoint, whether or not one has come."""
         self.send_sample()
         self.go_on()
+
+    def discharged(self) -> bool:
+        """Whether the coil carries no current any more."""
+        return abs(self._mount.truth['coil_current']) < _DISCHARGED
 
     def send_sample(self) -> None:
         """Send the next sample, and take the newest setpoint, if one has come, for the time from it on."""

@@ -17,7 +17,7 @@ from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters, Reading
-from mount_sim.loop import ElectronicsLoop, NoAnswerError
+from mount_sim.loop import ElectronicsLoop, NoAnswerError, until_ending
 from mount_sim.plant.simulated_mount import DivergedError
 
 CODEC = MountCodec()
@@ -413,6 +413,30 @@ def test_a_frame_that_switches_off_brings_0_ampere_in_real_time(ends, make_mount
     finally:
         ending.set()
         running.join()
+
+
+def test_electronics_that_are_asked_to_end_in_real_time_go_on_until_the_coil_is_discharged(ends, make_mount):
+    end, host = ends
+    mount, ending = make_mount(timeline__duration=20.0), threading.Event()
+    running = _in_thread(_loop(mount, end).run_in_real_time, ending)
+    try:
+        sample = _next_sample(host)
+        while mount.truth['coil_current'] < 0.5:
+            host.send(Setpoint(1.0, sample.sample_counter))
+            sample = _next_sample(host)
+    finally:
+        ending.set()
+        running.join()
+    assert mount.truth['coil_current'] < 0.01  # A
+
+
+def test_electronics_end_though_their_coil_keeps_its_current():
+    ending = threading.Event()
+    ending.set()
+    begin = time.monotonic()
+    for _ in until_ending(ending, lambda: False):
+        time.sleep(1e-3)
+    assert time.monotonic() - begin >= 0.1  # s; that it ends at all is what is asked
 
 
 def _next_sample(host):

@@ -25,6 +25,7 @@ ACTIVATE, DEACTIVATE = Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEA
 _ANOTHER = (
     'another|a second |second sender|publisher|writer'  # words that name who sends what only one may send
 )
+_SILENCE = 'no frames|no displacement|no setpoint'
 _HOUR = 3600.0  # s
 
 
@@ -82,7 +83,7 @@ def _lost(node: str, reaction: Reaction, **options) -> FaultCase:
 
 
 BUS = (
-    _simulated('can_silent', _WHILE, 'no frames|no displacement|no setpoint', silent=True, third=True),
+    _simulated('can_silent', _WHILE, _SILENCE, silent=True, third=True),
     _simulated('bus_off', _WHILE, 'bus off', silent=True, in_electronics=True),
     _simulated('lost_1', _TOLERATED, 'samples lost'),
     _simulated('lost_5', _TOLD, 'samples lost', lasts=1.5, third=True),
@@ -129,8 +130,8 @@ SENSORS = (
 COIL = (
     _off('coil_open', 'coil current', third=True),
     _off('coil_half', 'coil current'),
-    _off('coil_stuck', 'coil current'),
-    _off('coil_stuck_on', 'coil current'),
+    _off('coil_stuck', 'coil current', coil_apart=True),
+    _off('coil_stuck_on', 'coil current', coil_apart=True),
     _off('coil_shorted', 'coil'),
     _simulated('coil_hot', _TOLD, 'coil temperature'),
     _off('supply_0', 'supply'),
@@ -171,13 +172,13 @@ PROCESSES = (
     _stopped('driver', '2_s', 2.0, _WHILE, 'no displacement|no samples', in_electronics=True),
     _stopped('recorder', '200_ms', 0.2, _TOLERATED),
     _stopped('recorder', '2_s', 2.0, _TOLERATED, third=True),
-    _stopped('sim', '200_ms', 0.2, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
-    _stopped('sim', '2_s', 2.0, _WHILE, 'no frames|no displacement|no setpoint', silent=True),
+    _stopped('sim', '200_ms', 0.2, _WHILE, _SILENCE, silent=True, coil_apart=True),
+    _stopped('sim', '2_s', 2.0, _WHILE, _SILENCE, silent=True, coil_apart=True),
     _lost('control', _WHILE, silent=True, third=True),
     _lost('driver', _INITIALISE, silent=True, in_electronics=True, third=True),
     _lost('init', _TOLD),
     _lost('recorder', _TOLD, loses_samples=True),
-    _lost('sim', _INITIALISE, silent=True, ends_drive=True),
+    _lost('sim', _INITIALISE, silent=True, ends_drive=True, coil_apart=True),
     FaultCase(
         'kill_supervisor', 'SIGKILL of the supervisor', Killed('supervisor'), _INITIALISE,
         'started this one .* has ended', ends_drive=True,

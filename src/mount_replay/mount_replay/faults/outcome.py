@@ -3,7 +3,6 @@
 import math
 import re
 from dataclasses import dataclass, field
-from statistics import median
 from typing import Any
 
 from mount_models.sampling import HIGHEST_CURRENT
@@ -13,8 +12,7 @@ from mount_ros.nodes.diagnostics import Level
 
 AFTER_DETECTION = 0.020  # s: 0 A on the bus, from the first sign that the fault was detected
 AFTER_OCCURRENCE = 0.050  # s: 0 A on the bus, from the beginning of silence
-_NO_CURRENT = 0.01  # A, chosen: below it the coil carries none
-_LAST = 0.03  # s, chosen: the end of a fault, over which the coil's current is told; some end after 0.1 s
+_NO_CURRENT = 0.05  # A, chosen: the coil with less gives the pads hardly any force
 _LATENESS = re.compile('no (displacement|setpoint) ')  # of a machine with other work
 _REMEDY = re.compile(r'[;:?,] *\w+ \w+')
 
@@ -92,9 +90,7 @@ def judged(case: FaultCase, course: Course, observed: Observers) -> Outcome:
     if zero is not None:
         outcome.zero_s = round(zero - course.begun, 4)
     if seen:
-        outcome.coil_current = round(
-            median(each.coil_current for each in since(seen, seen[-1].time - _LAST)), 3
-        )
+        outcome.coil_current = round(seen[-1].coil_current, 3)
     outcome.highest_current = round(max((each.current for each in heard), default=0.0), 4)
     _note_recovery(outcome, case, course)
     _check_initialised(outcome, case, course, observed)
@@ -171,6 +167,8 @@ def _check_safe(outcome: Outcome, case: FaultCase, course: Course, told: list[To
         last = wanted[-1][1] if wanted else math.nan
         outcome.complaints.append(f'the current does not stay at 0 A: {last:.2f} A at the end of the fault')
         return
+    if not case.coil_apart:
+        _check_discharged(outcome)
     if case.silent and outcome.zero_s > AFTER_OCCURRENCE:
         outcome.late.append(
             f'0 A after {1e3 * outcome.zero_s:.0f} ms; the limit is {1e3 * AFTER_OCCURRENCE:g} ms'
@@ -181,6 +179,16 @@ def _check_safe(outcome: Outcome, case: FaultCase, course: Course, told: list[To
     over = course.ended or case.for_good
     if not outcome.recovered and not (over and case.reaction is Reaction.SAFE_UNTIL_INITIALISED):
         outcome.complaints.append('it does not damp again')
+
+
+def _check_discharged(outcome: Outcome) -> None:
+    if outcome.coil_current is None:
+        outcome.complaints.append('nobody has seen the current of the coil')
+    elif not outcome.coil_current < _NO_CURRENT:
+        outcome.complaints.append(
+            f'the coil carries {outcome.coil_current:g} A at the end of the fault; the limit is '
+            f'{_NO_CURRENT:g} A'
+        )
 
 
 def _check_not_started(
