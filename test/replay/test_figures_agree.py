@@ -184,12 +184,24 @@ def test_switching_is_told_on_the_same_axis(good):
     assert f'damping on on (s) off (s) lasted highest displacement highest current {on:.3f}' in good.report
 
 
+def test_control_that_was_late_for_the_excitation_is_a_complaint(good, tmp_path):
+    assert good.summary['control_from_s'] == pytest.approx(2.75, abs=0.1)
+    late = command(
+        'drive', '--core', '--scenario', 'bench', '--duration', '1.5', '--no-report',
+        '--set', 'mount_sim.timeline.start=2', '--out', tmp_path / 'run',
+    )  # fmt: skip
+    assert late.exit_code == 1
+    begin = json.loads((tmp_path / 'run/summary.json').read_text())['control_from_s']
+    assert f'control from {begin:.2f} s on' in ' '.join(late.output.split())
+    assert f'its first sample {begin - 2.0:.1f} s after the excitation began (limit 0.5 s)' in late.output
+
+
 @pytest.mark.parametrize('mount', ['hydro', 'elastomer', 'friction_off'])
 def test_a_mount_in_which_control_can_do_nothing_has_no_figures_of_friction(tmp_path, mount):
     found = told(tmp_path / 'run', '--mount', mount)
     assert found.codes == (0, 0)
-    figures = ('switch_on_s', 'switch_off_s', 'peak_current_a', 'tracking_error_rms')
-    assert [found.summary[name] for name in figures] == [None] * 4
+    figures = ('control_from_s', 'switch_on_s', 'switch_off_s', 'peak_current_a', 'tracking_error_rms')
+    assert [found.summary[name] for name in figures] == [None] * 5
     assert 'friction not applicable: ' in found.terminal
     for words in ('damping switched', 'peak current', 'friction force error'):
         assert words not in found.terminal

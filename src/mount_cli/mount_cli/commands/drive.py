@@ -41,8 +41,9 @@ if TYPE_CHECKING:
     from mount_replay.drive.brought import Brought
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
-control was active, no fault, and the recording whole; 1 when one of these did not hold, or nothing was
-driven, with the reason; 2 for a wrong use of the command; 130 when interrupted.
+control was active, control active when the excitation began (0.5 s later at most), no fault, and the
+recording whole; 1 when one of these did not hold, or nothing was driven, with the reason; 2 for a wrong
+use of the command; 130 when interrupted.
 
 Times are in s from the first displacement sample, as in `report`, `cut` and `compare`.
 

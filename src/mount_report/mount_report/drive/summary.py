@@ -23,6 +23,7 @@ from mount_report.drive.signals import DriveSignals, excitation_stamp
 from mount_sim.plant.mounts import without_friction
 
 _UM, _MM, _US = 1e6, 1e3, 1e6
+_LATE_CONTROL = 0.5  # s, chosen: of an excitation without damping, which an order may have in it
 
 
 def summarise(
@@ -50,6 +51,7 @@ def summarise(
         'mode': run['mode'],
         'mount': seat_of(parameters),
         'excitation_start_s': start,
+        'control_from_s': friction.control_from,
         'duration_s': float(drive.seen.time[-1] - max(drive.seen.time[0], start)),
         **found.as_json(),
         'restarts': [_restart(entry, drive.zero) for entry in run['restarts']],
@@ -75,6 +77,7 @@ def summarise(
 class _FrictionFigures:
     """What the control did to the friction; all None with a mount in which it can do nothing."""
 
+    control_from: float | None = None
     switch_on: list[float] | None = None
     switch_off: list[float] | None = None
     peak_current: float | None = None
@@ -91,7 +94,30 @@ def _friction_figures(
     time = (trace.stamps[order] - drive.zero) / 1e9
     on, off = switching_times(time, trace['damping_active'][order])
     error = tracking_error(drive, *policy_of(parameters))
-    return _FrictionFigures(on.tolist(), off.tolist(), _known(peak_current(recording, audits)), _known(error))
+    return _FrictionFigures(
+        control_from=float(time[0]) if len(time) else None,
+        switch_on=on.tolist(),
+        switch_off=off.tolist(),
+        peak_current=_known(peak_current(recording, audits)),
+        tracking_error=_known(error),
+    )
+
+
+def late_control(figures: Mapping[str, Any]) -> list[str]:
+    """Return a sentence if control answered its first sample well behind the start of the excitation."""
+    if without_friction(figures['mount']):
+        return []
+    begin, start = figures['control_from_s'], figures['excitation_start_s']
+    if begin is None:
+        return ['control answered no sample: the mount had no damping; look at its log']
+    late = begin - start
+    if late <= _LATE_CONTROL:
+        return []
+    return [
+        f'control answered its first sample {late:.1f} s after the excitation began (limit {_LATE_CONTROL:g} '
+        's); until then the mount had no damping: drive again if the initialisation was repeated, or give it '
+        'more time by mount_sim.timeline.start'
+    ]
 
 
 def _restart(restart: Restart, zero: int) -> dict[str, Any]:
@@ -134,6 +160,7 @@ def print_summary(figures: dict[str, Any], found: Losses, screen: Screen, mount:
     rows = [
         *(_gap_row(figures, name) for name in ('rest', 'contact')),
         ('excitation', f'from {figures["excitation_start_s"]:.2f} s on'),
+        *_control_row(figures),
         ('peak displacement', f'{_MM * figures["peak_displacement_m"]:.2f} mm'),
         *_friction_rows(figures),
         *found.rows(),
@@ -148,6 +175,13 @@ def _gap_row(figures: dict[str, Any], name: str) -> tuple[str, str]:
     measured, std = _UM * figures[f'{name}_gap_m'], _UM * figures[f'{name}_gap_std_m']
     true = _UM * figures[f'true_{name}_gap_m']
     return f'{name} gap', f'{measured:.1f} ± {std:.1f} µm measured, {true:.1f} µm true'
+
+
+def _control_row(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    if without_friction(figures['mount']):
+        return []
+    begin = figures['control_from_s']
+    return [('control', 'answered no sample' if begin is None else f'from {begin:.2f} s on')]
 
 
 def _switching_text(figures: dict[str, Any]) -> str:

@@ -18,6 +18,7 @@ from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_report.drive.evaluation import levels_of, samples_at_the_ends
 from mount_report.drive.signals import DriveSignals, load_drive
 from mount_report.drive.summary import (
+    late_control,
     print_summary,
     snapshots_sentence,
     summarise,
@@ -86,8 +87,8 @@ def _tell_mount(
         drive = load_drive(recording)
     mount = f'{recording.mount}: ' if recording.mount else ''
     complaints = [*found.complaints(), *samples_at_the_ends(recording, audits, run['samples'])]
-    told.complaints += [f'{mount}{words}' for words in complaints]
     figures = summarise(recording, audits, found, drive, parameters, run)
+    told.complaints += [f'{mount}{words}' for words in (*complaints, *late_control(figures))]
     print_summary(figures, found, screen, mount)
     screen.table(as_table(audits))
     if report:
