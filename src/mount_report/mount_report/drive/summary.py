@@ -23,7 +23,7 @@ from mount_report.drive.signals import DriveSignals, excitation_stamp
 from mount_sim.plant.mounts import without_friction
 
 _UM, _MM, _US = 1e6, 1e3, 1e6
-_LATE_CONTROL = 0.5  # s, chosen: of an excitation without damping, which an order may have in it
+_LATE_CONTROL = 0.5  # s, chosen: so much of the excitation may pass before control answers
 
 
 def summarise(
