@@ -11,6 +11,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 Taken = tuple[bytes, dict[str, int]]
@@ -23,6 +24,14 @@ def raw_taker(subscription: Subscription) -> Callable[[], Taken | None]:
     The subscription must not be destroyed meanwhile.
     """
     return partial(subscription.handle.take_message, subscription.msg_type, True)
+
+
+def raw_publisher(publisher: Publisher) -> Callable[[bytes], None]:
+    """Return the function that publishes serialised bytes, 6 to 11 us faster than `publish`.
+
+    It raises an `RCLError` once the publisher is destroyed.
+    """
+    return publisher.handle.publish_raw
 
 
 def given_at_start(node: Node) -> frozenset[str]:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-_BINS_PER_DECADE = 50  # chosen: 4.7 % wide bins
+_BINS_PER_DECADE = 200  # chosen: 1.2 % wide bins
 _LOWEST = 1e-6  # s
 _DECADES = 7
 

@@ -27,10 +27,12 @@ def subscription(source):
     return source.node.create_subscription(kind, DISPLACEMENT.name, print, qos, raw=True)
 
 
-def test_the_names_are_there(subscription):
+def test_the_names_are_there(source, subscription):
     assert isinstance(getattr(Subscription, 'handle', None), property), CHANGED.format('Subscription.handle')
     assert hasattr(subscription, 'msg_type'), CHANGED.format('Subscription.msg_type')
     assert callable(getattr(subscription.handle, 'take_message', None)), CHANGED.format('take_message')
+    publisher = source.node.create_publisher(message_class(DISPLACEMENT.type), DISPLACEMENT.name, 1)
+    assert callable(getattr(publisher.handle, 'publish_raw', None)), CHANGED.format('publish_raw')
     assert hasattr(LifecycleNodeMixin, '_LifecycleNodeMixin__change_state'), CHANGED.format('__change_state')
 
 

@@ -35,6 +35,8 @@ class ChainRun(NamedTuple):
 
     latency: float
     """Median from a sample's frame to the frame that answers it."""
+    latency_p99: float
+    """99 % of them are below."""
     cpu: float
     """Share of one core that the processes between the frames used."""
     start: float
@@ -43,6 +45,8 @@ class ChainRun(NamedTuple):
     """Memory that the process that grew most won, B."""
     missing: float
     """Share of the samples that were not answered."""
+    unrecorded: float = 0.0
+    """Messages that came to the recorder and do not stand in its file."""
 
 
 class Place(NamedTuple):
@@ -55,20 +59,21 @@ class Place(NamedTuple):
 def run_graph(
     place: Place, seconds: float, sample_rate: float = SAMPLE_RATE, *, composed: bool = False
 ) -> ChainRun:
-    """Drive the bench scenario for `seconds`, every node in a process or `composed`, without a recorder."""
+    """Drive the bench scenario for `seconds` and record it, every node in a process or `composed`."""
     port = {'port': can_port(place.domain, '')}
     drive = {'scenario': 'bench', 'timeline.duration': 3600.0, **port}
-    parameters = with_sample_rate({DRIVER.name: port, SIM.name: drive}, sample_rate)
-    nodes = tuple(node for node in SIMULATED if node is not RECORDER)
     prepare_environment()
     with tempfile.TemporaryDirectory() as folder, domain_lock(place.domain, ''):
+        recording = {'uri': f'{folder}/recording'}
+        chosen = {DRIVER.name: port, SIM.name: drive, RECORDER.name: recording}
+        parameters = with_sample_rate(chosen, sample_rate)
         settings = GraphSettings(
             domain=place.domain,
             parameters=parameters,
             grouping=Grouping.COMPOSED if composed else Grouping.APART,
             priority=place.priority,
         )
-        supervisor = Supervisor(nodes, settings, Path(folder))
+        supervisor = Supervisor(SIMULATED, settings, Path(folder))
         begin = time.monotonic()
         try:
             supervisor.start(lambda told: session_text({'parameters': told}), lambda words: None)
@@ -78,11 +83,20 @@ def run_graph(
             modules = [f'from {node.package}.node' for node in (DRIVER, INIT, CONTROL)]
             with _watched(children(modules)) as found:
                 _serve(supervisor, seconds)
-            after, latency = supervisor.figures(DRIVER), supervisor.figures(SIM)['latency_median_s']
+            after, bus = supervisor.figures(DRIVER), supervisor.figures(SIM)
             samples, answered = (int(after[name]) - before[name] for name in ('samples', 'setpoints'))
+            lost = int(supervisor.figures(RECORDER)['lost'])
         finally:
             supervisor.stop()
-    return ChainRun(float(latency), found['cpu'], start, found['growth'], 1.0 - answered / max(1, samples))
+    return ChainRun(
+        float(bus['latency_median_s']),
+        float(bus['latency_p99_s']),
+        found['cpu'],
+        start,
+        found['growth'],
+        1.0 - answered / max(1, samples),
+        lost,
+    )
 
 
 def run_relay(
@@ -97,7 +111,8 @@ def run_relay(
             told = json.loads(_line(peer))
         peer.wait()
     missing = 1.0 - told['answered'] / told['samples']
-    return ChainRun(told['latency_median_s'], found['cpu'], first - begin, found['growth'], missing)
+    latencies = told['latency_median_s'], told['latency_p99_s']
+    return ChainRun(*latencies, found['cpu'], first - begin, found['growth'], missing)
 
 
 def relay_in_turn(place: Place, seconds: float) -> float:

@@ -38,9 +38,14 @@ def graph_figures(place: Place, seconds: float, rounds: int, say: Say) -> dict[s
         apart_events.append(run_relay(place, seconds, executor=EVENTS))
         graph_composed.append(run_graph(place, seconds, composed=True))
     allowed = seconds * _LARGEST_GROWTH
+    unrecorded = max(run.unrecorded for run in (*graph, *graph_composed))
     return {
         'latency': _compared('setpoint latency', graph, _APART, apart, 'latency'),
         'latency_composed': _compared('setpoint latency, composed', graph_composed, _APART, apart, 'latency'),
+        'latency_p99': _compared('setpoint latency, p99', graph, _APART, apart, 'latency_p99'),
+        'latency_p99_composed': _compared(
+            'setpoint latency, p99, composed', graph_composed, _APART, apart, 'latency_p99'
+        ),
         'latency_events': _compared('setpoint latency', graph, _EVENTS, apart_events, 'latency'),
         'latency_composed_events': _compared(
             'setpoint latency, composed', graph_composed, _EVENTS, apart_events, 'latency'
@@ -54,6 +59,7 @@ def graph_figures(place: Place, seconds: float, rounds: int, say: Say) -> dict[s
             'memory growth of a node', _median(graph, 'growth'), '1 MB in 30 minutes', allowed, 'B'
         ),
         'unanswered': _compared('unanswered samples', graph, _APART, apart, 'missing', '1'),
+        'unrecorded': Comparison('messages lost by the recorder', unrecorded, 'none', 0.0, '1'),
     }
 
 

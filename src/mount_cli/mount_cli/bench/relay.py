@@ -121,8 +121,9 @@ def _measure(port: int, seconds: float, rate: float) -> None:
         sent, late = _sent(bus, seconds, rate) if rate else _sent_in_turn(bus, seconds)
     finally:
         bus.shutdown()
-    median = statistics.median(late)
-    print(json.dumps({'samples': sent, 'answered': len(late), 'latency_median_s': median}), flush=True)
+    percent = statistics.quantiles(late, n=100)
+    told = {'latency_median_s': percent[49], 'latency_p99_s': percent[98]}
+    print(json.dumps({'samples': sent, 'answered': len(late), **told}), flush=True)
 
 
 def _first_answer(bus: can.BusABC) -> float:
