@@ -4,8 +4,10 @@ While a lifecycle transition runs, the executor of its node serves nothing else.
 its own node `<name>_io` and goes on receiving during a blocking activation.
 """
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -15,21 +17,37 @@ from rclpy.publisher import Publisher
 from mount_ros.data_thread import DataThread, Work
 from mount_ros.direct import Receiver
 from mount_ros.messages.types import message_class
+from mount_ros.private_rclpy import raw_publisher
 from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Delivery, Topic
 from mount_ros.writers import WriterWatch
 
 
-def io_node(owner: Node) -> Node:
-    """Return the plain node `<name>_io` that carries the data of the node `owner`."""
+def io_node(owner: Node, name: str = '') -> Node:
+    """Return the plain node `<name>_io` that carries the data of the node `owner`, by default under its name.
+
+    Remappings of topics on the command line hold for it too. One of the name of `owner` does not change
+    `name`: other nodes know the writers of a topic by it.
+    """
     return Node(
-        f'{owner.get_name()}_io',
+        f'{name or owner.get_name()}_io',
         namespace=owner.get_namespace(),
         context=owner.context,
+        cli_args=['--ros-args', *topic_remappings(sys.argv, owner.get_name())],
         use_global_arguments=False,
         start_parameter_services=False,
         enable_rosout=False,
     )
+
+
+def topic_remappings(arguments: Sequence[str], node: str) -> list[str]:
+    """Return those of the command line's `arguments` that remap topics of `node`, without its name."""
+    kept: list[str] = []
+    for option, rule in pairwise(arguments):
+        *of_node, name = rule.partition(':=')[0].split(':')
+        if option in ('-r', '--remap') and of_node in ([], [node]) and not name.startswith('__'):
+            kept += ['-r', rule.removeprefix(f'{node}:')]
+    return kept
 
 
 class DataPath:
@@ -41,11 +59,12 @@ class DataPath:
         *,
         lockstep: bool = False,
         thread: DataThread | None = None,
-        on_writers: Callable[[], None] = lambda: None,
+        on_writers: Callable[[str, str], None] = lambda foreign, doubt: None,
+        name: str = '',
     ):
         self.lockstep = lockstep
         self._thread = thread or DataThread(owner.context)
-        self.node = io_node(owner)
+        self.node = io_node(owner, name)
         self.writers = WriterWatch(self.node, on_writers)
         """Who publishes what this path hears; `on_writers` is called when others begin or cease to."""
         self._serving = False
@@ -82,10 +101,11 @@ class DataPath:
         """
         placed = replace(topic, name=f'{mount}/{topic.name}') if mount else topic
         publisher = self.publisher(placed)
+        publish = raw_publisher(publisher)
         if self.lockstep:
-            return publisher.publish
+            return publish
         self._sent_directly.append(publisher.topic_name)
-        return self._thread.direct.sender(publisher.topic_name, publisher.publish)
+        return self._thread.direct.sender(publisher.topic_name, publish)
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None], *, directly: bool = False) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`.

@@ -43,11 +43,12 @@ class WriterWatch:
     """Holds the publishers of the heard topics against those that the registry names; any thread may ask.
 
     A topic's own writers are the nodes `<writer>_io` in the namespace of `node`, each once. Where none of
-    them is there, one other node may stand in for them: a replay or a test bench. `on_change` is called, in
-    the thread that finds it, when `foreign` or `doubt` have changed.
+    them is there, one other node may stand in for them: a replay or a test bench. `on_change(foreign, doubt)`
+    is called, in the thread that finds it, when they have changed: one call at a time, each with what holds
+    then, so that of changes found by two threads the newer one is delivered last.
     """
 
-    def __init__(self, node: Node, on_change: Callable[[], None]):
+    def __init__(self, node: Node, on_change: Callable[[str, str], None]):
         self.foreign = ''
         """Which other node publishes on which topic, and the remedy; empty where none does."""
         self.doubt = ''
@@ -56,6 +57,7 @@ class WriterWatch:
         self._on_change = on_change
         self._heard: dict[Topic, _Heard] = {}
         self._guard = threading.Lock()
+        self._delivery = threading.RLock()
 
     def hear(self, topic: Topic, subscription: Subscription) -> None:
         """Watch the writers of `topic`."""
@@ -92,7 +94,14 @@ class WriterWatch:
             self.doubt = next((heard.doubt for heard in self._heard.values() if heard.doubt), '')
             changed = before != (self.foreign, self.doubt)
         if changed:
-            self._on_change()
+            self.deliver()
+
+    def deliver(self) -> None:
+        """Call `on_change` with what holds now."""
+        with self._delivery:
+            with self._guard:
+                foreign, doubt = self.foreign, self.doubt
+            self._on_change(foreign, doubt)
 
     def wait_for_own(self, ending: threading.Event) -> None:
         """Return when no other writer is there, or raise `ForeignWriterError`; a doubt is waited for."""

@@ -366,3 +366,19 @@ def test_a_callback_that_would_wait_for_its_own_thread_is_refused(pair):
     wait_until(lambda: receiver.stamps == [1], 'arrival')
     receiver.path.stop()
     assert len(_data_threads()) == 1  # that of the sender
+
+
+def test_the_topics_of_a_node_are_remapped_with_it_and_its_data_node_keeps_its_registered_name(
+    context, monkeypatch
+):
+    rules = ['displacement:=/car/travel', 'left:coil_ripple:=ripple', 'right:air_gap:=gap', '__node:=left']
+    monkeypatch.setattr('sys.argv', ['mount_driver', '--ros-args', *(w for r in rules for w in ('-r', r))])
+    owner = Node('left', context=context)
+    path = DataPath(owner, name='mount_driver')
+    for topic in (DISPLACEMENT, COIL_RIPPLE, AIR_GAP):
+        path.sender(topic)
+    path.subscribe(CURRENT_SETPOINT, print)
+    assert path.unmatched() == ['/air_gap', '/car/travel', '/current_setpoint', '/ripple']
+    assert path.name == '/mount_driver_io'
+    path.stop()
+    owner.destroy_node()

@@ -10,9 +10,9 @@ import mount_ros.writers
 from mount_ros.data_path import DataPath
 from mount_ros.messages.types import message_class
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import wait_until
+from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, TOPICS
-from mount_ros.writers import NAMING_TIME, ForeignWriterError, NamelessWriter
+from mount_ros.writers import NAMING_TIME, ForeignWriterError, NamelessWriter, WriterWatch
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def heard(context):
     """A data path in a namespace that hears the displacement, and what it was told of writers."""
     owner = Node('listener', namespace='/car', context=context)
     changes = []
-    path = DataPath(owner, on_writers=lambda: changes.append(threading.current_thread().name))
+    path = DataPath(owner, on_writers=lambda *_: changes.append(threading.current_thread().name))
     path.changes = changes
     path.subscribe(DISPLACEMENT, lambda raw: None)
     path.start()
@@ -171,3 +171,52 @@ def test_the_name_of_a_writer_is_awaited_for_a_moment_from_its_first_message(mon
         now[0] = begin + 1.1 * NAMING_TIME
         assert not nameless.is_awaited(True)
         assert not nameless.is_awaited(False)  # named, or gone
+
+
+class Publishers:
+    """The graph as discovery shows it to a subscription: the node that listens, and who publishes."""
+
+    def __init__(self, *names):
+        self.names = names
+
+    def get_namespace(self):
+        return '/'
+
+    def get_publisher_count(self):
+        return len(self.names)
+
+    def get_publishers_info_by_topic(self, _):
+        kind = DISPLACEMENT.type
+        return [types.SimpleNamespace(node_name=n, node_namespace='/', topic_type=kind) for n in self.names]
+
+
+def test_of_two_changes_found_by_two_threads_the_newer_one_is_delivered_last():
+    publishers, delivered, first, going_on = (
+        Publishers('mount_driver_io'),
+        [],
+        threading.Event(),
+        threading.Event(),
+    )
+
+    def on_change(foreign, doubt):
+        if not first.is_set():
+            first.set()
+            going_on.wait(LIMIT)  # the first thread is held up amid its delivery
+        delivered.append((bool(foreign), bool(doubt)))
+
+    watch = WriterWatch(publishers, on_change)
+    watch.hear(DISPLACEMENT, publishers)
+    watch.look()
+    publishers.names = ('mount_driver_io', 'mount_driver_io')  # a doubt
+    threads = [threading.Thread(target=watch.look)]
+    threads[0].start()
+    first.wait(LIMIT)
+    publishers.names = ('mount_driver_io', 'stranger')
+    threads.append(threading.Thread(target=watch.look))
+    threads[1].start()
+    wait_until(lambda: watch.foreign, 'the second change')
+    going_on.set()
+    for thread in threads:
+        thread.join(LIMIT)
+    assert delivered[-1] == (True, False)
+    assert len(delivered) == 2

@@ -68,6 +68,7 @@ class SafeLifecycleNode(DeclaringNode):
 
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
+        self._registered_name = name  # its own one may have been remapped
         self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
         self._lockstep = bool(self.declare_parameter(*_LOCKSTEP).value)
         self.data_path: ServedPath | None = None
@@ -138,15 +139,20 @@ class SafeLifecycleNode(DeclaringNode):
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
         thread = self.data_thread or DataThread(self.context, self.tell_failure)
-        path = DataPath(self, lockstep=self.lockstep, thread=thread, on_writers=self.tell_writers)
+        path = DataPath(
+            self,
+            lockstep=self.lockstep,
+            thread=thread,
+            on_writers=self.heed_writers,
+            name=self._registered_name,
+        )
         self.data_path, self._writers = path, path.writers
         return path
 
     def tell_writers(self) -> None:
-        """Call `heed_writers` with what holds now: at each change, and when the node has begun to heed it."""
-        writers = self._writers
-        if writers is not None:
-            self.heed_writers(writers.foreign, writers.doubt)
+        """Call `heed_writers` with what holds now: for a node that has begun to heed it."""
+        if self._writers is not None:
+            self._writers.deliver()
 
     def wait_for_own_writers(self) -> None:
         """Return when only their own writers publish what this node hears; raises `ForeignWriterError`."""
