@@ -56,6 +56,7 @@ class ControlFigures:
     step_median: float  # s, sample received to setpoint published
     step_p99: float  # s
     last_stamp: int | None  # ns
+    lockstep: bool = False
     faults: int = 0  # times that the controller's memory held what is no finite number
     last_fault: int = 0  # stamp of the last such sample, ns
     policy: str = ''
@@ -91,8 +92,8 @@ def verdict(figures: ControlFigures) -> Verdict:
         'parameter_changes': figures.parameter_changes,
         'needs_initialisation': bool(figures.table_refusal),
         'messages_malformed': figures.unread.messages,
-        # A supervisor ends the graph, with the name of the other node where one can be known.
-        'fatal': bool(figures.foreign) and not figures.name_awaited,
+        # In lock-step a supervisor ends the graph, with the name of the other node where one can be known.
+        'fatal': bool(figures.foreign) and figures.lockstep and not figures.name_awaited,
     }
     well = 'damping on' if figures.damping_active else 'damping off'
     return verdict_on(_errors(figures) or _warnings(figures), well, values)

@@ -175,6 +175,7 @@ class MountControl(SafeLifecycleNode):
                 step_median=self._latency.quantile(0.5),
                 step_p99=self._latency.quantile(0.99),
                 last_stamp=answering.watch.last,
+                lockstep=self.lockstep,
                 faults=answering.faults,
                 last_fault=answering.last_fault,
                 policy=self._settings.parameters.policy,

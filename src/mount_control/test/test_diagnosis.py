@@ -107,16 +107,20 @@ def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
     assert judged.sentence.startswith('the controller held what is no finite number: damping')
 
 
-def test_another_writer_is_an_error_that_ends_the_graph():
-    judged = verdict(replace(GOOD, foreign='/evil must not publish displacement: end it'))
-    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, True)
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_another_writer_is_an_error_that_ends_a_graph_in_lock_step_alone(lockstep):
+    foreign = '/evil must not publish displacement: end it'
+    judged = verdict(replace(GOOD, foreign=foreign, lockstep=lockstep))
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, lockstep)
     assert judged.sentence == (
         '0 A: /evil must not publish displacement: end it, then activate mount_init and mount_control again'
     )
 
 
 def test_another_writer_whose_name_may_still_come_does_not_end_the_graph_yet():
-    judged = verdict(replace(GOOD, foreign='10 samples were repeated: end one', name_awaited=True))
+    judged = verdict(
+        replace(GOOD, foreign='10 samples were repeated: end one', lockstep=True, name_awaited=True)
+    )
     assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
     assert judged.sentence.startswith('0 A: 10 samples were repeated')
 

@@ -1,4 +1,4 @@
-"""The exchange of frames with the electronics: one thread that receives, decodes, stamps and watches.
+"""The exchange of frames with the electronics: one thread receives, another one watches the hold.
 
 No ROS here: samples leave by a callback, setpoints come in by `send_setpoint` from any thread.
 """
@@ -23,7 +23,7 @@ from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw
 from mount_models.sampling import sample_time_ns
 
-_WAKE = 0.005  # s: longest sleep when no frames come; the watch wakes for the end of the hold besides
+_WAKE = 0.02  # s, chosen: longest sleep of the receiving thread when no frames come
 _REOPEN_PERIOD = 0.2  # s, chosen
 _OFF_FRAMES = 3  # chosen: so that one lost frame does not leave the coil on until the electronics' own watch
 _BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
@@ -32,8 +32,11 @@ _BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
 class Exchange:
     """Owns the bus between `start` and `stop`; every way out of it sends 0 A first.
 
-    `on_sample(stamped)` is called in the receiving thread for every new sample, and
-    `on_temperature(stamp_ns, celsius)` for a status with a coil temperature, with the last sample's stamp.
+    Callbacks run in the receiving thread: `on_sample(stamped)` for every new sample as soon as it is decoded,
+    because the setpoint waits for it; then the watches judge it, in any case before a setpoint that answers
+    it leaves; then `on_judged(stamped)`. `on_temperature(stamp_ns, celsius)` is called for a status with a
+    coil temperature, with the last sample's stamp. A callback that hangs does not
+    hold up the watch of the hold.
     `clock` gives the stamps and says by which time ages are judged; `steady() -> ns` is the steady clock.
     `heat` is the coil's temperature from before, which an activation does not cool; `law` is the ripple's.
     """
@@ -45,6 +48,7 @@ class Exchange:
         clock: Clock,
         on_sample: Callable[[Stamped], None],
         *,
+        on_judged: Callable[[Stamped], None] = lambda stamped: None,
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
         steady: Callable[[], int] = time.monotonic_ns,
         heat: HeatWatch | None = None,
@@ -69,6 +73,7 @@ class Exchange:
         self._parameters = parameters
         self._codec = codec
         self._on_sample = on_sample
+        self._on_judged = on_judged
         self._on_temperature = on_temperature
         self._temperature_stamp: int | None = None  # of the temperature told last
         self._clock = clock
@@ -79,23 +84,24 @@ class Exchange:
         self._bus: can.BusABC | None = None
         self._alive = AliveCounter()
         self._frame = Frame(codec.setpoint.frame_id, bytes(codec.setpoint.length))
-        self._sending = threading.Lock()  # between setpoints, the watch and the end
+        self._sending = threading.Lock()  # between setpoints, judgements, the watch and the end
+        self._unjudged: tuple[Stamped, int] | None = None  # the newest sample and when it came (ns)
         self._accepting = False
         self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._threads: list[threading.Thread] = []
 
     def start(self, *, threaded: bool = True) -> None:
-        """Open the bus and begin to receive, in a thread or by `poll`; raises `CanLinkError`."""
+        """Open the bus and begin to receive, in threads or by `poll`; raises `CanLinkError`."""
         self._bus = self._open()
         self._accepting = True
         atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
-        if threaded:
-            thread = threading.Thread(target=self._serve, name='can_receive', daemon=True)
+        loops = {'can_receive': self._serve, 'can_watch': self._watch_hold} if threaded else {}
+        self._threads = [threading.Thread(target=loops[name], name=name, daemon=True) for name in loops]
+        for thread in self._threads:
             thread.start()
-            self._thread = thread
 
     def stop(self) -> None:
-        """Send 0 A, end the thread, close the bus; safe to call twice.
+        """Send 0 A, end the threads, close the bus; safe to call twice.
 
         Whatever one step raises, the others are done. Raises `CanLinkError` where the bus did not take 0 A.
         """
@@ -112,10 +118,11 @@ class Exchange:
             if not self._accepting or self.bus_off or self.trouble:
                 self.link.refuse(Refusal.BUS_LOST)
                 return False
+            self._judge()
             setpoint = self.link.answer(stamp, current, self._now())
             sent = setpoint is not None and self._send(setpoint)
             if self.link.double_answer and not self.link.fault:
-                self._send(self.link.switch_off(self.link.double_answer, needs_initialisation=False))
+                self._send(self.link.switch_off(self.link.double_answer, foreign_writer=True))
                 return False
             return sent
 
@@ -124,14 +131,9 @@ class Exchange:
 
         The first fault stays, but for a graver one, or for one that names who answers beside the other.
         """
-        link = self.link
-        if fault is None:
-            return
-        graver = link.needs_initialisation and not fault.needs_initialisation
-        if link.fault and not (graver or link.nameless):
-            return
-        with self._sending:
-            self._send(link.switch_off(*fault))
+        if fault is not None:
+            with self._sending:
+                self._switch_off(fault)
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
@@ -148,14 +150,19 @@ class Exchange:
 
     def _serve(self) -> None:
         while not self._ending.is_set() and not self.failure:
-            self._attempt(self._sleep())
+            self._attempt(_WAKE)
 
-    def _sleep(self) -> float:
-        """Return how long to wait for a frame, s: no longer than until 0 A is due."""
-        if self._clock.lockstep:
-            return _WAKE
+    def _watch_hold(self) -> None:
+        """Look whenever 0 A may be due; in lock-step only frames move time, see `_receive`."""
+        try:
+            while not self._clock.lockstep and not self._ending.wait(self._time_until_off()):
+                self.watch()
+        except BaseException as error:
+            self._fail(error)
+
+    def _time_until_off(self) -> float:
         with self._sending:
-            return min(_WAKE, max(0.0, 1e-9 * self.link.time_until_off(self._now())))
+            return max(0.0, 1e-9 * self.link.time_until_off(self._now()))
 
     def _attempt(self, wait: float) -> bool:
         """Handle the frame that comes within `wait` s; what cannot be recovered ends the exchange safely."""
@@ -165,15 +172,18 @@ class Exchange:
             except can.CanError as error:
                 self._recover(error)
         except BaseException as error:
-            # The border of the thread: whatever the reason, say it and be safe.
-            self.failure = str(error) if isinstance(error, CanLinkError) else _named(error)
-            try:
-                self._leave_off()
-            except CanLinkError as unsent:
-                self.failure += f'; {unsent}'
-            if not isinstance(error, Exception):
-                raise
+            self._fail(error)
         return False
+
+    def _fail(self, error: BaseException) -> None:
+        """End the exchange at 0 A with the reason: the border of its threads."""
+        self.failure = str(error) if isinstance(error, CanLinkError) else _named(error)
+        try:
+            self._leave_off()
+        except CanLinkError as unsent:
+            self.failure += f'; {unsent}'
+        if not isinstance(error, Exception):
+            raise error
 
     def _receive(self, wait: float) -> bool:
         bus = self._bus
@@ -190,7 +200,8 @@ class Exchange:
                 self._take_status(message)
             elif message.arbitration_id == self._ids[2]:
                 self._take_foreign_setpoint(message)
-        self.watch()
+        if self._clock.lockstep:
+            self.watch()
         return message is not None
 
     def _take_measurement(self, message: can.Message, received: int) -> None:
@@ -198,12 +209,28 @@ class Exchange:
         if stamped is not None:
             self.bus_off = False
             self.last_received = received
-            self.switch_off(self.guard.judge_sample(stamped, received))
+            self._unjudged = stamped, received
             self._on_sample(stamped)
+            with self._sending:
+                self._judge()
+            self._on_judged(stamped)
             return
         self.switch_off(self.guard.judge_frame(received))
         if self.link.arrival is Arrival.RESENT:
             self._answer_again()
+
+    def _judge(self) -> None:
+        """Let the watches judge the newest sample once; call it with the lock held."""
+        unjudged, self._unjudged = self._unjudged, None
+        if unjudged is not None and (fault := self.guard.judge_sample(*unjudged)) is not None:
+            self._switch_off(fault)
+
+    def _switch_off(self, fault: Fault) -> None:
+        """See `switch_off`; call it with the lock held."""
+        link = self.link
+        graver = link.needs_initialisation and not fault.needs_initialisation
+        if not link.fault or graver or link.nameless:
+            self._send(link.switch_off(*fault))
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
@@ -277,10 +304,9 @@ class Exchange:
             )
 
     def _join(self) -> None:
-        thread = self._thread
-        if thread is not None and thread is not threading.current_thread():
-            thread.join()
-            self._thread = None
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join()
 
     def _recover(self, error: can.CanError) -> None:
         """Open the bus again and again until it works, `stop` is called, or the time is over."""

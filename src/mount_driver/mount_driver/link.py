@@ -91,6 +91,8 @@ class Link:
         """Why the coil is off for as long as this link lasts; empty while it may be on."""
         self.needs_initialisation = False
         """Whether nothing but a new initialisation is needed to end the fault."""
+        self.foreign_writer = False
+        """Whether the fault is another node that publishes setpoints."""
         self.held = ''
         """Why every answer is lowered to 0 A at present; empty while none is."""
         self.double_answer = ''
@@ -191,9 +193,12 @@ class Link:
         """Whether the fault tells of two answers to a sample, but not who gives the other."""
         return bool(self.fault) and self.fault == self.double_answer
 
-    def switch_off(self, fault: str, needs_initialisation: bool) -> Setpoint:
+    def switch_off(
+        self, fault: str, needs_initialisation: bool = False, foreign_writer: bool = False
+    ) -> Setpoint:
         """Refuse all setpoints from now on; return the one that switches the coil off."""
         self.fault, self.needs_initialisation = fault, needs_initialisation
+        self.foreign_writer = foreign_writer
         return self.off()
 
     def answer_again(self, sample_counter: int, now: int) -> Setpoint | None:

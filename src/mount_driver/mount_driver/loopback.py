@@ -67,7 +67,10 @@ class LoopbackMulticastBus(can.BusABC):
             raise can.CanOperationError(f'receiving failed: {error.strerror}', error.errno) from error
         message = _message(datagram, _arrival(told))
         # Like SocketCAN: error frames pass the filter, because they tell the state of the bus.
-        return message, message.is_error_frame
+        return message, message.is_error_frame or message.arbitration_id in self._received
+
+    def _apply_filters(self, filters: Any) -> None:
+        self._received = {entry['can_id'] for entry in filters or ()}  # what is not here python-can looks at
 
 
 def _message(datagram: bytes, arrival: float) -> can.Message:

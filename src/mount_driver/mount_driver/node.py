@@ -32,7 +32,7 @@ _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses
 class MountDriver(SafeLifecycleNode):
     """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
 
-    urgent = Urgent(frozenset({'data', 'can_receive'}))
+    urgent = Urgent(frozenset({'data', 'can_receive', 'can_watch'}))
 
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
@@ -78,6 +78,7 @@ class MountDriver(SafeLifecycleNode):
             self._codec,
             clock,
             self._on_sample,
+            on_judged=self._on_judged,
             on_temperature=self._on_temperature,
             heat=self._heat,
             law=self._law,
@@ -109,7 +110,7 @@ class MountDriver(SafeLifecycleNode):
         exchange = self._exchange
         if exchange is not None:
             exchange.guard.writer_doubt = doubt
-            exchange.switch_off(Fault(foreign) if foreign else None)
+            exchange.switch_off(Fault(foreign, foreign_writer=True) if foreign else None)
 
     def judge(self) -> Verdict:
         exchange = self._exchange
@@ -133,8 +134,10 @@ class MountDriver(SafeLifecycleNode):
 
     def _on_sample(self, stamped: Stamped) -> None:
         stamp, sample = stamped
-        # The displacement first: the setpoint waits for it.
         self._publish_displacement(self._displacement_layout.pack(stamp, (sample.displacement,)))
+
+    def _on_judged(self, stamped: Stamped) -> None:
+        stamp, sample = stamped
         self._publish_ripple(
             self._ripple_layout.pack(
                 stamp, (sample.coil_current, math.nan), (sample.current_rate, sample.flux_rate)

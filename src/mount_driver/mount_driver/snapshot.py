@@ -47,6 +47,7 @@ class Snapshot(NamedTuple):
     fault: str = ''  # keeps the coil off until the next activation
     nameless: bool = False  # it tells of two answers to a sample, but not who gives the other
     needs_initialisation: bool = False  # and nothing else
+    foreign_writer: bool = False  # the fault is another node that publishes setpoints
     other_senders: int = 0  # frames that neither our electronics nor we have sent
     other_sender_age: float = math.inf  # s, since the last of them
     celsius: float = math.nan  # degC, the coil by the thermal model
@@ -99,6 +100,7 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         fault=link.fault,
         nameless=link.nameless,
         needs_initialisation=link.needs_initialisation,
+        foreign_writer=link.foreign_writer,
         other_senders=guard.other_senders,
         other_sender_age=math.inf if seen is None else (link.clock.now(now_ns) - seen) * 1e-9,
         celsius=guard.heat.celsius,

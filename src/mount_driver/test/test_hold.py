@@ -1,6 +1,7 @@
 """How long a current stands on the bus: time is told by the test, so no machine is too slow for it."""
 
 import re
+import threading
 
 import pytest
 from car import GOOD, MS, Car
@@ -164,7 +165,7 @@ def test_without_a_status_for_1_s_there_are_0_ampere(car):
 
 
 class SilentBus:
-    """Has one sample to give; after that the time that the receiver waits passes, and nothing else."""
+    """Has one sample to give, 5 ms after the start, and nothing else."""
 
     def __init__(self, clock):
         self._clock = clock
@@ -175,8 +176,8 @@ class SilentBus:
 
     def recv(self, timeout):
         frame, self._frame = self._frame, None
-        if frame is None:
-            self._clock.now += round(1e9 * timeout) + 1000  # the processor takes its time, too
+        if frame is not None:
+            self._clock.now += 5 * MS
         return frame
 
     def send(self, message):
@@ -195,20 +196,48 @@ class Steady:
         return self.now
 
 
-def test_on_a_silent_bus_the_thread_wakes_when_the_hold_ends(monkeypatch):
-    steady = Steady()
+class Sleep(threading.Event):
+    """Waits on the steady clock of a test: until the sample is answered nothing moves it on."""
+
+    def __init__(self, steady, answered):
+        super().__init__()
+        self._steady, self._answered = steady, answered
+
+    def wait(self, timeout=None):
+        end = self._steady.now + round(1e9 * timeout)
+        self._answered.wait()
+        self._steady.now = max(self._steady.now, end) + 1000  # the processor takes its time, too
+        return self.is_set()
+
+
+def test_a_controller_that_hangs_holds_up_neither_the_watch_nor_its_0_ampere(monkeypatch):
+    steady, answered, hanging = Steady(), threading.Event(), threading.Event()
     bus = SilentBus(steady)
     monkeypatch.setattr(exchange_module, 'open_bus', lambda *_, **__: bus)
 
     def answer(stamped):
-        steady.now += 13 * MS  # an answer after 13 ms holds for 7 ms
+        steady.now += 8 * MS
         exchange.send_setpoint(stamped.stamp, 3.0)
+        answered.set()
+        hanging.wait()
 
     exchange = Exchange(DriverParameters(), CODEC, ElectronicsClock(0), answer, steady=steady)
-    exchange.start()
-    wait_until(lambda: len(bus.sent) >= 2, '0 A')
-    exchange.stop()
-    (answered, first), (off_at, off) = bus.sent[:2]
-    assert (answered, first) == (10**9 + 13 * MS, Setpoint(3.0, 0, True))
+    exchange._ending = Sleep(steady, answered)
+    try:
+        exchange.start()
+        wait_until(lambda: len(bus.sent) >= 2, '0 A')
+    finally:
+        hanging.set()
+        exchange.stop()
+    (answered_at, first), (off_at, off) = bus.sent[:2]
+    assert (answered_at, first) == (10**9 + 13 * MS, Setpoint(3.0, 0, True))
     assert off == Setpoint(0.0, 0, False)
-    assert HOLD < off_at - 10**9 <= HOLD + MS // 100
+    assert HOLD < off_at - 10**9 - 5 * MS <= HOLD + MS // 100
+
+
+def test_a_sample_is_judged_before_an_answer_that_is_given_at_once(car):
+    car.exchange._on_sample = lambda stamped: car.exchange.send_setpoint(stamped.stamp, 3.0)
+    car.sent.clear()
+    car.drive(1, lambda: None, lambda index: car.far.send(sample(5)))  # the electronics have begun anew
+    assert 'begun anew' in car.exchange.link.fault
+    assert [setpoint.enable for _, setpoint in car.sent] == [False]

@@ -269,7 +269,7 @@ def test_another_node_that_publishes_setpoints_takes_the_coil_to_0_ampere_for_go
     wait_until(lambda: not far.setpoint().enable and driver._exchange.link.fault, '0 A')
     names = '/controller_io and /elsewhere/evil'
     verdict = driver.judge()
-    assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, True)
+    assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, lockstep)
     assert verdict.sentence == (
         f'coil switched off: {names} must not publish current_setpoint too (limit: one writer, mount_control '
         'and mount_init): end it, then activate mount_driver, mount_init and mount_control again'

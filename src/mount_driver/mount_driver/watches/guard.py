@@ -28,6 +28,8 @@ class Fault(NamedTuple):
     sentence: str
     needs_initialisation: bool = False
     """Nothing else is needed: a graph may do it by itself."""
+    foreign_writer: bool = False
+    """Another node publishes setpoints: the graph goes on at 0 A, and records, until a user has ended it."""
 
 
 class Guard:

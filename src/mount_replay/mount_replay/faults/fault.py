@@ -27,9 +27,9 @@ class FaultCase:
     `words` is a regular expression for the sentence that tells of it. 0 A is looked for in the setpoints on
     the bus, or, where `in_electronics`, in what the electronics follow: where frames do not reach them, and
     where others send frames too. After `silent` faults 0 A is due 50 ms after they began. A graph of its own
-    is started with `options` where there are any; `clock`: with clocks that can be stepped. `ends_drive`: the
-    graph does not outlive it. `for_good`: it does, but only a new start damps again. `coil_apart`: the coil's
-    current is not the graph's to take away, or nobody can see it.
+    is started with `options` where there are any; `shim`: with processes that the `shim` can change.
+    `ends_drive`: the graph does not outlive it. `for_good`: it does, but only a new start damps again.
+    `coil_apart`: the coil's current is not the graph's to take away, or nobody can see it.
     """
 
     name: str
@@ -43,7 +43,7 @@ class FaultCase:
     ends_drive: bool = False
     for_good: bool = False
     options: tuple[str, ...] = ()
-    clock: bool = False
+    shim: bool = False
     loses_samples: bool = False  # the fault itself keeps samples out of the recording
     coil_apart: bool = False
     third: bool = False  # one of the representative third

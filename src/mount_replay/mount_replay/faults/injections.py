@@ -7,6 +7,7 @@ import signal
 import struct
 import subprocess
 import sys
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +23,9 @@ from mount_replay.faults.graph import PATIENCE, GraphUnderTest, GraphUnderTestEr
 
 _INJECT = 'mount_sim/inject_fault'
 _INTRUDER = 'mount_replay.faults.intruder'
-_SHIM = Path(__file__).parent / 'clock_shim'
-CLOCK_FILE = 'ENGINE_MOUNT_CLOCK_STEP'
-"""Environment variable: file whose 8 bytes are the step (ns) of the clocks of the processes under test."""
+_SHIM = Path(__file__).parent / 'shim'
+SHIM_FILE = 'ENGINE_MOUNT_SHIM'
+"""Environment variable: file of two int64, what the `shim` changes in the processes under test."""
 
 
 class Injection(Protocol):
@@ -147,13 +148,25 @@ class ClockStep:
     seconds: float
 
     def prepare(self, graph: GraphUnderTest) -> None:
-        """Nothing takes time: the graph was started with `clock_environment`."""
+        """Nothing takes time: the graph was started with `shim_environment`."""
 
     def begin(self, graph: GraphUnderTest) -> None:
-        _write_step(clock_file(graph.folder.parent), self.seconds)
+        _write_shim(graph.folder.parent, step=self.seconds)
 
     def end(self, graph: GraphUnderTest) -> None:
-        _write_step(clock_file(graph.folder.parent), 0.0)
+        _write_shim(graph.folder.parent)
+
+
+@dataclass(frozen=True)
+class ControlHangs(_Momentary):
+    """One step of the control lasts longer by `seconds`."""
+
+    seconds: float
+
+    def begin(self, graph: GraphUnderTest) -> None:
+        _write_shim(graph.folder.parent, hang=self.seconds)
+        time.sleep(0.5 * self.seconds)  # by then a step has begun
+        _write_shim(graph.folder.parent)
 
 
 class Unchanged(_Momentary):
@@ -221,20 +234,20 @@ def refusal_of(graph: GraphUnderTest, node: str, values: Mapping[str, Any]) -> s
     return '; '.join(each.reason for each in answer.results if not each.successful)
 
 
-def clock_file(folder: Path) -> Path:
-    """Return the file that holds the step of the clocks of graphs in `folder`."""
-    return folder / 'clock_step'
-
-
-def clock_environment(folder: Path) -> dict[str, str]:
-    """Return what a graph needs in its environment for `ClockStep`."""
-    _write_step(clock_file(folder), 0.0)
+def shim_environment(folder: Path) -> dict[str, str]:
+    """Return what a graph in `folder` needs in its environment for `ClockStep` and `ControlHangs`."""
+    _write_shim(folder)
     paths = [str(_SHIM), *filter(None, [os.environ.get('PYTHONPATH')])]
-    return {CLOCK_FILE: str(clock_file(folder)), 'PYTHONPATH': os.pathsep.join(paths)}
+    return {SHIM_FILE: str(_shim_file(folder)), 'PYTHONPATH': os.pathsep.join(paths)}
 
 
-def _write_step(file: Path, seconds: float) -> None:
+def _shim_file(folder: Path) -> Path:
+    return folder / 'shim'
+
+
+def _write_shim(folder: Path, *, step: float = 0.0, hang: float = 0.0) -> None:
+    file = _shim_file(folder)
     if not file.exists():
         file.write_bytes(bytes(mmap.PAGESIZE))
     with file.open('r+b') as opened:
-        opened.write(struct.pack('<q', round(seconds * 1e9)))
+        opened.write(struct.pack('<qq', round(1e9 * step), round(1e9 * hang)))

@@ -8,6 +8,7 @@ from lifecycle_msgs.msg import Transition
 from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.injections import (
     ClockStep,
+    ControlHangs,
     Intruder,
     Killed,
     ParametersSet,
@@ -61,9 +62,8 @@ def _off(name: str, words: str, **options) -> FaultCase:
 
 
 def _sender(name: str, meaning: str, kind: str, **options) -> FaultCase:
-    """Somebody sends what only one may send: nobody knows whom to believe, and the drive ends."""
-    injection = Intruder(kind)
-    return FaultCase(name, meaning, injection, _INITIALISE, _ANOTHER, 1.0, ends_drive=True, **options)
+    """Another sender of what only one may send: a node leaves the graph at 0 A, one on the bus ends it."""
+    return FaultCase(name, meaning, Intruder(kind), _INITIALISE, _ANOTHER, 1.0, **options)
 
 
 def _flood(name: str, meaning: str, kind: str) -> FaultCase:
@@ -74,6 +74,14 @@ def _stopped(node: str, name: str, lasts: float, reaction: Reaction, words: str 
     """A process stands still for a while (SIGSTOP)."""
     meaning, injection = f'mount_{node} stands still for {lasts:g} s', Stopped(f'mount_{node}')
     return FaultCase(f'stop_{node}_{name}', meaning, injection, reaction, words, lasts, **options)
+
+
+def _hanging(name: str, *options: str) -> FaultCase:
+    """A step of the control does not come to its end for a while; `options` of the graph."""
+    meaning = f'a control step lasts 0.5 s{" in a composed graph" if options else ""}'
+    injection = ControlHangs(0.5)
+    words, lasts = 'no setpoint', 0.4
+    return FaultCase(name, meaning, injection, _WHILE, words, lasts, silent=True, options=options, shim=True)
 
 
 def _lost(node: str, reaction: Reaction, **options) -> FaultCase:
@@ -105,10 +113,10 @@ CLOCKS = (
     _from_start('counter_wrap', lasts=6.0),
     _simulated('electronics_reset', _INITIALISE, 'restart|initialis', silent=True, third=True),
     FaultCase(
-        'clock_forward', 'the system clock goes an hour ahead', ClockStep(_HOUR), _TOLERATED, clock=True
+        'clock_forward', 'the system clock goes an hour ahead', ClockStep(_HOUR), _TOLERATED, shim=True
     ),
     FaultCase(
-        'clock_back', 'the system clock goes back by an hour', ClockStep(-_HOUR), _TOLERATED, clock=True
+        'clock_back', 'the system clock goes back by an hour', ClockStep(-_HOUR), _TOLERATED, shim=True
     ),
 )
 SENSORS = (
@@ -151,8 +159,17 @@ COIL = (
     _at_start('gap_blocked', 'gap|contact|closed', third=True),
 )
 SENDERS = (
-    _sender('second_host', 'a second CAN host asks for 3 A', 'can_host', third=True, in_electronics=True),
-    _sender('second_electronics', 'second electronics send samples at rest', 'can_electronics'),
+    _sender(
+        'second_host',
+        'a second CAN host asks for 3 A',
+        'can_host',
+        third=True,
+        in_electronics=True,
+        ends_drive=True,
+    ),
+    _sender(
+        'second_electronics', 'second electronics send samples at rest', 'can_electronics', ends_drive=True
+    ),
     _sender(
         'second_setpoint', 'a second node publishes 3 A on current_setpoint', 'current_setpoint', third=True
     ),
@@ -166,6 +183,8 @@ SENDERS = (
     _flood('flood_service', 'mount_control is asked for parameters 500 times a second', 'flood_service'),
 )
 PROCESSES = (
+    _hanging('hang_control'),
+    _hanging('hang_control_composed', '--composed'),
     _stopped('control', '200_ms', 0.2, _WHILE, 'no setpoint', silent=True, third=True),
     _stopped('control', '2_s', 2.0, _INITIALISE, 'no setpoint', silent=True),
     _stopped('driver', '200_ms', 0.2, _WHILE, 'no displacement|no setpoint|not take', in_electronics=True),

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from mount_bringup.graph.domain import can_port
 from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.graph import Ending, GraphUnderTest, GraphUnderTestError, Place
-from mount_replay.faults.injections import NonsenseTakenError, clock_environment
+from mount_replay.faults.injections import NonsenseTakenError, shim_environment
 from mount_replay.faults.kept import lost_while
 from mount_replay.faults.observers import observers
 from mount_replay.faults.outcome import Outcome, tells
@@ -29,7 +29,7 @@ _CODES = (0, 1, 130)  # of `drive`: nothing wrong, something wrong, interrupted
 Progress = Callable[[float, str], None]
 Tell = Callable[[FaultCase, Outcome], None]
 Kind = tuple[bool, tuple[str, ...]]
-"""What a graph is started with: clocks that can be stepped, options."""
+"""What a graph is started with: the shim, options."""
 
 
 def run_faults(
@@ -58,7 +58,7 @@ def _in_order(cases: Sequence[FaultCase]) -> list[FaultCase]:
 
 
 def _kind(case: FaultCase) -> Kind:
-    return case.clock, case.options
+    return case.shim, case.options
 
 
 @dataclass
@@ -135,7 +135,7 @@ class _Session:
             'operator', namespace=namespace, context=self._context, start_parameter_services=False
         )
         stack.callback(operator.destroy_node)
-        environment = clock_environment(self._place.folder) if case.clock else {}
+        environment = shim_environment(self._place.folder) if case.shim else {}
         graph = GraphUnderTest(self._place, namespace, case.options, environment, observed, operator)
         return _Running(_kind(case), graph, stack)
 

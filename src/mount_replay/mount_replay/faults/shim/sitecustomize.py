@@ -1,0 +1,84 @@
+"""Changes a process under test by what a file says: steps of the clocks that it reads, a control that hangs.
+
+On the PYTHONPATH of that process. `time.time`, `time.time_ns` and `rclpy.clock.Clock.now` of the system's
+clocks go on by the first number of the file (ns); the machine's clock is left alone, and what the middleware
+reads in C++ (its own time stamps) too. Each step of a control lasts longer by the second one (ns).
+"""
+
+import importlib.abc
+import importlib.machinery
+import mmap
+import os
+import struct
+import sys
+import time
+
+_NUMBERS = struct.Struct('<qq')
+
+
+def _install(file):
+    with open(file, 'rb') as opened:
+        content = mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ)
+
+    def step():
+        return _NUMBERS.unpack_from(content)[0]
+
+    def hang():
+        return _NUMBERS.unpack_from(content)[1]
+
+    read, read_ns = time.time, time.time_ns
+    time.time = lambda: read() + 1e-9 * step()
+    time.time_ns = lambda: read_ns() + step()
+
+    def change_clock(module):
+        now, steady = module.Clock.now, module.ClockType.STEADY_TIME
+
+        def stepped(clock):
+            read = now(clock)
+            if clock.clock_type == steady:
+                return read
+            return module.Time(nanoseconds=read.nanoseconds + step(), clock_type=clock.clock_type)
+
+        module.Clock.now = stepped
+
+    def change_control(module):
+        answer = module.Answering.answer
+
+        def hanging(answering, stamp, displacement):
+            if pause := hang():
+                time.sleep(1e-9 * pause)
+            return answer(answering, stamp, displacement)
+
+        module.Answering.answer = hanging
+
+    changes = {'rclpy.clock': change_clock, 'mount_control.answering': change_control}
+    sys.meta_path.insert(0, _Finder(changes))
+
+
+class _Finder(importlib.abc.MetaPathFinder):
+    """Changes modules when they are imported: {name: change}."""
+
+    def __init__(self, changes):
+        self._changes = changes
+
+    def find_spec(self, name, path=None, target=None):
+        if name not in self._changes:
+            return None
+        spec = importlib.machinery.PathFinder.find_spec(name, path)
+        if spec is not None and spec.origin is not None:
+            spec.loader = _Loader(spec.name, spec.origin, self._changes[name])
+        return spec
+
+
+class _Loader(importlib.machinery.SourceFileLoader):
+    def __init__(self, name, path, change):
+        super().__init__(name, path)
+        self._change = change
+
+    def exec_module(self, module):
+        super().exec_module(module)
+        self._change(module)
+
+
+if file := os.environ.get('ENGINE_MOUNT_SHIM'):
+    _install(file)
