@@ -240,7 +240,8 @@ def main() -> None:
 def _sink(
     folder: Path, parameters: RecorderParameters, event: str, topics: list[Topic]
 ) -> BagWriter | Snapshot:
-    open_writer = partial(BagWriter, split=split_of(parameters))
+    # What belongs together in a file is told by the steady clock: the system's, of the log times, may step.
+    open_writer = partial(BagWriter, split=split_of(parameters), clock=time.monotonic_ns)
     if not parameters.snapshot:
         return open_writer(folder)
     if EVENT not in topics:

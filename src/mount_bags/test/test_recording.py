@@ -3,6 +3,7 @@
 import itertools
 import threading
 import time
+import tracemalloc
 from dataclasses import replace
 
 import pytest
@@ -16,6 +17,7 @@ from mount_bags.container.stored import RECORDER_RECORD
 from mount_bags.messages.stamp_watch import StampWatch
 from mount_bags.recorder import recorder as recording
 from mount_bags.recorder.diagnosis import Counted, OnFull, RecorderState, judge
+from mount_bags.recorder.queue import ReceivedQueue
 from mount_bags.recorder.recorder import Recorder, RecorderFigures, Unobserved
 from mount_bags.recorder.space import SpaceGuard
 from mount_ros.messages.scalars import stamp_of
@@ -27,7 +29,7 @@ from mount_ros.topics import DISPLACEMENT
 STRING = 'std_msgs/msg/String'
 
 
-def recorder_of(folder, memory_limit=1 << 20, threaded=True, space=None, on_loss=lambda _: None, **options):
+def recorder_of(folder, memory_limit=1 << 22, threaded=True, space=None, on_loss=lambda _: None, **options):
     writer = BagWriter(folder, **options)
     writer.add_topic('/displacement', DISPLACEMENT.type)
     writer.add_topic('/latched', STRING)
@@ -294,6 +296,41 @@ def test_sound_recorder_says_how_many_topics_have_a_publisher(tmp_path):
     assert verdict.level is Level.OK
     assert '1 of 2 topics have a publisher' in verdict.sentence
     assert verdict.figures['publishers./latched'] == 0
+    recorder.end()
+
+
+def test_the_limit_of_the_queue_holds_for_the_memory_and_not_for_the_payload_alone():
+    limit = 1 << 20
+    queue = ReceivedQueue(limit)
+    take = queue.taker('/topic')
+    tracemalloc.start()
+    for index in range(limit // 8):
+        take(('/topic', index.to_bytes(8, 'little'), START + index, START + index + 1))
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert 0.5 * limit < held < limit
+    assert len(queue) + queue.overflowed == limit // 8
+
+
+def test_a_loss_that_cannot_be_told_ends_no_recording(tmp_path, clocked):
+    size = len(sample(DISPLACEMENT, 0))
+
+    def fail(count):
+        raise ValueError('no node to tell it')
+
+    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, on_loss=fail)
+    stuck, write = threading.Event(), recorder._writer.write
+    recorder._writer.write = lambda *item: stuck.wait() and write(*item)
+    receive = clocked(recorder.receiver('/displacement'))
+    recorder.begin()
+    for index in range(100):
+        receive(sample(DISPLACEMENT, index))
+    stuck.set()
+    told = wait_until(lambda: recorder.unobserved.get('marks of losses'), 'the failure to be told')
+    assert told == Unobserved(1, 0, 'ValueError: no node to tell it')
+    before = recorder.figures().kept
+    receive(sample(DISPLACEMENT, 100))
+    wait_until(lambda: recorder.figures().kept > before, 'the next message on the disk')
     recorder.end()
 
 

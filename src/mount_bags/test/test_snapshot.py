@@ -13,16 +13,37 @@ from mount_bags.bag.statement import read_statement
 from mount_bags.bag.writer import BagWriter, RecordingError
 from mount_bags.container.stored import RECORDER_RECORD
 from mount_bags.recorder.diagnosis import OnFull, RecorderState, judge
+from mount_bags.recorder.queue import ITEM_OVERHEAD
 from mount_bags.recorder.recorder import Recorder
-from mount_bags.recorder.snapshot import ITEM_OVERHEAD, Snapshot, SnapshotRule
+from mount_bags.recorder.snapshot import Snapshot, SnapshotRule
 from mount_ros.nodes.diagnostics import Level
 
 STRING = 'std_msgs/msg/String'
 RULE = SnapshotRule(before=30, after=10, memory=1 << 20)
 
 
+class SteadyClock:
+    """Stands at the time of arrival of the message that is written; the system's clock is `ahead` of it."""
+
+    now = ahead = 0
+
+    def __call__(self):
+        return self.now
+
+    def follow(self, snapshot):
+        write = snapshot.write
+
+        def timed(topic, raw, received, sent):
+            self.now = received - self.ahead
+            write(topic, raw, received, sent)
+
+        snapshot.write, snapshot.steady = timed, self
+
+
 def snapshot_of(folder, rule=RULE, **options):
-    snapshot = Snapshot(folder, '/event', rule, lambda place: BagWriter(place, **options))
+    steady = SteadyClock()
+    snapshot = Snapshot(folder, '/event', rule, lambda place: BagWriter(place, **options), steady)
+    steady.follow(snapshot)
     snapshot.add_topic('/stream', STRING)
     snapshot.add_topic('/latched', STRING, latched=True)
     snapshot.add_topic('/event', STRING)
@@ -55,6 +76,23 @@ def test_event_saves_what_came_before_and_what_follows(tmp_path):
     assert snapshot.folders == [tmp_path / 'bag']
     assert times_of(tmp_path / 'bag') == [*range(70, 100), *range(101, 111)]
     assert times_of(tmp_path / 'bag', '/event') == [100]
+
+
+@pytest.mark.parametrize('step', [3600, -3600])
+def test_a_step_of_the_system_clock_takes_nothing_from_before_or_after_an_event(tmp_path, step):
+    snapshot = snapshot_of(tmp_path / 'bag')
+    stream(snapshot, 10_000, 10_080)
+    snapshot.steady.ahead = step
+    stream(snapshot, 10_080 + step, 10_100 + step)
+    snapshot.write('/event', b'boom', 10_100 + step, 10_100 + step)
+    stream(snapshot, 10_101 + step, 10_104 + step)
+    snapshot.steady.ahead = 0
+    stream(snapshot, 10_104, 10_150)
+    snapshot.close()
+    before, after = range(10_080 + step, 10_100 + step), range(10_101 + step, 10_104 + step)
+    assert sorted(times_of(tmp_path / 'bag')) == sorted(
+        [*range(10_070, 10_080), *before, *after, *range(10_104, 10_111)]
+    )
 
 
 def test_event_while_one_is_recorded_makes_the_recording_longer(tmp_path):

@@ -69,6 +69,21 @@ def test_duration_begins_a_new_file_with_the_message_that_reaches_it(tmp_path):
     assert [times[0] for times in samples] == [START + 100 * number * PERIOD for number in range(4)]
 
 
+@pytest.mark.parametrize('step', [3600, -3600])
+def test_by_a_clock_a_step_of_the_log_times_neither_begins_a_file_nor_keeps_one_open(tmp_path, step):
+    now = 0
+    writer = BagWriter(tmp_path / 'bag', split=SplitRule(duration=100 * PERIOD), clock=lambda: now)
+    writer.add_topic('/displacement', DISPLACEMENT.type)
+    for index in range(350):
+        ahead = round(1e9 * step) if 50 <= index < 250 else 0
+        writer.write('/displacement', sample(DISPLACEMENT, index), START + index * PERIOD + ahead)
+        if index % 10 == 9:
+            now += 10 * PERIOD
+            writer.flush()
+    writer.close()
+    assert [len(mcap_messages(path)) for path in pieces_of(tmp_path / 'bag')] == [110, 100, 100, 40]
+
+
 def test_latched_messages_stand_at_the_head_of_each_file_with_their_own_publish_time(tmp_path):
     heads = [mcap_messages(path)[0] for path in pieces_of(split_bag(tmp_path / 'bag'))]
     assert heads[1:] == [

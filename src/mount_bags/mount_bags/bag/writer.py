@@ -33,7 +33,8 @@ class BagWriter:
     and `RecordingError` is raised by the call that met the end and by every later `write`.
 
     With a `split` rule the recording goes on in a next file, which begins with the last message of each
-    latched topic, so that it can be read alone. The file before is closed by a thread of its own.
+    latched topic, so that it can be read alone. The file before is closed by a thread of its own. A duration
+    is one of log times, or of `clock` (ns), which is looked at after each chunk.
     """
 
     def __init__(
@@ -44,12 +45,15 @@ class BagWriter:
         chunk_size: int = CHUNK_SIZE,
         custom_data: Mapping[str, str] | None = None,
         open_file: Callable[[Path], RecordFile] = RecordFile,
+        clock: Callable[[], int] | None = None,
     ):
         self.folder = Path(folder)
         self.failure = ''
         self.closed = False
         self.statement: Statement | None = None  # asked at the end
         self._split = split
+        self._clock = clock if split.duration else None
+        self._piece_begun: int | None = None  # by `clock`, ns
         self._channels: dict[str, int] = {}  # of the topics that `write` need not look at
         self._latched: dict[str, Repetition] = {}
         self._pieces = Pieces(
@@ -59,7 +63,8 @@ class BagWriter:
             open_file=open_file,
             after_chunk=self._after_chunk,
         )
-        self._due = 0 if split.duration else _NEVER  # log time from which a message may begin a piece
+        self._duration = 0 if clock else split.duration  # of log times, ns; 0: no limit
+        self._due = 0 if self._duration else _NEVER  # log time from which a message may begin a piece
         create_folder(self.folder)
         try:
             self._open_piece()
@@ -212,6 +217,11 @@ class BagWriter:
     def _after_chunk(self) -> None:
         if self._split.size and self._piece.room_needed > self._split.size:
             self._due = 0  # with the next message, so that no piece is empty
+        if self._clock is not None:
+            now = self._clock()
+            self._piece_begun = now if self._piece_begun is None else self._piece_begun
+            if now - self._piece_begun >= self._split.duration:
+                self._due = 0
 
     def _begin_piece(self, time: int) -> None:
         """Begin a piece with the message of log time `time` (ns), unless the present one is still empty."""
@@ -221,8 +231,9 @@ class BagWriter:
             self._open_piece()
             self._pieces.close_beside(full)
             self._due = _NEVER
+            self._piece_begun = self._clock() if self._clock is not None else None
             self._piece.repeat(self._latched.values(), time)
-        self._due = time + self._split.duration if self._split.duration else _NEVER
+        self._due = time + self._duration if self._duration else _NEVER
 
     # The end.
 

@@ -12,9 +12,15 @@ from mount_bags.bag.statement import Reception
 Item = tuple[str, bytes, int, int]
 """Topic, message, times of arrival and of sending in ns."""
 
+ITEM_OVERHEAD = 256
+"""Bytes of memory per message besides its payload: tuple, numbers, head of the bytes (measured: 203)."""
+
 
 class ReceivedQueue:
-    """Messages in the order in which they came; one for which `memory_limit` bytes leave no room is lost."""
+    """Messages in the order in which they came; one for which `memory_limit` leaves no room is lost.
+
+    The limit, in bytes, holds for the memory that they take, not for their payload alone.
+    """
 
     def __init__(self, memory_limit: int):
         self.receptions: dict[str, Reception] = {}
@@ -31,7 +37,7 @@ class ReceivedQueue:
 
     @property
     def size(self) -> int:
-        """How many bytes of room are taken."""
+        """How many bytes of memory are taken."""
         return self._received_bytes - self._drained_bytes
 
     @property
@@ -59,7 +65,7 @@ class ReceivedQueue:
 
         def take(item: Item) -> None:
             reception.received += 1
-            size = len(item[1])
+            size = len(item[1]) + ITEM_OVERHEAD
             if self._received_bytes + size - self._drained_bytes > self._memory_limit:
                 reception.overflowed += 1
                 return
@@ -72,13 +78,13 @@ class ReceivedQueue:
         """Return the counts of `topic`."""
         return self.receptions.setdefault(topic, Reception())
 
-    def free(self, size: int) -> None:
-        """Give free the room of messages that were taken out, bytes."""
-        self._drained_bytes += size
+    def free(self, count: int, payload: int) -> None:
+        """Give free the room of `count` messages that were taken out, with so many bytes of payload."""
+        self._drained_bytes += payload + count * ITEM_OVERHEAD
 
     def discard(self) -> int:
         """Throw away what is in the queue; return how many messages."""
         count = len(self)
         for _ in range(count):
-            self.free(len(self.pop()[1]))
+            self.free(1, len(self.pop()[1]))
         return count

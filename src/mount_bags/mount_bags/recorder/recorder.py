@@ -16,7 +16,7 @@ from mount_bags.recorder.queue import Item, ReceivedQueue
 from mount_bags.recorder.sink import Sink
 from mount_bags.recorder.space import SpaceGuard
 
-MEMORY_LIMIT = 64 * 1024 * 1024  # bytes, chosen: half a minute of a full drive with the simulator's truth
+MEMORY_LIMIT = 128 << 20  # bytes, chosen: half a minute of a full drive with the simulator's truth
 _DRAIN_PERIOD = 0.02  # s, chosen: what a crash may cost besides the chunk being filled
 _FLUSH_PERIOD = 0.08  # s, chosen: longest time that a chunk is filled; with the above a crash costs 0.12 s
 _SPACE_PERIOD = 0.2  # s, chosen: a tenth of the reserve at 100 MB/s
@@ -60,7 +60,8 @@ class Recorder:
     and `end` by any other. The writing is done by a thread of its own, or (`threaded` off) by whoever
     calls `poll`. What `watch` and `observe` take is called where the writing is done, and so is
     `on_loss`, with the number of messages for which the queue had no room since it was called last.
-    A message on which an observer fails is recorded all the same and counted in `unobserved`.
+    A message on which an observer fails is recorded all the same and counted in `unobserved`; so is a
+    failure of `on_loss`.
     """
 
     def __init__(
@@ -221,9 +222,13 @@ class Recorder:
         if now - self._looked > _SPACE_PERIOD:
             self._looked = now
             self._guarded(self._look_at_space)
-        if (overflowed := self._queue.overflowed) > self._lost_before:
-            self._on_loss(overflowed - self._lost_before)
-            self._lost_before = overflowed
+        lost, self._lost_before = self._queue.overflowed - self._lost_before, self._queue.overflowed
+        if lost:
+            try:
+                self._on_loss(lost)
+            except Exception as error:
+                # The border of the thread: what cannot be told of a loss costs no more messages.
+                self._note_unobserved('marks of losses', b'', error)
 
     def _write_queued(self) -> None:
         rest = len(self._queue)
@@ -247,7 +252,7 @@ class Recorder:
                         self._note_unobserved(topic, raw, error)
         finally:
             self._handed += taken
-            self._queue.free(taken_bytes)
+            self._queue.free(taken, taken_bytes)
 
     def _note_unobserved(self, topic: str, raw: bytes, error: Exception) -> None:
         before = self.unobserved.get(topic)

@@ -1,5 +1,9 @@
-"""Keeps the last messages in memory and writes them, and what follows, when an event comes."""
+"""Keeps the last messages in memory and writes them, and what follows, when an event comes.
 
+How long ago a message came is told by the steady clock, when it is taken: the system's clock may step.
+"""
+
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,14 +17,14 @@ from mount_bags.bag.piece import Offers
 from mount_bags.bag.schemas import schema_text
 from mount_bags.bag.statement import Reception, excerpt_statement
 from mount_bags.bag.writer import BagWriter, RecordingError
+from mount_bags.recorder.queue import ITEM_OVERHEAD
 
 MEMORY = 256 << 20  # bytes, chosen: 75 s of a full drive with the simulator's truth
 AFTER = 10_000_000_000  # ns, chosen
-ITEM_OVERHEAD = (
-    256  # bytes per message besides its payload: tuple, numbers, head of the bytes (measured: 203)
-)
 
-_Item = tuple[str, bytes, int, int]  # topic, message, times of arrival and of sending
+_Item = tuple[
+    str, bytes, int, int, int
+]  # topic, message, arrival, sending; steady time at which it was taken
 
 
 class SnapshotRule(NamedTuple):
@@ -74,6 +78,7 @@ class Snapshot:
         trigger: str,
         rule: SnapshotRule,
         open_writer: Callable[[Path], BagWriter] = BagWriter,
+        clock: Callable[[], int] = time.monotonic_ns,
     ):
         if folder.exists():
             raise RecordingError(f'{folder} exists already; a recording is never written over')
@@ -83,6 +88,7 @@ class Snapshot:
         self._trigger = trigger
         self._rule = rule
         self._open_writer = open_writer
+        self._clock = clock
         self._topics: dict[str, _Announced] = {}
         self._receptions: dict[str, Reception] = {}
         self._ring: deque[_Item] = deque()
@@ -113,7 +119,7 @@ class Snapshot:
     def figures(self) -> SnapshotFigures:
         """Return what lies in memory and what was made of it."""
         ring = self._ring
-        held = (ring[-1][2] - ring[0][2]) * 1e-9 if ring else 0.0
+        held = (ring[-1][4] - ring[0][4]) * 1e-9 if ring else 0.0
         running = self._writer is not None
         return SnapshotFigures(len(self.folders), running, held, self._ring_bytes, self._cut_by_memory)
 
@@ -143,13 +149,14 @@ class Snapshot:
             raise RecordingError(self.failure)
         if topic not in self._topics:
             raise RecordingError(f'topic {topic} is not announced; call add_topic before write')
-        item = (topic, raw, receive_time, publish_time)
+        now = self._clock()
+        item = (topic, raw, receive_time, publish_time, now)
         self._remember(item)
         is_event = topic == self._trigger
-        if self._writer is not None and receive_time > self._until:
+        if self._writer is not None and now > self._until:
             self._guard(self._end_recording)
         if is_event:
-            self._until = receive_time + self._rule.after
+            self._until = now + self._rule.after
         if self._writer is not None:
             self._store(item)
         elif is_event:
@@ -184,8 +191,8 @@ class Snapshot:
             self._forget_oldest()
         ring.append(item)
         self._ring_bytes += size
-        begin = item[2] - self._rule.before
-        while ring[0][2] < begin:
+        begin = item[4] - self._rule.before
+        while ring[0][4] < begin:
             self._cut_by_memory = False  # the time is full
             self._forget_oldest()
 
@@ -198,8 +205,8 @@ class Snapshot:
     def _begin_recording(self) -> None:
         self._guard(partial(self._open, snapshot_folder(self.folder, len(self.folders) + 1)))
         begin = self._ring[0][2]
-        for topic, raw, _, sent in self._latched.values():
-            self._store((topic, raw, begin, sent))
+        for topic, raw, _, sent, taken in self._latched.values():
+            self._store((topic, raw, begin, sent, taken))
         for item in self._ring:
             self._store(item)
 
@@ -215,7 +222,7 @@ class Snapshot:
         assert self._writer is not None
         self._wanted += 1
         try:
-            self._writer.write(*item)
+            self._writer.write(*item[:4])
         except RecordingError as error:
             self.failure = str(error)
             raise
