@@ -1,5 +1,6 @@
 """What is done, in which order, after the loss of a node, on a graph that only notes it."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -61,7 +62,8 @@ class Graph:
     def call(self, kind, service, request):
         if kind is SetParameters:
             [parameter] = request.parameters
-            value = parameter.value.string_value or parameter.value.bool_value
+            value = parameter.value
+            value = value.string_value or value.double_value or value.bool_value
             self.done.append(f'{service.removesuffix("/set_parameters")}.{parameter.name} = {value}')
             return SetParameters.Response(results=[SetParametersResult(successful=True)])
         return GetState.Response(current_state=State(id=State.PRIMARY_STATE_ACTIVE))
@@ -142,6 +144,17 @@ def test_measurements_that_break_off_while_control_starts_end_in_a_new_initialis
     assert made_good(graph, CONTROL) is Remedy.INITIALISE
     assert graph.done[-3:] == INITIALISED
     assert graph.done.index('mount_control.measured_before = False') > graph.done.index('match')
+
+
+def test_a_driver_started_again_is_told_how_hot_its_coil_was_if_the_one_before_knew(graph):
+    graph.said[DRIVER.name] |= {'coil_model_celsius': '131.5', 'coil_model_known': 'True'}
+    made_good(graph, DRIVER)
+    given = graph.done.index('mount_driver.coil_celsius_before = 131.5')
+    assert given < graph.done.index('configure mount_driver')
+    other = Graph(Path(graph.parameters[RECORDER.name]['uri']).parent)
+    other.said[DRIVER.name] |= {'coil_model_celsius': '152.2', 'coil_model_known': 'False'}
+    made_good(other, DRIVER)
+    assert not any('coil_celsius_before' in each for each in other.done)
 
 
 def test_a_lost_driver_is_started_before_anything_is_waited_for_and_comes_back_with_an_initialisation(graph):

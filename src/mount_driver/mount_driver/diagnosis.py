@@ -129,8 +129,12 @@ def _status_findings(now: Snapshot, earlier: Snapshot, parameters: DriverParamet
 
 def _heat_findings(now: Snapshot, parameters: DriverParameters) -> Findings:
     heating = parameters.heating
-    if not now.celsius > heating.derating_celsius:
+    if now.current_limit == HIGHEST_CURRENT:
         return []
+    if not now.celsius_known:
+        text = 'what the coil has carried before is not known, nor its temperature, so it counts as'
+        limit = f'{heating.derating_celsius:g} degC or more and is let less current until it has cooled'
+        return [Finding(Level.WARN, 'heat', f'{text} {limit}; report coil_temperature in MountStatus')]
     text = f'coil above {heating.derating_celsius:g} degC by the thermal model: the hotter, the less current'
     limit = f'it is let, 0 A at {heating.limit_celsius:g} degC'
     return [Finding(Level.WARN, 'heat', f'{text} {limit}; damp less or cool the mount')]
@@ -235,6 +239,7 @@ def _figures(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> 
         'needs_initialisation': bool(now.fault) and now.needs_initialisation,
         'other_senders': now.other_senders,
         'coil_model_celsius': round(now.celsius, 1),
+        'coil_model_known': now.celsius_known,
         'current_limit': round(now.current_limit, 3),
         'derated': now.derated,
         **{f'recent.{name}': getattr(now, name) - getattr(earlier, name) for name in _RECENT},

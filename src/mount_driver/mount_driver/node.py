@@ -43,6 +43,7 @@ class MountDriver(SafeLifecycleNode):
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
         self._watch, self._nameless = LinkWatch(), NamelessWriter()
+        self._heat: HeatWatch | None = None
         self._started_ns = 0
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
@@ -55,7 +56,7 @@ class MountDriver(SafeLifecycleNode):
         self._settings = read(self, DriverParameters())
         sample_time_ns(self._settings.sample_rate)  # refuses what the electronics cannot count
         check_heating(self._settings.heating)
-        self._heat = HeatWatch(self._settings.heating)
+        self._heat = self._heat_of(self._settings)
         self._codec = MountCodec()
         path = self.open_data_path()
         self._publish_displacement = path.sender(DISPLACEMENT)
@@ -120,6 +121,13 @@ class MountDriver(SafeLifecycleNode):
         awaited = self._nameless.is_awaited(now.nameless)
         past = self._watch.past(now)
         return judge(now, past, self._settings, lockstep=self.lockstep, name_awaited=awaited)
+
+    def _heat_of(self, settings: DriverParameters) -> HeatWatch:
+        """Return what is known of the coil: a new configuration does not cool it."""
+        before = self._heat
+        if before is None:
+            return HeatWatch(settings.heating, settings.coil_celsius_before)
+        return before if before.heating == settings.heating else HeatWatch(settings.heating, before.told)
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()

@@ -1,5 +1,6 @@
 """Parameters of the driver."""
 
+import math
 from typing import Annotated, NamedTuple
 
 from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
@@ -53,3 +54,14 @@ class DriverParameters(NamedTuple):
     senders: SenderLimits = SenderLimits()
     ripple: RippleWatchParameters = RippleWatchParameters()
     heating: CoilHeating = CoilHeating()
+    coil_celsius_before: Annotated[
+        float,
+        Quantity(
+            'degC',
+            'coil temperature at the start, at most 10 s old; NaN: unknown, as hot as current makes it',
+            -60.0,
+            250.0,
+            'told by the supervisor where it starts a driver again',
+            may_be_unknown=True,
+        ),
+    ] = math.nan

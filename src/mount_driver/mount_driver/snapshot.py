@@ -51,6 +51,7 @@ class Snapshot(NamedTuple):
     other_senders: int = 0  # frames that neither our electronics nor we have sent
     other_sender_age: float = math.inf  # s, since the last of them
     celsius: float = math.nan  # degC, the coil by the thermal model
+    celsius_known: bool = True  # and not the worst that may be
     current_limit: float = HIGHEST_CURRENT  # A, what it may carry
     derated: int = 0  # setpoints that were lowered to that
     held: str = ''  # keeps it at 0 A at present
@@ -104,6 +105,7 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         other_senders=guard.other_senders,
         other_sender_age=math.inf if seen is None else (link.clock.now(now_ns) - seen) * 1e-9,
         celsius=guard.heat.celsius,
+        celsius_known=guard.heat.known,
         current_limit=guard.heat.current_limit,
         derated=link.derated,
         held=link.held,

@@ -57,6 +57,7 @@ class Recovery:
         self.restarts: list[Restart] = []
         self._graph = graph
         self._count = RestartCount(limit)
+        self._celsius: dict[str, float] = {}  # driver -> how hot its coil was when it told so last
 
     def make_good(self, loss: Loss) -> None:
         """Return when the graph works again; raise `GraphError` where it is given up."""
@@ -78,6 +79,10 @@ class Recovery:
         One for which the graph is given up stands in the error alone.
         """
         self._count.note(loss, time.monotonic())
+        for node in loss.nodes:
+            figures = self._graph.figures(node)
+            if node.is_a(DRIVER) and figures.get('coil_model_known') == 'True':
+                self._celsius[node.full_name] = float(figures['coil_model_celsius'])
         self._graph.tell_loss(f'{loss.reason}; {remedy(whole, self._table_holds(whole)).value}')
 
     def _bring_back(self, loss: Loss, active: Sequence[GraphNode]) -> Remedy:
@@ -149,6 +154,8 @@ class Recovery:
         if node.is_a(RECORDER):
             first = Path(str(self._graph.parameters[RECORDER.name]['uri']))
             self._set(node, 'uri', str(next_recording(first)))
+        elif node.is_a(DRIVER) and node.full_name in self._celsius:
+            self._set(node, 'coil_celsius_before', self._celsius[node.full_name])
         elif node.is_a(CONTROL):
             self._set(node, 'measured_before', chosen is Remedy.DAMP_ON)
 

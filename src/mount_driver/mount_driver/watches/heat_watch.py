@@ -2,32 +2,52 @@
 
 No bus and no clock here. The model runs on the greater of the measured and the sent current, so a sensor of
 current that reads too little does not cool it; a temperature that the electronics report may only raise it.
+
+Where nobody knows what the coil has carried before, the model begins as hot as current can make it, and the
+first temperature that the electronics report takes the place of that assumption, though never below the
+ambient of the model. Without such a sensor the coil stays derated until the model has cooled.
+
+So that a coil that is warm, or may be, can be initialised all the same, each activation has a little current
+to spare from its begin on: the ramp warms the coil by less than 1 K.
 """
 
-from mount_models.coil.heating import CoilHeating, highest_current, warmed
+from mount_models.coil.heating import CoilHeating, highest_current, hottest_by_current, warmed
 from mount_models.sampling import HIGHEST_CURRENT
 
 _STEP = 100_000_000  # ns, chosen: the model goes on 10 times a second, the square of the current each sample
 _LONGEST_STEP = 2_000_000_000  # ns, chosen: of a longer pause nothing is known, so the coil has not cooled
+_AGE = 10.0  # s, chosen: a temperature told from before is no older; 3 A may have flowed since it was told
+_SPARE = 12.0  # A^2 s, chosen: a ramp takes 7.2; 12 warm the shipped coil by 0.5 K
+_NEAR = 5.0  # K, chosen: so near to its limit nothing is spared
 
 
 class HeatWatch:
     """The temperature of the coil; it outlives an activation of the driver, as the heat does."""
 
-    def __init__(self, heating: CoilHeating):
-        self.celsius = heating.ambient_celsius
-        """Temperature of the coil by the model, degC."""
-        self.current_limit = HIGHEST_CURRENT
-        """What the coil may carry, A."""
-        self.derating = heating.derating_celsius
-        self.limit = heating.limit_celsius
-        self._heating = heating
+    def __init__(self, heating: CoilHeating, celsius: float = float('nan')):
+        """`celsius`: the temperature by what ran before, at most 10 s old; NaN where nobody knows."""
+        self.known = celsius == celsius
+        """Whether the temperature rests on what was measured, and not on the worst that may be."""
+        self.heating = heating
         self._begin: int | None = None  # stamp of the sample from which the squares are summed
         self._squares, self._samples = 0.0, 0
+        self._spare = _SPARE  # A^2 s
+        if self.known:
+            begin = max(celsius, heating.ambient_celsius)
+            self._set(warmed(heating, begin, HIGHEST_CURRENT * HIGHEST_CURRENT, _AGE))
+        else:
+            self._set(hottest_by_current(heating, HIGHEST_CURRENT))
+
+    @property
+    def told(self) -> float:
+        """The temperature for a watch that follows this one, degC; NaN where it is not known."""
+        return self.celsius if self.known else float('nan')
 
     def begin(self) -> None:
         """Start with stamps of another clock: what lies between is not known and cools nothing."""
         self._begin = None
+        self._spare = _SPARE
+        self._set(self.celsius)
 
     def take(self, stamp: int, measured: float, sent: float) -> None:
         """Take the current that was measured at `stamp` (ns) and the one that was sent last, both A."""
@@ -43,15 +63,23 @@ class HeatWatch:
         """Take the temperature that the electronics report, degC; NaN where they know none."""
         if celsius > self.celsius:
             self._set(celsius)
+        elif not self.known and celsius == celsius:
+            self._set(max(celsius, self.heating.ambient_celsius))
+        self.known = self.known or celsius == celsius
 
     def _go_on(self, stamp: int) -> None:
         assert self._begin is not None
         elapsed = stamp - self._begin
         if elapsed <= _LONGEST_STEP:
-            mean_square = self._squares / self._samples
-            self._set(warmed(self._heating, self.celsius, mean_square, 1e-9 * elapsed))
+            mean_square, seconds = self._squares / self._samples, 1e-9 * elapsed
+            self._spare -= mean_square * seconds
+            self._set(warmed(self.heating, self.celsius, mean_square, seconds))
         self._begin, self._squares, self._samples = stamp, 0.0, 0
 
     def _set(self, celsius: float) -> None:
         self.celsius = celsius
-        self.current_limit = highest_current(self._heating, celsius, HIGHEST_CURRENT)
+        """Temperature of the coil by the model, degC."""
+        spared = self._spare > 0.0 and celsius < self.heating.limit_celsius - _NEAR
+        limit = HIGHEST_CURRENT if spared else highest_current(self.heating, celsius, HIGHEST_CURRENT)
+        self.current_limit = limit
+        """What the coil may carry, A."""

@@ -18,6 +18,8 @@ from mount_models.quantity import ParameterError, Quantity
 COPPER_CELSIUS = 20.0
 """Temperature at which `CoilHeating.resistance` holds, degC."""
 
+_FINE = 0.01  # K, chosen
+
 
 class CoilHeating(NamedTuple):
     """Coil as a thermal body, and the temperatures between which its current is lowered."""
@@ -68,6 +70,17 @@ def highest_current(heating: CoilHeating, celsius: float, current_limit: float) 
         return 0.0
     span = heating.limit_celsius - heating.derating_celsius
     return current_limit * ((heating.limit_celsius - celsius) / span)
+
+
+def hottest_by_current(heating: CoilHeating, current_limit: float) -> float:
+    """Return the temperature (degC) at which `highest_current` keeps a coil that carries it for ever."""
+    low, high = heating.ambient_celsius, heating.limit_celsius
+    while high - low > _FINE:
+        middle = 0.5 * (low + high)
+        current = highest_current(heating, middle, current_limit)
+        rises = warmed(heating, middle, current * current, 1.0) > middle
+        low, high = (middle, high) if rises else (low, middle)
+    return high
 
 
 def check_heating(heating: CoilHeating) -> None:
