@@ -17,7 +17,7 @@ class Refused(Supervisor):
         self.refusals, self.asked = refusals, 0
         self.rate = {} if sample_rate is None else {'sample_rate': str(sample_rate)}
         self.each = {
-            DRIVER.name: {'setpoint_timeouts': timeouts},
+            DRIVER.name: {'late_setpoints': timeouts},
             SIM.name: {'samples': samples, 'overruns': overruns},
         }
 

@@ -225,6 +225,7 @@ def _figures(now: Snapshot, earlier: Snapshot, parameters: DriverParameters) -> 
         'limited': now.limited,
         'refused': now.refused,
         'setpoint_timeouts': now.timeouts,
+        'late_setpoints': now.late_setpoints,
         'unsent': now.unsent,
         'restarts': now.restarts,
         'jumps': now.jumps,

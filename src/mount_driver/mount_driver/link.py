@@ -51,6 +51,9 @@ class Refusal(Enum):
     SWITCHED_OFF = 'a fault keeps the coil at 0 A until mount_driver is activated again'
 
 
+_LATE = frozenset((Refusal.STALE, Refusal.UNKNOWN_SAMPLE))
+
+
 class Stamped(NamedTuple):
     """A sample with the ROS time (ns) at which it was taken; a setpoint names the sample by this stamp."""
 
@@ -109,6 +112,8 @@ class Link:
         self.last_refusal: Refusal | None = None
         self.timeouts = 0
         """Times that the answered sample became older than the timeout before the next answer."""
+        self.late_setpoints = 0
+        """Setpoints refused for their age, and times that one of the two watches went to 0 A without any."""
 
         self._highest_current = codec.current.high
         self._timeout = setpoint_timeout_ns
@@ -136,6 +141,7 @@ class Link:
             return None
         if sample.displacement != sample.displacement:
             self.invalid_displacements += 1
+        self._note_watch(sample)
         stamp = self.clock.stamp(sample.microseconds, received)
         if len(self._samples) == _REMEMBERED:
             del self._samples[next(iter(self._samples))]
@@ -186,6 +192,7 @@ class Link:
     def refuse(self, reason: Refusal) -> None:
         """Count a setpoint that is not sent."""
         self.refusals[reason] += 1
+        self.late_setpoints += reason in _LATE
         self.last_refusal = reason
 
     @property
@@ -227,6 +234,7 @@ class Link:
             return False
         if self._last_setpoint.enable:
             self.timeouts += 1
+            self.late_setpoints += 1
         self._off_at = now + self._timeout
         return True
 
@@ -250,6 +258,11 @@ class Link:
         if stamp == self._answered_stamp and current > 0.0 and current >= self._last_setpoint.current:
             return Refusal.NOT_LOWER
         return None
+
+    def _note_watch(self, sample: Measurement) -> None:
+        """Count it when the electronics' own watch has gone to 0 A although setpoints leave."""
+        before = self.latest is not None and self.latest.sample.setpoint_timeout
+        self.late_setpoints += self._last_setpoint.enable and sample.setpoint_timeout and not before
 
     def _compare(self, stamp: int, current: float) -> None:
         """Note another answer to the sample of `stamp`; a node that ends adds one of 0 A, once."""

@@ -28,6 +28,7 @@ class Snapshot(NamedTuple):
     limited: int = 0
     refused: int = 0
     timeouts: int = 0
+    late_setpoints: int = 0  # refused for their age, or the cause that a watch went to 0 A
     unsent: int = 0
     unsent_reason: str = ''
     restarts: int = 0
@@ -82,6 +83,7 @@ def snapshot(exchange: Exchange, now_ns: int, started_ns: int) -> Snapshot:
         limited=link.limited,
         refused=sum(link.refusals.values()),
         timeouts=link.timeouts,
+        late_setpoints=link.late_setpoints,
         unsent=exchange.unsent,
         unsent_reason=exchange.unsent_reason,
         restarts=link.clock.restarts,

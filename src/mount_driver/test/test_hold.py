@@ -241,3 +241,21 @@ def test_a_sample_is_judged_before_an_answer_that_is_given_at_once(car):
     car.drive(1, lambda: None, lambda index: car.far.send(sample(5)))  # the electronics have begun anew
     assert 'begun anew' in car.exchange.link.fault
     assert [setpoint.enable for _, setpoint in car.sent] == [False]
+
+    assert HOLD < off_at - 10**9 <= HOLD + MS // 100
+
+
+def test_late_setpoints_are_counted_whichever_watch_they_miss(car):
+    late = car.exchange.link
+    assert late.late_setpoints == 0
+    car.drive(30, nothing)
+    assert late.late_setpoints == 1  # the watch of the driver
+    car.exchange.send_setpoint(car.stamps[-22], 3.0)
+    assert late.late_setpoints == 2  # an answer refused for its age
+    car.drive(1, car.answer)
+
+    def unreached(index):
+        car.far.send(sample(index)._replace(setpoint_timeout=True))
+
+    car.drive(5, car.answer, electronics=unreached)
+    assert late.late_setpoints == 3  # the watch of the electronics

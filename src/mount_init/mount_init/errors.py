@@ -13,6 +13,10 @@ class CurrentNotFollowingError(InitialisationError):
     """The coil current does not follow its setpoint."""
 
 
+class OverloadError(InitialisationError):
+    """Setpoints came too late for the safe state to let the coil be driven."""
+
+
 class UnusableReadingsError(InitialisationError):
     """The ripple readings cannot be those of a working coil: wrong sign, stuck, or scattered."""
 

@@ -13,6 +13,7 @@ from mount_init.errors import (
     CurrentNotFollowingError,
     InitialisationError,
     OutsideCalibrationError,
+    OverloadError,
     SpecimenMismatchError,
     TooFewRipplesError,
 )
@@ -40,7 +41,7 @@ from mount_init.plausibility import (
     check_single_crossing,
     check_steady_fall,
 )
-from mount_init.ramp import Ramp, current_ramp
+from mount_init.ramp import Ramp, approach, current_ramp
 from mount_init.readings import Readings, check_rate, check_readings
 from mount_init.supply import RampSupply, check_reach, inductance_at_supply_of_curves, saturated
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
@@ -52,11 +53,15 @@ from mount_models.specimen import Specimen
 OFF = 0.0  # A: the safe state
 
 _NOT_FOLLOWING = 'is the coil connected, and the supply at its voltage?'
-# From here late setpoints look like a broken cable: mount_driver and the electronics then switch off.
-_GONE = (
-    'it did before: did setpoints come too late, so that mount_driver or the electronics switched off '
-    '(is this machine overloaded?), or did the coil come loose?'
+_GONE = 'it did before: did the coil come loose, or did setpoints come too late?'
+_OVERLOAD = (
+    'this machine is overloaded: end what else runs on it, or give the nodes real-time priority (--priority)'
 )
+_AGAIN = 10  # samples, chosen: a current that follows for so many is back
+_DISTURBED = 3  # samples, chosen: a deviation that lasts so long is repeated though it ends by itself
+_MARGIN = 10  # samples, chosen: so many before the deviation are repeated too
+_LONGEST_AWAY = 0.5  # s, chosen: so long a late machine may leave the coil at 0 A
+_INTERRUPTIONS = 40  # chosen: each costs some 0.3 s; `total_timeout` ends them too
 
 
 @dataclass(frozen=True)
@@ -98,6 +103,9 @@ class Initialisation:
 
     `temperatures` may go on taking readings meanwhile; the gaps are compensated for the one that held in the
     middle of the ramp. It is looked up at the end, when it must have come, however late.
+
+    Where setpoints came so late that driver or electronics went to 0 A, the ramp waits at the rest current
+    until the coil follows again, and repeats from there on what was disturbed.
     """
 
     def __init__(
@@ -116,11 +124,18 @@ class Initialisation:
         self.ramp: Ramp = current_ramp(parameters, specimen.rest_current)
         self.readings = Readings(self.ramp.setpoints.size)
         self.last_stamp: int | None = None
+        self.interruptions = 0
+        """Times that the coil current was away and came back."""
         self._first_stamp: int | None = None
         self._temperatures = temperatures or TemperatureReadings()
         self._middle_stamp: int | None = None
         self._setpoints: list[float] = self.ramp.setpoints.tolist()
         self._failure: InitialisationError | None = None
+        self._taken = 0
+        self._last = OFF  # A: the last setpoint
+        self._approach: list[float] | None = None  # setpoints back to the ramp; empty while the coil is away
+        self._leading = False  # whether these setpoints are being sent
+        self._back = 0  # samples in a row in which it follows again
         self._deviating = 0
         self._followed = False
         self._invalid = 0
@@ -135,6 +150,11 @@ class Initialisation:
         """Whether no further sample is wanted: the ramp is over, or given up."""
         return self._failure is not None or self.readings.received >= self.length
 
+    @property
+    def disturbed(self) -> bool:
+        """Whether the coil did not follow for a while, or not at all: `note_late` tells why."""
+        return self.interruptions > 0 or isinstance(self._failure, CurrentNotFollowingError)
+
     def step(self, stamp: int, current: float, current_rate: float, flux_rate: float) -> float:
         """Return the setpoint (A) for the sample of time `stamp` (ns), in A, A/s, T/s; 0 A when finished.
 
@@ -145,13 +165,37 @@ class Initialisation:
             return OFF
         number = self.readings.received
         self.last_stamp = stamp
-        if number == 0:
+        self._taken += 1
+        if self._first_stamp is None:
             self._first_stamp = stamp
-        if number == self.length // 2:
-            self._middle_stamp = stamp
-        valid = self.readings.add(current, current_rate, flux_rate)
-        self._watch(valid, current, flux_rate, self._setpoints[number - 1] if number else OFF)
-        return OFF if self._failure is not None else self._setpoints[number]
+        deviates = self._deviates(current)
+        if self._approach is None:
+            if number == self.length // 2:
+                self._middle_stamp = stamp
+            valid = self.readings.add(current, current_rate, flux_rate)
+            self._watch(valid, deviates, current, flux_rate)
+        else:
+            self._carry(deviates, current)
+        self._last = OFF if self._failure is not None else self._next(number)
+        return self._last
+
+    def note_late(self, count: int) -> None:
+        """Take how many setpoints came too late during the ramp by `mount_driver`; raise what follows of it.
+
+        Raises `OverloadError` where they are why the coil did not follow, and `CurrentNotFollowingError`
+        where its current was away though none was late.
+        """
+        if isinstance(self._failure, CurrentNotFollowingError) and count:
+            raise OverloadError(
+                f'{count} setpoints came too late or not at all for the 20 ms limit of mount_driver and the '
+                f'electronics, which then keep the coil at 0 A (interrupted {self.interruptions} times, '
+                f'limit {_INTERRUPTIONS}): {_OVERLOAD}'
+            ) from self._failure
+        if self._failure is None and self.interruptions and not count:
+            raise CurrentNotFollowingError(
+                f'coil current left its setpoint {self.interruptions} times (limit 0) and came back, though '
+                'no setpoint came too late: check coil, cable and connectors'
+            )
 
     def silence(self, duration: float) -> TooFewRipplesError:
         """Return the refusal for samples that stopped to come for `duration` (s)."""
@@ -171,7 +215,7 @@ class Initialisation:
             )
         assert self._first_stamp is not None
         assert self.last_stamp is not None
-        check_rate(self.last_stamp - self._first_stamp, self.length, self.parameters)
+        check_rate(self.last_stamp - self._first_stamp, self._taken, self.parameters)
         check_reach(self.specimen, self.readings, self.ramp)
         check_readings(self.readings, self.ramp, self.parameters)
         temperature = coil_temperature(
@@ -180,7 +224,44 @@ class Initialisation:
         evidence = _estimate(self.specimen, self.parameters, self.ramp, self.readings, temperature)
         return _complete(self.specimen, self.parameters, evidence)
 
-    def _watch(self, valid: bool, current: float, flux_rate: float, setpoint: float) -> None:
+    def _deviates(self, current: float) -> bool:
+        return not abs(current - self._last) <= self.parameters.following_error
+
+    def _next(self, number: int) -> float:
+        if self._approach is None:
+            return self._setpoints[number]
+        return self._approach.pop(0) if self._approach else self.specimen.rest_current
+
+    def _carry(self, deviates: bool, current: float) -> None:
+        """Go back to the ramp after an interruption: the coil must follow again, then it is led there."""
+        self._deviating = self._deviating + 1 if deviates else 0
+        self._back = 0 if deviates else self._back + 1
+        if self._deviating > _LONGEST_AWAY * self.parameters.sample_rate:
+            self._give_up(current, _GONE)
+        elif self._approach:
+            if self._deviating > self.parameters.following_duration * self.parameters.sample_rate:
+                self._interrupt(current)
+        elif self._leading:
+            self._approach, self._leading = None, False
+        elif self._back >= _AGAIN:
+            self._approach = approach(self.parameters, self.ramp, self.readings.received)
+            self._leading = True
+
+    def _interrupt(self, current: float) -> None:
+        """Begin to wait for the coil, for a piece of the ramp was disturbed."""
+        self.interruptions += 1
+        self._approach, self._leading, self._back = [], False, 0
+        self._invalid = 0
+        if self.interruptions > _INTERRUPTIONS:
+            self._give_up(current, _GONE)
+
+    def _give_up(self, current: float, why: str) -> None:
+        self._failure = CurrentNotFollowingError(
+            f'coil current ({current:.3f} A) must follow its setpoint ({self._last:.3f} A) within '
+            f'{self.parameters.following_error:g} A; {why}'
+        )
+
+    def _watch(self, valid: bool, deviates: bool, current: float, flux_rate: float) -> None:
         parameters = self.parameters
         if not valid:
             self._invalid += 1
@@ -189,18 +270,21 @@ class Initialisation:
                     f'air gap not estimated: {self._invalid} ripple samples in a row were invalid, more than '
                     f'{parameters.invalid_duration:g} s; check the coil ripple measurement'
                 )
+                return
+        else:
+            self._invalid = 0
+        if current != current:
             return
-        self._invalid = 0
-        deviates = abs(current - setpoint) > parameters.following_error
-        self._deviating = self._deviating + 1 if deviates else 0
+        deviated, self._deviating = self._deviating, self._deviating + 1 if deviates else 0
         self._followed |= not deviates and current > parameters.following_error
-        if self._deviating > parameters.following_duration * parameters.sample_rate:
-            gone = self._followed and abs(current) <= parameters.following_error
-            full = saturated(self.specimen, current, flux_rate)
-            self._failure = CurrentNotFollowingError(
-                f'coil current ({current:.3f} A) must follow its setpoint ({setpoint:.3f} A) within '
-                f'{parameters.following_error:g} A; {full or (_GONE if gone else _NOT_FOLLOWING)}'
-            )
+        gone = deviates and current <= parameters.following_error  # 0 A: as the safe state makes it
+        back = not deviates and deviated >= _DISTURBED
+        if self._followed and (gone or back):
+            disturbed = deviated + _MARGIN
+            self.readings.forget(max(0, self.readings.received - disturbed))
+            self._interrupt(current)
+        elif self._deviating > parameters.following_duration * parameters.sample_rate:
+            self._give_up(current, saturated(self.specimen, current, flux_rate) or _NOT_FOLLOWING)
 
 
 def load_compiled_laws(specimen: Specimen) -> None:

@@ -27,6 +27,7 @@ from mount_ros.nodes.process import run_node
 from mount_ros.nodes.sliding_window import SlidingWindow
 
 _DRIVER_PATIENCE = 0.3  # s, chosen: the driver looks at itself ten times a second
+_VERDICT_PERIOD = 1.2  # s, chosen: it tells its figures once a second
 
 
 class MountInit(SafeLifecycleNode):
@@ -50,7 +51,7 @@ class MountInit(SafeLifecycleNode):
         self._malformed, self._malformed_reason = 0, ''
         self._malformed_before = SlidingWindow(0)
         self._temperatures = TemperatureReadings()
-        self._driver = DriverReport(self.get_namespace())
+        self._driver = DriverReport(self.get_namespace(), self._init_parameters.peak_current)
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
@@ -108,7 +109,13 @@ class MountInit(SafeLifecycleNode):
         parameters = self._init_parameters
         # in lock-step only silence can tell a stalled chain from a slow machine
         total_timeout = math.inf if self.lockstep else parameters.total_timeout
+        before = self._driver.late_setpoints or 0
         dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
+        if ramp.disturbed:
+            self._driver.hear(_VERDICT_PERIOD, self.ending)
+            late = self._driver.late_setpoints
+            if late is not None:
+                ramp.note_late(late - before if late >= before else late)
         return ramp.result()
 
     def _objection(self) -> str:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from mount_init.errors import SpecimenMismatchError
 from mount_init.parameters import InitParameters
 
+_APPROACH = 0.25  # chosen: share of `ramp_duration` for the way from 0 A to the peak
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -68,6 +69,23 @@ def current_ramp(parameters: InitParameters, rest_current: float) -> Ramp:
         down=slice(start[4], start[5]),
         dwell_after=slice(start[5] + settle, start[6]),
     )
+
+
+def approach(parameters: InitParameters, ramp: Ramp, place: int) -> list[float]:
+    """Return the setpoints (A) from 0 A to that of the sample number `place`, at whose end the halves rest.
+
+    Behind the peak they come from there, as in the ramp itself.
+    """
+    target, peak = float(ramp.setpoints[place]), float(ramp.setpoints[ramp.down.start - 1])
+    rest = [target] * _count(parameters, parameters.settle_duration)
+
+    def way(begin: float, end: float) -> list[float]:
+        duration = _APPROACH * parameters.ramp_duration * abs(end - begin) / peak
+        return [*(begin + (end - begin) * _smooth_step(max(1, _count(parameters, duration))))]
+
+    if place < ramp.down.start:
+        return [*way(0.0, target), *rest]
+    return [*way(0.0, peak), *([peak] * len(rest)), *way(peak, target), *rest]
 
 
 def _count(parameters: InitParameters, duration: float) -> int:

@@ -28,6 +28,12 @@ class Readings:
         """Number of samples received with all three readings finite."""
         return self.received - self.skipped
 
+    def forget(self, number: int) -> None:
+        """Take back the samples from `number` on."""
+        self.skipped -= int(np.isnan(self._rows[0, number : self.received]).sum())
+        self._rows[:, number:] = np.nan
+        self.received = number
+
     def add(self, current: float, current_rate: float, flux_rate: float) -> bool:
         """Store the next sample; return whether it is valid. What is not finite is skipped and counted."""
         number = self.received

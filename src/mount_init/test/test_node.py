@@ -416,6 +416,45 @@ def test_what_the_driver_refuses_is_refused_with_its_reason(graph, figure):
     assert g.electronics.setpoints == []
 
 
+def test_a_coil_that_is_too_hot_for_the_ramp_is_refused_with_that_reason(graph):
+    g = graph()
+    g.configure()
+    g.electronics.send_sample()
+
+    def heard():
+        g.electronics.speak_as_driver('coil above 140 degC; damp less', current_limit=0.4)
+        return g.init._driver.refusal
+
+    wait_until(heard, 'the verdict of the driver')
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    told = 'mount_driver lets the coil carry 0.400 A, the ramp needs 3.000 A: coil above 140 degC; damp less'
+    assert g.refusal() == told
+
+
+def test_a_driver_that_counts_late_setpoints_is_believed_and_the_coil_is_not_blamed(
+    graph, simulated_actuator
+):
+    g = graph(simulated_actuator(distort=lambda _, s: (0.0, s[1], s[2])))
+    g.configure()
+    g.electronics.send_sample()
+    stop = threading.Event()
+
+    def speak():
+        while not stop.wait(0.02):
+            late = 60 * (len(g.electronics.setpoints) > 1)
+            g.electronics.speak_as_driver('link is up', late_setpoints=late)
+
+    driver = threading.Thread(target=speak)
+    driver.start()
+    try:
+        assert not g.change(Transition.TRANSITION_ACTIVATE)
+    finally:
+        stop.set()
+        driver.join()
+    assert '60 setpoints came too late' in g.refusal()
+    assert 'this machine is overloaded' in g.refusal()
+
+
 def test_a_driver_that_switches_off_during_the_ramp_ends_it_with_its_reason(graph):
     g = graph()
     g.electronics.at(

@@ -90,10 +90,10 @@ def test_an_open_coil_is_refused_early(specimen, simulated_actuator, run_ramp):
 
 
 @pytest.mark.parametrize('since', [200, 1000])
-def test_a_current_that_followed_and_is_gone_hints_at_late_setpoints(refusal, since):
+def test_a_current_that_followed_and_stays_away_is_refused(refusal, since):
     error = refusal(distort=lambda n, s: s if n < since else (0.0, s[1], s[2]))
     assert isinstance(error, CurrentNotFollowingError)
-    assert 'it did before: did setpoints come too late' in str(error)
+    assert 'it did before: did the coil come loose, or did setpoints come too late?' in str(error)
     assert 'is the coil connected' not in str(error)
 
 

@@ -22,7 +22,7 @@ class Pace(NamedTuple):
 def pace(driver: Mapping[str, str], sim: Mapping[str, str]) -> Pace:
     """Return the pace that the figures of driver and simulator tell; without them nothing was late."""
     return Pace(
-        timeouts=int(driver.get('setpoint_timeouts', 0)),
+        timeouts=int(driver.get('late_setpoints', 0)),
         samples=int(sim.get('samples', 0)),
         overruns=int(sim.get('overruns', 0)),
     )
