@@ -242,8 +242,6 @@ def test_a_sample_is_judged_before_an_answer_that_is_given_at_once(car):
     assert 'begun anew' in car.exchange.link.fault
     assert [setpoint.enable for _, setpoint in car.sent] == [False]
 
-    assert HOLD < off_at - 10**9 <= HOLD + MS // 100
-
 
 def test_late_setpoints_are_counted_whichever_watch_they_miss(car):
     late = car.exchange.link
