@@ -50,6 +50,17 @@ def test_it_has_the_sample_rate_of_the_drive(tmp_path):
     assert (undamped.begin - undamped.stamps[0]) / 1e9 == pytest.approx(2.8)
 
 
+def test_of_a_drive_in_real_time_it_ends_with_the_run_and_the_recording_goes_on(drive):
+    parameters = parameters_of(drive)
+    whole = undamped_of(drive, parameters)
+    # In real time the simulator's truth goes on behind the end of its run, as this one behind a shorter run.
+    parameters['mount_sim']['timeline.duration'] = 2.9
+    shorter = undamped_of(drive, parameters)
+    assert len(whole.stamps) - len(shorter.stamps) == 100
+    np.testing.assert_array_equal(shorter.displacement, whole.displacement[:-100])
+    assert shorter.begin == whole.begin
+
+
 def test_of_a_part_of_a_drive_it_is_the_same_part(drive, tmp_path):
     cut(drive, tmp_path / 'part', 3.5, 4.5)
     part = open_recording(tmp_path / 'part')

@@ -170,6 +170,36 @@ def test_a_mapping_file_says_columns_units_axes_and_offsets(tmp_path):
     assert other['force'].column == 'Strom:N'
 
 
+@pytest.mark.parametrize(
+    ('scale', 'factor'),
+    [('', 1e-3), (', scale: -1', -1e-3), (', scale: 0.001', 1e-3), (', scale: 0.98', None)],
+)
+def test_a_scale_without_a_unit_stands_beside_the_unit_of_the_header(tmp_path, scale, factor):
+    table = {'x [mm]': 1e3 * WAY, 'force [kN]': 1e-3 * FRICTION, 'load [N]': LOAD}
+    as_csv(tmp_path / 'rig.csv', {'time [s]': np.arange(len(WAY)) * 1e-3, **table})
+    text = (
+        f'columns:\n  displacement: {{column: x{scale}}}\n  force: {{column: force, scale: -1}}\n'
+        '  normal_force: {column: load}\n'
+    )
+    (tmp_path / 'rig.yaml').write_text(text)
+    chosen = said([], mapping_in_file(tmp_path / 'rig.yaml'))
+    if factor is None:
+        with pytest.raises(
+            IdentificationError, match=r'says mm \(0.001 SI units each\), the mapping a scale of 0.98'
+        ):
+            read_recording(tmp_path / 'rig.csv', chosen)
+        return
+    found = read_recording(tmp_path / 'rig.csv', chosen)
+    assert found.displacement == pytest.approx(1e3 * factor * WAY, rel=1e-9, abs=1e-12)
+    assert found.force == pytest.approx(-FRICTION, rel=1e-9, abs=1e-9)
+
+
+def test_a_mapped_unit_of_another_quantity_is_refused(tmp_path):
+    (tmp_path / 'rig.yaml').write_text('columns:\n  displacement: {column: x, unit: N}\n')
+    with pytest.raises(IdentificationError, match='the mapping names N for displacement'):
+        said([], mapping_in_file(tmp_path / 'rig.yaml'))
+
+
 def test_ripple_tables_are_read_of_other_formats_too(tmp_path):
     table = {'gap_um': GAP, 'current_a': CURRENT, 'inductance_mh': 20.0 / (1.0 + CURRENT) * (300.0 / GAP)}
     as_mdf(tmp_path / 'L.mf4', table)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mount_bringup.graph.ending_signals import ending_signals
-from mount_view.feed.feed import Feed, Message, Receive
+from mount_view.feed.feed import Feed, FeedError, Message, Receive
 from mount_view.window.model import Model
 
 PAGE_PORT, FOXGLOVE_PORT = 8137, 8765
@@ -46,13 +46,15 @@ def model_of(order: ViewOrder) -> Iterator[tuple[Feed, Model]]:
     feed = open_feed(order)
     with ExitStack() as stack:
         stack.callback(feed.stop)
-        yield feed, stack.enter_context(_at_work(feed, order, ()))
+        yield feed, stack.enter_context(_at_work(feed, order, (), lambda: None))
 
 
 @contextmanager
-def _at_work(feed: Feed, order: ViewOrder, others: Sequence[Receive]) -> Iterator[Model]:
+def _at_work(
+    feed: Feed, order: ViewOrder, others: Sequence[Receive], on_failure: Callable[[], None]
+) -> Iterator[Model]:
     """Give the model of a feed that has begun; `others` get every message too."""
-    model = Model(feed, beside=order.beside)
+    model = Model(feed, beside=order.beside, on_failure=on_failure)
     receivers = (model.take, *others)
 
     def receive(message: Message) -> None:
@@ -69,7 +71,7 @@ def _at_work(feed: Feed, order: ViewOrder, others: Sequence[Receive]) -> Iterato
 
 
 def serve_view(order: ViewOrder, say: Callable[[str], None]) -> None:
-    """Serve page and Foxglove until Ctrl-C; `say` takes where to look. Raises `FeedError`."""
+    """Serve page and Foxglove until Ctrl-C; `say` takes where to look. Raises `FeedError`, also amid it."""
     from mount_view.foxglove_server import FoxgloveServer
     from mount_view.page.web import Web
 
@@ -84,13 +86,15 @@ def serve_view(order: ViewOrder, say: Callable[[str], None]) -> None:
             stack.callback(server.stop)
             others.append(server.take)
             say(f'Foxglove   {server.address} (Foxglove or Lichtblick: open connection, Foxglove WebSocket)')
-        model = stack.enter_context(_at_work(feed, order, others))
+        model = stack.enter_context(_at_work(feed, order, others, ending.set))
         page = Web(model, feed.title, feed.mark, order.host, order.port)
         stack.callback(page.stop)
         page.start()
         say(f'page       {page.address}')
         say('Ctrl-C ends the view; what is looked at goes on')
         ending.wait()
+        if model.failure:
+            raise FeedError(model.failure)
 
 
 def wait_for_state(model: Model, limit: float) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import struct
+import threading
 
 import aiohttp
 import numpy as np
@@ -87,6 +88,30 @@ def test_a_mark_is_handed_on(page):
     assert run(answer({'Origin': 'http://elsewhere'}))[0] == 403
 
 
+def test_a_page_on_loopback_has_no_other_name(page):
+    async def status(host):
+        async with (
+            aiohttp.ClientSession() as session,
+            session.get(f'{page.address}view.js', headers={'Host': host}) as got,
+        ):
+            return got.status
+
+    assert [run(status(host)) for host in ('localhost:8137', '[::1]:8137', '127.0.0.1')] == [200] * 3
+    assert [run(status(host)) for host in ('elsewhere.example:8137', '127.0.0.1.elsewhere.example')] == [
+        403
+    ] * 2
+
+
+def test_a_model_that_fails_says_so_and_ends_the_view(drive):
+    ended = threading.Event()
+    model = Model(Recorded(drive), beside=False, on_failure=ended.set)
+    model.interval = lambda messages: 1 / 0
+    model.start()
+    assert ended.wait(LIMIT)
+    assert model.failure == 'the view has ended: ZeroDivisionError: division by zero'
+    model.stop()
+
+
 def test_others_need_the_token(drive, free_port):
     feed = Recorded(drive)
     web = Web(Model(feed, beside=False), feed.title, feed.mark, '0.0.0.0', free_port)
@@ -100,6 +125,7 @@ def test_others_need_the_token(drive, free_port):
     try:
         assert run(status('')) == 403
         assert run(status('?token=guess')) == 403
+        assert run(status('?token=gue%C3%9F')) == 403
         assert run(status('?' + web.address.split('?')[1])) == 200
     finally:
         web.stop()

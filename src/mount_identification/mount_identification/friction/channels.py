@@ -12,6 +12,7 @@ from mount_identification.friction.recording import FloatArray, IdentificationEr
 from mount_identification.rack.measured_table import MeasuredTable
 from mount_identification.rack.unit_words import unit_word
 from mount_signals.formats.content import Stated
+from mount_signals.units.column_unit import factor_beside_unit
 from mount_signals.units.columns import stated_with
 from mount_signals.units.mapping import ColumnChoice, Mapping, TimeChoice
 from mount_signals.units.unit import Unit, unit_of, units_of
@@ -29,10 +30,11 @@ DESIRED = 'desired_displacement'
 
 @dataclass(frozen=True)
 class Channel:
-    """Where a quantity is: column, or `topic.field`; factor to SI units; what is subtracted then."""
+    """Where a quantity is: column, or `topic.field`; unit and scale where said; what is subtracted then."""
 
     source: str
-    factor: float | None = None
+    unit: Unit | None = None
+    scale: float | None = None
     offset: float | str | None = None
 
 
@@ -57,7 +59,7 @@ def said(texts: Sequence[str] = (), mapping: Mapping | None = None, stated: Stat
         if name == 'time':
             time = TimeChoice(source, unit.symbol if unit else '')
         else:
-            channels[name] = Channel(source, unit.factor if unit else None)
+            channels[name] = Channel(source, unit)
     return Said(channels, time, stated_with(mapping, stated))
 
 
@@ -75,7 +77,7 @@ def columns_in_si(table: MeasuredTable | Table, said: Said, needed: tuple[str, .
                 f'it as in --channel {name}=COLUMN:UNIT'
             )
         places[name] = table.place(channel.source)
-        factors[name] = _factor_of(table, places[name], name) if channel.factor is None else channel.factor
+        factors[name] = _factor_of(table, places[name], name, channel)
     times, rows = _over_time(table, list(places.values()), said.time)
     found = {name: factors[name] * row for name, row in zip(places, rows, strict=True)}
     for name in found.keys() & said.channels.keys():
@@ -109,7 +111,8 @@ def _mapped(mapping: Mapping) -> dict[str, Channel]:
     return {
         known.get(name, name): Channel(
             choice.column,
-            None if not choice.unit and choice.scale is None else _factor_said(choice),
+            _unit_said(known.get(name, name), choice) if choice.unit else None,
+            choice.scale,
             choice.offset,
         )
         for name, choice in choices.items()
@@ -117,10 +120,14 @@ def _mapped(mapping: Mapping) -> dict[str, Channel]:
     }
 
 
-def _factor_said(choice: ColumnChoice) -> float:
-    return (unit_of(choice.unit).factor if choice.unit else 1.0) * (
-        1.0 if choice.scale is None else choice.scale
-    )
+def _unit_said(name: str, choice: ColumnChoice) -> Unit:
+    unit = unit_of(choice.unit)
+    if unit.dimension != _DIMENSIONS[name]:
+        raise IdentificationError(
+            f'the mapping names {choice.unit} for {name} (column {choice.column}), a unit of '
+            f'{unit.dimension}; it must be one of {_DIMENSIONS[name]}, such as {_example(name)}'
+        )
+    return unit
 
 
 def _over_time(
@@ -143,14 +150,36 @@ def _by_heading(header: Sequence[str], name: str) -> Channel | None:
     return next((Channel(each) for each, title in pairs if re.fullmatch(rf'{name}(_\w+)?', title)), None)
 
 
-def _factor_of(table: MeasuredTable | Table, place: int, name: str) -> float:
+def _factor_of(table: MeasuredTable | Table, place: int, name: str, channel: Channel) -> float:
+    """Return the factor to SI: what is said goes before the header, a scale without a unit beside it."""
+    scale = 1.0 if channel.scale is None else channel.scale
+    if channel.unit is not None:
+        return channel.unit.factor * scale
     column = table.header[place]
+    header = _unit_in_header(table, place, name)
+    if header is None:
+        if channel.scale is not None:
+            return scale
+        raise IdentificationError(
+            f'{table.path.name}: column {column} does not say its unit; name it as in '
+            f'--channel {name}={column}:{_example(name)}'
+        )
+    factor = factor_beside_unit(scale, header)
+    if factor is None:
+        raise IdentificationError(
+            f'{table.path.name}: the header of column {column} says {header.symbol} ({header.factor:g} SI '
+            f'units each), the mapping a scale of {scale:g} without a unit: add unit: {header.symbol} to the '
+            'scale of a calibration, or leave the scale out'
+        )
+    return factor
+
+
+def _unit_in_header(table: MeasuredTable | Table, place: int, name: str) -> Unit | None:
     told = table.units[place] if isinstance(table, MeasuredTable) else ''
-    for unit in (told, column.rpartition('_')[2]):
-        word = unit_word(unit, _DIMENSIONS[name]) if unit else None
-        if word is not None:
-            return word.factor
-    raise IdentificationError(
-        f'{table.path.name}: column {column} does not say its unit; name it as in --channel {name}={column}:'
-        f'{"mm" if "displacement" in name else "N"}'
-    )
+    spellings = (told, table.header[place].rpartition('_')[2])
+    words = (unit_word(spelling, _DIMENSIONS[name]) for spelling in spellings if spelling)
+    return next((word for word in words if word is not None), None)
+
+
+def _example(name: str) -> str:
+    return 'mm' if 'displacement' in name else 'N'

@@ -44,7 +44,7 @@ class UndampedError(ValueError):
 
 @dataclass(frozen=True)
 class Undamped:
-    """The undamped mount at the stamps (ns) of the recorded truth: m, and m/s^2 of the chassis.
+    """The undamped mount at the recorded stamps (ns) within the run: m, and m/s^2 of the chassis.
 
     `begin` (ns) is the stamp at which the excitation begins.
     """
@@ -88,8 +88,10 @@ def undamped_of(recording: Recording, parameters: Parameters) -> Undamped:
         raise UndampedError(f'the run cannot be computed again: {error}') from None
     first = _first_sample(stamps, excited, simulated)
     places = first + _samples(stamps, simulated.sample_time)
+    within = places < len(simulated.displacement)  # electronics in real time go on behind the end of the run
+    places = places[within]
     return Undamped(
-        stamps,
+        stamps[within],
         simulated.displacement[places],
         simulated.chassis_acceleration[places],
         int(stamps[0]) + (simulated.start - first) * simulated.sample_time,
@@ -151,7 +153,8 @@ def _first_sample(stamps: NDArray[np.int64], excited: Mapping[str, Array], simul
     recorded, ours, places = excited[name], getattr(simulated, name), _samples(stamps, simulated.sample_time)
     clearest = int(np.argmax(np.abs(recorded)))
     for candidate in (np.flatnonzero(ours == recorded[clearest]) - places[clearest]).tolist():
-        inside = candidate >= 0 and candidate + places[-1] < len(ours)
-        if inside and np.array_equal(ours[candidate + places], recorded):
+        within = candidate + places < len(ours)
+        whole = candidate >= 0 and 2 * np.count_nonzero(within) > len(places)
+        if whole and np.array_equal(ours[candidate + places[within]], recorded[within]):
             return int(candidate)
     raise UndampedError('the excitation that was recorded is not that of the session')

@@ -31,10 +31,20 @@ def unit_of_column(
     if said and header and unit_of(header) != unit:
         notes.append(f'{column.name}: its header says {header}; taken as {said}, as you say')
     scale = 1.0 if choice.scale is None else choice.scale
-    if not said and abs(scale) != 1.0:
+    if not said:
         scale = judge.scale_beside_header(scale, unit)
     judge.believe(unit, by_hand=bool(said), notes=notes)
     return unit, scale, notes
+
+
+def factor_beside_unit(scale: float, unit: Unit) -> float | None:
+    """Return the factor to SI where a header names `unit` and a hand `scale` alone; None: they disagree.
+
+    A scale of 1 or -1 turns an axis; one that is the factor of the unit says it twice.
+    """
+    if abs(scale) == 1.0:
+        return scale * unit.factor
+    return scale if abs(abs(scale) / unit.factor - 1.0) <= _SAME_FACTOR else None
 
 
 class _Judge:
@@ -75,8 +85,9 @@ class _Judge:
 
     def scale_beside_header(self, scale: float, unit: Unit) -> float:
         """Return the factor that is left of `scale` where the header names a unit and no hand does."""
-        if abs(abs(scale) / unit.factor - 1.0) <= _SAME_FACTOR:
-            return scale / unit.factor  # the factor of the unit itself, as it is said twice
+        factor = factor_beside_unit(scale, unit)
+        if factor is not None:
+            return factor / unit.factor
         raise UnitError(
             f'{self.where}: its header says {unit.symbol} ({unit.factor:g} {self.wanted.unit.symbol} each), '
             f'the scale says {scale:g}: write {self.option(unit.symbol)} with the scale of a calibration, or '

@@ -84,8 +84,11 @@ class Web:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
         given = request.query.get('token') or request.cookies.get('token') or ''
-        if self._token and not secrets.compare_digest(given, self._token):
+        if self._token and not secrets.compare_digest(given.encode(errors='replace'), self._token.encode()):
             raise web.HTTPForbidden(text='This page needs the token that `engine-mount view` has printed.')
+        if not self._token and request.url.host not in LOOPBACK:
+            # A name of somebody else's that leads here lets a page of theirs read this one.
+            raise web.HTTPForbidden(text=f'This page is served as localhost alone, not as {request.host}.')
         origin = request.headers.get('Origin')
         if origin is not None and origin.split('://')[-1] != request.host:
             raise web.HTTPForbidden(text='Another page may not look at this one.')

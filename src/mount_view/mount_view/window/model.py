@@ -42,9 +42,14 @@ class Interval:
 
 
 class Model:
-    """What is known of the graph that a feed shows; `listen` gets each new interval."""
+    """What is known of the graph that a feed shows; `listen` gets each new interval.
 
-    def __init__(self, feed: Feed, *, beside: bool = True):
+    An exception ends its thread: `failure` says which, and `on_failure` is called there.
+    """
+
+    def __init__(self, feed: Feed, *, beside: bool = True, on_failure: Callable[[], None] = lambda: None):
+        self.failure = ''
+        self._on_failure = on_failure
         self._feed = feed
         self._lock = threading.Lock()
         self._arrived: list[Message] = []
@@ -99,6 +104,14 @@ class Model:
         return {label: _MM * value for label, value in levels_of(policy, own).items()}
 
     def _serve(self) -> None:
+        try:
+            self._make_intervals()
+        except Exception as error:
+            # The border of the thread: without a word the last picture would pass for the present one.
+            self.failure = f'the view has ended: {type(error).__name__}: {error}'
+            self._on_failure()
+
+    def _make_intervals(self) -> None:
         next_one = time.monotonic()
         while not self._ending.is_set():
             next_one += 1.0 / INTERVALS_PER_SECOND
