@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mount_bags.signals.signal import SignalError
+from mount_signals.formats import excel
 from mount_signals.formats.content import Stated
 from mount_signals.formats.reading import headings, read
 from mount_signals.sources.source import SourceError
@@ -147,3 +148,10 @@ def test_json_names_line_and_column_of_a_fault(tmp_path):
     assert 'data[1] holds 1 values where row 0 holds 2' in _refusal(path)
     path.write_text('{"a": 1}')
     assert 'holds no lists of numbers' in _refusal(path)
+
+
+def test_a_workbook_that_unpacks_to_more_than_may_be_is_refused(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(excel, '_LARGEST', 1000)
+    file, _ = whole['excel']
+    with pytest.raises(SignalError, match=r'unpacks to \d+ bytes \(limit 1000\): export the sheet as CSV'):
+        headings(file.path, Stated())

@@ -4,6 +4,7 @@ import numpy as np
 import zstandard
 
 from mount_bags.container.stored import StoredMessages, stored_messages
+from mount_bags.container.unpacking import TooLargeError, unpacked_zstd, unpacking_limit
 
 _MAGIC = b'\x28\xb5\x2f\xfd'  # of zstd; a message in CDR begins with a zero
 
@@ -25,9 +26,8 @@ def _has_packed(messages: StoredMessages) -> bool:
 def _unpacked(raw: bytes) -> bytes:
     if raw[: len(_MAGIC)] != _MAGIC:
         return raw
-    unpacking = zstandard.ZstdDecompressor().decompressobj()
     try:
-        unpacked = unpacking.decompress(raw)
-    except (zstandard.ZstdError, MemoryError):
+        unpacked, whole = unpacked_zstd(raw, unpacking_limit(len(raw)))
+    except (zstandard.ZstdError, MemoryError, TooLargeError):
         return raw
-    return unpacked if unpacking.eof else raw
+    return unpacked if whole else raw

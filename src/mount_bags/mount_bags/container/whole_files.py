@@ -1,14 +1,17 @@
 """Files as bytes in memory, those compressed as a whole included."""
 
 import mmap
-import shutil
+import os
 import tempfile
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import zstandard
 
+from mount_bags.container.unpacking import unpacking_limit
+
 COMPRESSED_SUFFIXES = ('.zstd', '.zst', '.lz4')
+_PIECE = 1 << 20  # bytes, chosen
 
 
 class FileError(ValueError):
@@ -27,6 +30,8 @@ def mapped(path: Path) -> mmap.mmap:
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise FileError(f'{path} cannot be read: {error.strerror or error}') from None
+    except FileError:
+        raise
     except ValueError:
         raise FileError(f'{path} is empty') from None
 
@@ -41,14 +46,29 @@ def forget(data: mmap.mmap, begin: int, end: int) -> None:
 
 
 def unpack(source: IO[bytes], target: IO[bytes], suffix: str) -> None:
-    """Unpack `source`, packed as `suffix` says; what is cut off there is missing in `target`."""
-    try:
-        if suffix == '.lz4':
-            import lz4.frame
+    """Unpack `source`, packed as `suffix` says; what is cut off there is missing in `target`.
 
-            with lz4.frame.open(source) as stream:
-                shutil.copyfileobj(stream, target)
-        else:
-            zstandard.ZstdDecompressor().copy_stream(source, target)
+    Raises `FileError` where more comes of it than may.
+    """
+    size = os.fstat(source.fileno()).st_size
+    limit = unpacking_limit(size)
+    try:
+        with _stream(source, suffix) as stream:
+            while piece := stream.read(_PIECE):
+                limit -= len(piece)
+                if limit < 0:
+                    raise FileError(
+                        f'{source.name} unpacks to more than {unpacking_limit(size)} bytes (limit for {size} '
+                        'packed bytes): if it is what you expect, unpack it by zstd or lz4 first'
+                    )
+                target.write(piece)
     except (zstandard.ZstdError, RuntimeError, EOFError):
         pass  # the file within tells where it ends
+
+
+def _stream(source: IO[bytes], suffix: str) -> Any:
+    if suffix == '.lz4':
+        import lz4.frame
+
+        return lz4.frame.open(source)
+    return zstandard.ZstdDecompressor().stream_reader(source, read_across_frames=False, closefd=False)

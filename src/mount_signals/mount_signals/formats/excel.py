@@ -1,5 +1,6 @@
 """Excel workbooks: a table of each sheet, whose first row of numbers follows its titles."""
 
+import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, time, timedelta
@@ -18,6 +19,7 @@ from mount_signals.formats.measured import Heading, MeasuredColumn, TimeBase, un
 _SECOND = 1_000_000_000  # ns
 _MISSING = ('', '#N/A', '#NV', '-', 'NaN', 'nan')
 _MOST_TITLES = 200  # rows without numbers at the beginning, chosen
+_LARGEST = 1 << 29  # bytes of a workbook when unpacked, chosen: a full sheet of a million rows of ten numbers
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class Workbook:
         self.format, self.reader, self.notes = 'Excel', 'openpyxl', []
         self._path = path
         with reading(path, 'Excel workbook (.xlsx)'):
+            _check_size(path)
             book = openpyxl.load_workbook(path, read_only=True, data_only=True)
             tables = [(sheet.title, list(sheet.iter_rows(values_only=True))) for sheet in book.worksheets]
             book.close()
@@ -179,3 +182,13 @@ def _cell(place: int, row: int) -> str:
         place, rest = divmod(place - 1, 26)
         letters = chr(65 + rest) + letters
     return f'{letters}{row}'
+
+
+def _check_size(path: Path) -> None:
+    """Raise `SignalError` where a workbook unpacks to more than may be read."""
+    with zipfile.ZipFile(path) as archive:
+        size = sum(part.file_size for part in archive.infolist())
+    if size > _LARGEST:
+        raise SignalError(
+            f'{path} unpacks to {size} bytes (limit {_LARGEST}): export the sheet as CSV and read that'
+        )

@@ -18,6 +18,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from mount_bags.container.stored import HEAD, StoredMessages, rows_at
+from mount_bags.container.unpacking import unpacked_lz4, unpacked_zstd, unpacking_limit
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.int64]
@@ -127,7 +128,13 @@ def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
 
 
 def left_out(chunk: Chunk) -> str:
-    """Return the sentence on a chunk that is damaged."""
+    """Return the sentence on a chunk that is damaged, or tells of more than may be unpacked."""
+    limit = unpacking_limit(chunk.end - chunk.begin)
+    if chunk.size > limit:
+        return (
+            f'the chunk at byte {chunk.position} tells of {chunk.size} bytes (limit {limit} for what it '
+            'takes in the file) and is left out: write smaller chunks'
+        )
     return f'the chunk at byte {chunk.position} is damaged and left out'
 
 
@@ -200,25 +207,18 @@ def _unpacked(packed: bytes, chunk: Chunk) -> bytes | None:
     if chunk.crc and kind not in ('', 'zstd', 'lz4'):
         kind = _MAGICS.get(packed[:4], '')  # a damaged name: the checksum decides
     try:
-        content = _unpack(packed, kind, chunk.size)
+        content = _unpack(packed, kind, min(chunk.size, unpacking_limit(len(packed))))
     except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError):
         return None
     sound = zlib.crc32(content) == chunk.crc if chunk.crc else len(content) == chunk.size
     return content if sound else None
 
 
-def _unpack(packed: bytes, kind: str, size: int) -> bytes:
+def _unpack(packed: bytes, kind: str, limit: int) -> bytes:
     if kind == 'zstd':
-        told = zstandard.frame_content_size(packed)
-        if told > LARGEST_CHUNK:
-            raise ValueError(f'{told} bytes in one chunk')
-        if told < 0:  # written as a stream
-            return zstandard.ZstdDecompressor().decompressobj().decompress(packed)
-        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+        return unpacked_zstd(packed, limit)[0]
     if kind == 'lz4':
-        import lz4.frame  # other writers use it, this project does not
-
-        return lz4.frame.decompress(packed)
+        return unpacked_lz4(packed, limit)
     if kind:
         raise ValueError(f'unknown compression {kind!r}')
     return packed

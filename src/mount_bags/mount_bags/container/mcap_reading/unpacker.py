@@ -7,6 +7,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from mount_bags.container.mcap_reading.chunk_table import ChunkTable, Places
+from mount_bags.container.unpacking import unpacking_limit
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.int64]
@@ -27,6 +28,8 @@ class Unpacker:
         """
         rows = self._chunks.rows[places]
         ends = np.cumsum(rows['size'])
+        if any(map(_is_too_large, rows['size'].tolist(), (rows['end'] - rows['begin']).tolist())):
+            return self._target, ends[:0]
         room = int(ends[-1]) + 1  # one byte more, so that a chunk that is too long is seen
         if room > self._target.size:
             try:
@@ -54,3 +57,7 @@ class Unpacker:
             return self._decompressor.stream_reader(source).readinto(target)
         except zstandard.ZstdError:
             return -1
+
+
+def _is_too_large(size: int, packed: int) -> bool:
+    return size > unpacking_limit(packed)
