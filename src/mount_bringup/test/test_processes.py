@@ -25,6 +25,15 @@ def test_the_loop_is_given_the_priority_and_the_recorder_one_behind_it(
     assert process.log_file.read_text().strip() == told
 
 
+def test_modules_in_the_working_directory_are_not_imported(tmp_path, monkeypatch):
+    for module in ('yaml', 'queue'):
+        (tmp_path / f'{module}.py').write_text('raise SystemExit("foreign code ran")')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(processes, '_program', lambda *_: 'import queue, yaml')
+    process = processes.NodeProcess([CONTROL], GraphSettings(), tmp_path)
+    assert process.wait() == 0, process.last_words()
+
+
 @pytest.fixture
 def held(tmp_path, monkeypatch):
     """Return a process that has loaded a module of its own and makes no node yet."""

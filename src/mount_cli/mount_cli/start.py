@@ -11,6 +11,7 @@ from mount_bringup.graph.errors import INTERRUPTED
 def main() -> None:
     """Load the command and run it."""
     signal.signal(signal.SIGINT, _leave)
+    os.environ['PYTHONSAFEPATH'] = '1'  # no child imports what lies in the working directory
     if os.environ.get('_ENGINE_MOUNT_COMPLETE') == 'complete_bash':
         from mount_cli.command import app
         from mount_cli.completion.bash import complete_in_bash

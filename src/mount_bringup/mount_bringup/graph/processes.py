@@ -133,7 +133,8 @@ def node_environment(nodes: Sequence[GraphNode], priority: int) -> dict[str, str
 
 def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
     own = node_environment(nodes, settings.priority)
-    return {**own, 'ROS_DOMAIN_ID': str(settings.domain), 'PYTHONUNBUFFERED': '1'}
+    python = {'PYTHONUNBUFFERED': '1', 'PYTHONSAFEPATH': '1'}  # modules in the working directory are foreign
+    return {**own, **python, 'ROS_DOMAIN_ID': str(settings.domain)}
 
 
 def _program(nodes: Sequence[GraphNode], namespace: str) -> str:

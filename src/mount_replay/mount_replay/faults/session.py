@@ -12,6 +12,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from mount_bringup.graph.domain import can_port
+from mount_bringup.graph.ending_signals import ending_signals
 from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.graph import Ending, GraphUnderTest, GraphUnderTestError, Place
 from mount_replay.faults.injections import NonsenseTakenError, shim_environment
@@ -37,10 +38,11 @@ def run_faults(
 ) -> dict[str, Outcome]:
     """Return {fault: outcome}; what the end of a graph shows is added to those that it has seen.
 
-    `progress` takes the share that is done and the fault that is next, `tell` each outcome as it comes.
+    `progress` takes the share that is done and the fault that is next, `tell` each outcome as it comes. The
+    first SIGINT, SIGTERM or SIGHUP raises `KeyboardInterrupt`; the graph that runs is ended first.
     """
     outcomes: dict[str, Outcome] = {}
-    with ros_context(place.domain) as context:
+    with ending_signals(_interrupt_once()), ros_context(place.domain) as context:
         session = _Session(place, context)
         try:
             for number, case in enumerate(_in_order(cases)):
@@ -50,6 +52,18 @@ def run_faults(
         finally:
             session.end_graph()
     return {case.name: outcomes[case.name] for case in cases}
+
+
+def _interrupt_once() -> Callable[[], None]:
+    """Return a function whose first call raises `KeyboardInterrupt`: a second signal cuts no end short."""
+    came: list[bool] = []
+
+    def interrupt() -> None:
+        came.append(True)
+        if len(came) == 1:
+            raise KeyboardInterrupt
+
+    return interrupt
 
 
 def _in_order(cases: Sequence[FaultCase]) -> list[FaultCase]:

@@ -68,7 +68,7 @@ def _processes(count: int, memory: int) -> Iterator[Any]:
     with (
         tempfile.TemporaryDirectory(prefix='engine_mount_fleet_') as scratch,
         dask.config.set(_configuration(scratch)),
-        _environment(dict.fromkeys(_THREADS, '1')),
+        _environment(dict.fromkeys((*_THREADS, 'PYTHONSAFEPATH'), '1')),  # none from the working directory
     ):
         # Threads and processes inherit which signals are blocked: Ctrl-C reaches this process alone.
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
