@@ -289,3 +289,18 @@ def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(run
     assert recorded.outcome.control_faults == 1
     assert trace['damping_active'][place - 1] == trace['damping_active'][-1] == 1.0
     assert trace['damping_active'][place] == trace['current'][place] == 0.0
+
+
+def test_a_displacement_of_wrong_sign_is_told_by_nothing_and_damps_all_the_same(run):
+    """Friction opposes the motion whatever sign it is told; the two directions of its law are exchanged."""
+    road = {'timeline.duration': 6.0, 'electronics.ripple_noise': 0.0}
+    right, wrong = (run({**road, 'faults': faults}, {}) for faults in ([], ['displacement_inverted@0']))
+    assert wrong.outcome.control_faults == 0
+    figures = []
+    for recorded in (right, wrong):
+        truth = recorded[topics.SIM_TRUTH]
+        power = truth['friction_force'] * truth['velocity']
+        assert -power[power < 0.0].sum() < 1e-2 * power.sum()  # the elastic part alone gives back
+        peak = np.abs(truth['displacement']).max()
+        figures.append((peak, np.sqrt(np.mean(truth['displacement'] ** 2)), power.sum()))
+    assert figures[1] == pytest.approx(figures[0], rel=0.2)

@@ -1,6 +1,7 @@
 """Whether a displacement can be one: does it move as a mount can, with the noise of a sound sensor?
 
-What no sample tells is not looked for: a reading of wrong sign, or one whose zero drifts within the range.
+What no sample tells is not looked for: a reading of wrong sign, unless it jumps there from beyond 0.5 mm, or
+one whose zero drifts within the range.
 Friction opposes the motion whatever sign it is told, and the band-pass takes drift away.
 """
 

@@ -295,6 +295,7 @@ def _read(timed, times=TIMES):
         ('displacement_step', [1.999e-3, 4e-3, 4.25e-3, 4.499e-3, 2.5e-3]),
         ('displacement_out_of_range', [1.999e-3, 0.045, 0.045, 0.045, 2.5e-3]),
         ('displacement_inverted', [1.999e-3, -2e-3, -2.25e-3, -2.499e-3, 2.5e-3]),
+        ('displacement_flipped', [1.999e-3, -2e-3, -2.25e-3, -2.499e-3, 2.5e-3]),
         ('displacement_drifting', [1.999e-3, 2.001e-3, 2.252e-3, 2.502e-3, 2.5e-3]),
     ],
 )

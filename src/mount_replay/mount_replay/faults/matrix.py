@@ -50,9 +50,9 @@ def _at_start(name: str, words: str, **options) -> FaultCase:
     )
 
 
-def _from_start(name: str, lasts: float) -> FaultCase:
-    """A fault that cannot come or go during a run, and that must be tolerated."""
-    told = ('--set', 'mount_sim.faults=["clock_drift@0", "counter_wrap@8"]')
+def _from_start(name: str, lasts: float, faults: str = '"clock_drift@0", "counter_wrap@8"') -> FaultCase:
+    """A fault that is there during the whole run, and that must be tolerated."""
+    told = ('--set', f'mount_sim.faults=[{faults}]')
     return FaultCase(name, FAULTS[name].meaning, Unchanged(), _TOLERATED, lasts=lasts, options=told)
 
 
@@ -125,7 +125,9 @@ SENSORS = (
     _simulated('displacement_step', _WHILE, 'displacement'),
     _simulated('displacement_out_of_range', _WHILE, 'displacement|invalid', third=True),
     _simulated('displacement_noisy', _WHILE, 'noise of the displacement|displacement moved'),
-    _simulated('displacement_inverted', _TOLD, 'displacement', third=True),
+    # Nothing shows a sign that is wrong from the start, and the damping stays what it is; a jump does show.
+    _from_start('displacement_inverted', 2.0, '"displacement_inverted@0"'),
+    _simulated('displacement_flipped', _TOLD, 'displacement moved', third=True),
     _simulated('displacement_drifting', _TOLERATED, lasts=1.5, third=True),
     _simulated('displacement_sensor', _WHILE, 'fault of the displacement sensor', third=True),
     _off('ripple_missing', 'ripple'),

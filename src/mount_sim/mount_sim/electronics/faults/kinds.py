@@ -61,6 +61,9 @@ FAULTS: dict[str, Kind] = {
     ),
     'displacement_noisy': Kind('white noise of 0.3 mm on the displacement', sensors.DisplacementNoisy),
     'displacement_inverted': Kind('displacements have the wrong sign', sensors.DisplacementInverted),
+    'displacement_flipped': Kind(
+        'displacements have the wrong sign from the next beyond 0.6 mm on', sensors.DisplacementFlipped
+    ),
     'displacement_drifting': Kind(
         "the displacement sensor's zero moves by 1 mm/s", sensors.DisplacementDrifting
     ),

@@ -9,6 +9,7 @@ from mount_sim.electronics.faults.contract import Fault, Occasion
 _STEP = 2e-3  # m, chosen
 _OUT_OF_RANGE = 0.045  # m, chosen: the signal can carry it, no mount moves so far
 _NOISE = 0.3e-3  # m, standard deviation, chosen: 150 times that of a sound sensor
+_FAR = 0.6e-3  # m, chosen: its change of sign within 1 ms is 1.2 m/s, and no mount moves faster than 1 m/s
 _DRIFT = 1e-3  # m/s, chosen
 _RIPPLE_NOISE = 0.2  # 1, standard deviation, chosen: 20 times that of a sound measurement
 _RIPPLE_SCALE = 1.3  # 1, chosen
@@ -66,6 +67,18 @@ class DisplacementInverted(Fault):
 
     def reading(self, reading: Reading) -> Reading:
         return reading._replace(displacement=-reading.displacement)
+
+
+class DisplacementFlipped(Fault):
+    """The sign turns while the displacement is far from zero, whenever the fault was asked for."""
+
+    def __init__(self, occasion: Occasion):
+        super().__init__(occasion)
+        self._flipped = False
+
+    def reading(self, reading: Reading) -> Reading:
+        self._flipped = self._flipped or abs(reading.displacement) > _FAR
+        return reading._replace(displacement=-reading.displacement) if self._flipped else reading
 
 
 class DisplacementDrifting(Fault):
