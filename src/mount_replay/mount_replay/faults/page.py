@@ -27,9 +27,9 @@ bus; where frames do not reach the electronics, or others send frames too, what 
 
 Nothing tells of a displacement whose sign is wrong from the start (`displacement_inverted`), or turns within
 0.5 mm of zero: friction opposes the motion whatever sign it is told, so that the damper goes on taking energy
-and only the two directions of its law are exchanged (motorway drive in core: peak displacement 1.34 instead of
-1.44 mm, rms 0.107 instead of 0.113 mm, 0.970 instead of 0.993 J; the friction force misses the wanted one by
-16 instead of 0.4 %). What is told is the jump where it turns farther away (`displacement_flipped`).
+and only the two directions of its law are exchanged (motorway drive in core: peak displacement 1.34 instead
+of 1.44 mm, rms 0.107 instead of 0.113 mm, 0.970 instead of 0.993 J; the friction force misses the wanted one
+by 16 instead of 0.4 %). What is told is the jump where it turns farther away (`displacement_flipped`).
 
 Required of every fault: at most 3 A on the bus; no traceback; no sample missing in the recording, but
 for what the fault itself takes from it; no process, file of shared memory or held lock left behind. A
