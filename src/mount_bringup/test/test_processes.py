@@ -5,8 +5,8 @@ import time
 import pytest
 
 from mount_bringup.graph import processes
-from mount_bringup.graph.nodes import CONTROL, RECORDER, GraphSettings
-from mount_ros.testing import LIMIT
+from mount_bringup.graph.nodes import CONTROL, DRIVER, RECORDER, GraphSettings
+from mount_ros.testing import LIMIT, wait_until
 
 TELL = 'from mount_ros.nodes.starter import given_priority; print(given_priority())'
 
@@ -73,7 +73,7 @@ def test_processes_are_asked_to_end_last_started_first_each_once(at_once):
 
     class Told:
         exit_code = None
-        begun = True
+        begun, reported = True, False
 
         def __init__(self, name):
             self.name = name
@@ -88,3 +88,60 @@ def test_processes_are_asked_to_end_last_started_first_each_once(at_once):
     assert processes.end_all([Told('a'), Told('b')], at_once=at_once) == []
     in_turn = ['ask b', 'wait b', 'ask a', 'wait a']
     assert told == (['ask b', 'ask a', 'wait b', 'wait a'] if at_once else in_turn)
+
+
+STANDING = 'import os, signal; print("up", flush=True); os.kill(os.getpid(), signal.SIGSTOP)'
+WRITING = """import pathlib, signal, time
+signal.signal(signal.SIGINT, signal.SIG_IGN); signal.signal(signal.SIGTERM, signal.SIG_IGN)
+print("up", flush=True)
+for count in range({count}):
+    pathlib.Path({file!r}).write_text("x" * count); time.sleep(0.02)
+{then}"""
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    """Limits of tenths of seconds, for processes that are told to end."""
+    monkeypatch.setattr(processes, '_INTERRUPT_LIMIT', 0.2)
+    monkeypatch.setattr(processes, '_TERMINATE_LIMIT', 0.1)
+
+
+def started(monkeypatch, folder, node, program, settings=None):
+    monkeypatch.setattr(processes, '_program', lambda *_: program)
+    process = processes.NodeProcess([node], settings or GraphSettings(), folder)
+    wait_until(lambda: 'up' in process.log_file.read_text(), 'the process')
+    process.begin()
+    return process
+
+
+@pytest.mark.usefixtures('impatient')
+@pytest.mark.parametrize('at_once', [True, False])
+def test_each_frozen_process_is_killed_and_named(tmp_path, monkeypatch, at_once):
+    frozen = [started(monkeypatch, tmp_path, node, STANDING) for node in (DRIVER, CONTROL)]
+    told = processes.end_all(frozen, at_once=at_once)
+    assert [sentence.split(' after')[0] for sentence in told] == [
+        'mount_control ended with code -9',
+        'mount_driver ended with code -9',
+    ]
+    assert [process.exit_code for process in frozen] == [-9, -9]
+
+
+@pytest.mark.usefixtures('impatient')
+@pytest.mark.parametrize(('then', 'code'), [('', 0), ('time.sleep(600)', -9)])
+def test_a_recorder_is_given_time_while_its_recording_grows_and_no_longer(tmp_path, monkeypatch, then, code):
+    file = tmp_path / 'run' / 'part_0.mcap'
+    file.parent.mkdir()
+    program = WRITING.format(count=50, file=str(file), then=then)
+    settings = GraphSettings(parameters={RECORDER.name: {'uri': str(tmp_path / 'run')}})
+    recorder = started(monkeypatch, tmp_path, RECORDER, program, settings)
+    told = processes.end_all([recorder])
+    assert recorder.exit_code == code
+    assert len(file.read_text()) == 49
+    assert bool(told) == bool(code)
+
+
+def test_a_process_that_died_before_the_end_is_told_once(tmp_path, monkeypatch):
+    dead = [started(monkeypatch, tmp_path, node, 'print("up"); exit(3)') for node in (DRIVER, CONTROL)]
+    wait_until(lambda: all(process.exit_code is not None for process in dead), 'their ends')
+    dead[1].reported = True
+    assert processes.end_all(dead) == ['mount_driver ended with code 3 before it was told to end: up']

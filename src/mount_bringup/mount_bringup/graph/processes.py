@@ -1,5 +1,6 @@
 """The processes of the graph: started with their parameters, watched, ended in order."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -31,7 +32,10 @@ class NodeProcess:
         self.nodes = tuple(nodes)
         self.name = ' + '.join(node.full_name for node in nodes)
         stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
+        self.reported = False
+        """Whether its end has been told."""
         self._settings = settings
+        self._recording = recording_of(self.nodes, settings)
         self.log_file = folder / f'{stem}.log'
         parameter_file = folder / f'{stem}.yaml'
         parameter_file.write_text(parameter_text(self.nodes, settings))
@@ -66,7 +70,7 @@ class NodeProcess:
         """Kill what is left of the process and start it with the same parameters; its log goes on."""
         self._process.kill()
         self._process.wait()
-        self._process = self._start()
+        self._process, self.reported = self._start(), False
         self.begin()
 
     @property
@@ -86,13 +90,23 @@ class NodeProcess:
             self._process.send_signal(signal.SIGINT if self.begun else signal.SIGKILL)
 
     def wait(self) -> int:
-        """Return the exit code; a node that does not end is terminated, then killed."""
+        """Return the exit code; a node that does not end is terminated, then killed.
+
+        Not a recorder while its recording grows: on a slow disk it may need long for what it holds.
+        """
         for limit, harder in ((_INTERRUPT_LIMIT, signal.SIGTERM), (_TERMINATE_LIMIT, signal.SIGKILL)):
-            try:
-                return self._process.wait(limit)
-            except subprocess.TimeoutExpired:
-                self._process.send_signal(harder)
+            written = -1
+            while written < (written := self._written()):
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    return self._process.wait(limit)
+            self._process.send_signal(harder)
         return self._process.wait()
+
+    def _written(self) -> int:
+        """Return how many bytes of recordings there are, 0 where it records none."""
+        folder = self._recording
+        files = folder.parent.glob(f'{folder.name}*/*') if folder is not None else ()
+        return sum(file.stat().st_size for file in files)
 
 
 def end_all(processes: list[NodeProcess], at_once: bool = False) -> list[str]:
@@ -101,22 +115,27 @@ def end_all(processes: list[NodeProcess], at_once: bool = False) -> list[str]:
     One after the other, so that none drives the coil without those that watch it, or `at_once`.
     """
     complaints = []
+    told = [process for process in processes if process.reported or not process.begun]
     died = [process for process in processes if process.exit_code is not None]
     if at_once:
         for process in reversed(processes):
             process.ask_to_end()
     for process in reversed(processes):
-        died_before = process in died or not process.begun
         if not at_once:
             process.ask_to_end()
         begin = time.monotonic()
         code = process.wait()
-        if code != 0 and not died_before:
-            complaints.append(
-                f'{process.name} ended with code {code} after {time.monotonic() - begin:.1f} s: '
-                f'{process.last_words()}'
-            )
+        if code == 0 or process in told:
+            continue
+        when = 'before it was told to end' if process in died else f'after {time.monotonic() - begin:.1f} s'
+        complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
     return complaints
+
+
+def recording_of(nodes: Sequence[GraphNode], settings: GraphSettings) -> Path | None:
+    """Return the folder of the recording that one of `nodes` makes, None where none does."""
+    uri = settings.parameters.get(RECORDER.name, {}).get('uri') if RECORDER in nodes else None
+    return Path(str(uri)) if uri else None
 
 
 def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> list[NodeProcess]:

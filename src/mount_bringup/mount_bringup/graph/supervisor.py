@@ -30,6 +30,7 @@ class Supervisor(Bringup):
     def check_processes(self) -> None:
         for process in self._processes:
             if process.exit_code is not None:
+                process.reported = True
                 words = process.last_words().split(']: ', 1)[-1]
                 said = f'its last words were: {words} (log: {process.log_file})'
                 reason = f'{process.name} ended with code {process.exit_code}; {said}'
@@ -43,5 +44,6 @@ class Supervisor(Bringup):
                 process.start_again()
 
     def leave(self) -> list[str]:
+        self._deadline.set(0.0)  # what follows has limits of its own, and its sentences shall be told
         complaints = end_all(self._processes, at_once=self.at_rest)
         return [*complaints, *super().leave()]
