@@ -6,10 +6,11 @@ import pytest
 
 import mount_bringup
 from mount_bringup.graph.domain import can_port
-from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
+from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS, check_arguments
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.nodes import RECORDER, SIMULATED, VEHICLE
-from mount_bringup.graph.order import launch_order
+from mount_bringup.graph.order import check_folder, launch_order
+from mount_bringup.settings import SettingError
 from mount_models.quantity import ParameterError
 
 CONFIG = Path(mount_bringup.__file__).parents[1] / 'config'
@@ -155,3 +156,23 @@ def test_a_sample_rate_of_one_mount_alone_is_refused(tmp_path, text, sentence):
     file.write_text(text)
     with pytest.raises(ParameterError, match=sentence):
         sim(config=str(file), mounts='left,right')
+
+
+def test_an_existing_folder_is_refused_before_anything_starts(tmp_path):
+    check_folder(sim(recording=str(tmp_path / 'new')))
+    check_folder(sim(record='false'))
+    with pytest.raises(SettingError, match=r'exists already; a recording is never written over'):
+        check_folder(vehicle(recording=str(tmp_path)))
+
+
+@pytest.mark.parametrize(
+    ('word', 'remedy'), [('scenary:=bench', r'did you mean scenario:=\?'), ('qqq:=1', '--show-args tells')]
+)
+def test_an_argument_that_the_launch_file_does_not_have_is_refused(word, remedy):
+    command = ['ros2', 'launch', 'mount_bringup', 'sim.launch.py', 'scenario:=bench', word]
+    with pytest.raises(SettingError, match=remedy):
+        check_arguments(command, SIM_ARGUMENTS)
+    check_arguments(command[:-1], SIM_ARGUMENTS)
+    check_arguments(
+        [*command[:3], 'car.launch.py', word], SIM_ARGUMENTS
+    )  # it may be for the file around ours

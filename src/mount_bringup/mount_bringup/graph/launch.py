@@ -4,6 +4,7 @@ Needs the `launch_ros` of a ROS 2 installation; where there is none, `mount_brin
 """
 
 import contextlib
+import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -21,10 +22,10 @@ from launch_ros.actions import Node
 
 from mount_bringup.graph.composed import COMPOSED
 from mount_bringup.graph.domain import domain_locks
-from mount_bringup.graph.launch_arguments import LaunchArgument
+from mount_bringup.graph.launch_arguments import LaunchArgument, check_arguments
 from mount_bringup.graph.launched import SUPERVISOR, arguments_of, exit_error
 from mount_bringup.graph.nodes import GraphNode, groups
-from mount_bringup.graph.order import LaunchOrder, launch_order
+from mount_bringup.graph.order import LaunchOrder, check_folder, launch_order
 from mount_bringup.graph.processes import node_environment, parameter_text
 from mount_bringup.graph.restarts import restartable
 from mount_models.arithmetic.compiled import compilation_told
@@ -68,7 +69,9 @@ def _graph(
 ) -> list[LaunchDescriptionEntity]:
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
     with compilation_told(get_logger('mount_bringup').info):  # the checks compute with the laws
+        check_arguments(sys.argv, arguments)
         order = order_of(given)
+    check_folder(order)
     inherited = drop_real_time()
     priority = order.settings.priority or inherited
     held = contextlib.ExitStack()  # until the last process has ended

@@ -1,9 +1,12 @@
 """The arguments of the launch files: what `ros2 launch ... --show-args` tells."""
 
+import difflib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from mount_bringup.graph.nodes import RESTART_LIMIT, SIMULATED, VEHICLE, GraphNode
+from mount_bringup.settings import SettingError
 from mount_control.policy.registry import POLICIES
 from mount_sim.electronics.faults.schedule import FORM
 from mount_sim.plant.mounts import MOUNTS
@@ -26,6 +29,24 @@ class LaunchArgument(NamedTuple):
         """The meaning, and what an empty text stands for."""
         told = self.default or not self.sets or 'empty:' in self.meaning
         return self.meaning if told else f'{self.meaning}; empty: as in the config file'
+
+
+_FILES = ('sim.launch.py', 'vehicle.launch.py', 'replay.launch.py')
+
+
+def check_arguments(command: Sequence[str], arguments: Sequence[LaunchArgument]) -> None:
+    """Raise `SettingError` for a NAME:=TEXT in the `command` that is no argument of its launch file.
+
+    Where another launch file includes ours, the arguments are for both, and nothing is told of them.
+    """
+    if not any(Path(word).name in _FILES for word in command):
+        return
+    known = [argument.name for argument in arguments]
+    for name in (word.partition(':=')[0] for word in command if ':=' in word):
+        if name not in known:
+            close = difflib.get_close_matches(name, known, 1)
+            meant = f'did you mean {close[0]}:=?' if close else '--show-args tells which there are'
+            raise SettingError(f'{name}:= is no argument of this launch file; {meant}')
 
 
 POLICY_OF_DAMPER = 'switched_viscous'  # the others compute their force without a given damper

@@ -93,6 +93,16 @@ def launch_order(
     )
 
 
+def check_folder(order: LaunchOrder) -> None:
+    """Raise `SettingError` if the folder of the recording exists, before anything is started for it."""
+    uri = order.settings.parameters.get(RECORDER.name, {}).get('uri')
+    if uri and Path(str(uri)).expanduser().exists():
+        raise SettingError(
+            f'recording:={uri} exists already; a recording is never written over: name another folder or '
+            'remove it'
+        )
+
+
 def _given_to(
     arguments: Sequence[LaunchArgument],
     given: Mapping[str, str],
