@@ -1,7 +1,10 @@
 """What the supervisor makes of what the nodes tell on `/diagnostics`."""
 
+import time
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.time import Time
 
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import CONTROL, DRIVER, SIMULATED
@@ -14,10 +17,12 @@ def verdicts():
     return Verdicts(SIMULATED, '/car')
 
 
-def tell(verdicts, name, sentence='', **figures):
+def tell(verdicts, name, sentence='', sent=0, **figures):
     values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
     status = DiagnosticStatus(name=name, level=DiagnosticStatus.ERROR, message=sentence, values=values)
-    verdicts.take(DiagnosticArray(status=[status]))
+    report = DiagnosticArray(status=[status])
+    report.header.stamp = Time(nanoseconds=sent).to_msg()
+    verdicts.take(report)
 
 
 def test_what_a_node_calls_fatal_ends_the_graph_with_its_sentence(verdicts):
@@ -57,3 +62,12 @@ def test_the_first_node_that_has_not_handled_the_waiting_sample_does_not_answer(
         verdicts.check_fatal()
     blamed = f'; {silent.name} does not answer' if silent else ''
     assert str(caught.value) == f'mount_sim: sample 3 was not answered{blamed}'
+
+
+def test_what_a_node_told_before_its_activation_does_not_take_it_back(verdicts):
+    before = time.time_ns()
+    verdicts.note_active(DRIVER)
+    tell(verdicts, 'car/mount_driver', 'inactive', before, state='inactive')
+    assert verdicts.figures(DRIVER)['state'] == 'active'
+    tell(verdicts, 'car/mount_driver', 'inactive', time.time_ns(), state='inactive')
+    assert verdicts.figures(DRIVER)['state'] == 'inactive'

@@ -29,6 +29,7 @@ from mount_bringup.graph.restarts import Loss, NodesLostError, Restart
 from mount_bringup.graph.transitions import TRANSITION_LIMIT, Transitions
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
+from mount_ros.environment import loopback_refusal
 from mount_ros.nodes.leaving import Deadline
 from mount_ros.nodes.shared_memory import remove_abandoned
 from mount_sim.diagnosis import FINISHED
@@ -74,6 +75,8 @@ class Bringup:
         self, session: Callable[[dict[str, dict[str, object]]], str], say: Callable[[str], None]
     ) -> None:
         """Bring all nodes to life; `session` makes the session text of a mount from its nodes' parameters."""
+        if refusal := loopback_refusal():
+            raise GraphError(refusal)
         remove_abandoned()
         self._own.open()
         offer(self._own.node, self._mounts, self._begin_anew)

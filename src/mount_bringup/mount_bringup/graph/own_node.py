@@ -16,6 +16,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import RECORDER, GraphSettings
 from mount_bringup.graph.verdicts import Verdicts
 from mount_ros.messages.event import read_mark
@@ -37,18 +38,23 @@ class OwnNode:
         self._context = Context()
         self._sessions: dict[str, Publisher] = {}
         self._clients: dict[str, Client] = {}
+        self._executor: SingleThreadedExecutor | None = None
 
     def open(self) -> None:
         """Join the middleware; from then on `verdicts` takes diagnostics and marks."""
-        rclpy.init(
-            context=self._context,
-            domain_id=self._settings.domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
+        try:
+            rclpy.init(
+                context=self._context,
+                domain_id=self._settings.domain,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+        except RuntimeError as error:
+            raise GraphError(f'the middleware does not start: {error}') from None
         namespace = self._settings.namespace
         self.node = Node('engine_mount_supervisor', namespace=namespace, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
+        executor = SingleThreadedExecutor(context=self._context)
+        executor.add_node(self.node)
+        self._executor = executor
         self.node.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self._verdicts.take, recording_qos(DIAGNOSTICS)
         )
@@ -66,10 +72,12 @@ class OwnNode:
 
     def serve_once(self) -> None:
         """Serve what arrives within a moment, whatever it tells."""
+        assert self._executor is not None
         self._executor.spin_once(_MOMENT)
 
     def serve_until(self, answer: Future, limit: float) -> None:
         """Serve what arrives until `answer` is there, or `limit` s have passed."""
+        assert self._executor is not None
         self._executor.spin_until_future_complete(answer, timeout_sec=limit)
 
     def tell_session(self, mount: str, text: str) -> None:
@@ -104,6 +112,7 @@ class OwnNode:
         self._verdicts.witness.mark(mount, read_mark(message.data, 0))
 
     def _take_down(self) -> None:
-        self._executor.shutdown()
-        self.node.destroy_node()
+        if self._executor is not None:
+            self._executor.shutdown()
+            self.node.destroy_node()
         rclpy.try_shutdown(context=self._context)

@@ -12,6 +12,8 @@ from mount_ros.messages.event import Mark
 from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.nodes.diagnostics import Level
 
+_NANOSECONDS = 1_000_000_000
+
 
 class Witness:
     """Is told what happens in a graph while it happens; this one takes no note of it."""
@@ -36,9 +38,11 @@ class Verdicts:
         self._names = {node.full_name for node in nodes}
         self._space = f'{namespace.strip("/")}/'.lstrip('/')
         self._figures: dict[str, dict[str, str]] = {}
+        self._activated: dict[str, int] = {}  # system clock, ns, as the stamps of diagnostics
 
     def take(self, message: DiagnosticArray) -> None:
         """Take what a node tells."""
+        sent = message.header.stamp.sec * _NANOSECONDS + message.header.stamp.nanosec
         for told in verdicts_in(message):
             # /diagnostics belongs to all mounts of the car
             if not told.node.startswith(self._space):
@@ -53,6 +57,8 @@ class Verdicts:
                 'level': str(told.level),
                 'sentence': told.sentence,
             }
+            if sent < self._activated.get(name, 0):
+                self._figures[name]['state'] = 'active'  # it was under way when the node was activated
             if name in self._names:
                 self.witness.told(name, self._figures[name])
 
@@ -62,12 +68,14 @@ class Verdicts:
 
     def note_active(self, node: GraphNode) -> None:
         """Note that a node was activated, which it tells only with its next diagnostics."""
+        self._activated[node.full_name] = time.time_ns()
         self._figures.setdefault(node.full_name, {'level': '0', 'sentence': ''})['state'] = 'active'
         self.witness.state(node, 'active')
 
     def forget(self, node: GraphNode) -> None:
         """Forget what a node has told: it holds no more."""
         self._figures.pop(node.full_name, None)
+        self._activated.pop(node.full_name, None)
         self.liveliness.forget(node.full_name)
 
     def check_fatal(self) -> None:
