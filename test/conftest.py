@@ -17,7 +17,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 LIMIT = 240.0  # s: only a hang takes so long
 LATE = 0.020  # s: a setpoint that comes later than this is answered with 0 A
-ATTEMPTS = 2
+ATTEMPTS, ATTEMPTS_IN_CI = 2, 4
 
 # Ahead of everything else, so that it is late only when the machine itself stands still.
 WATCH_TIME = """
@@ -109,10 +109,13 @@ def command(tmp_path: Path, domain: int) -> Iterator[Command]:
 
 @pytest.fixture(scope='session')
 def skip_if_late() -> Callable[[str], None]:
-    """Skip the test if two processes that only keep time are late too; the text says what was wrong."""
+    """Skip the test if two processes that only keep time are late too; the text says what was wrong.
+
+    Not in continuous integration: there a failure of the safe state must not pass for a slow machine.
+    """
 
     def skip(what: str) -> None:
-        if (late := lateness_of_machine()) > LATE:
+        if not os.environ.get('CI') and (late := lateness_of_machine()) > LATE:
             pytest.skip(f'without us too this machine is {late * 1e3:.0f} ms late at 1 kHz; {what}')
 
     return skip
@@ -123,12 +126,12 @@ def drive_in_time(command: Command, skip_if_late: Callable[[str], None]) -> Call
     """Drive in real time, once more if something was late; a machine too late by itself skips the test."""
 
     def drive(*options: str) -> Result:
-        for _ in range(ATTEMPTS):
+        for _ in range(ATTEMPTS_IN_CI if os.environ.get('CI') else ATTEMPTS):
             with machine_watched() as stood_still:
                 result = command.drive(*options, report=True)
             if result.code == 0 and result.figures['lost_samples'] == 0:
                 return result
-        if stood_still() > LATE:
+        if not os.environ.get('CI') and stood_still() > LATE:
             pytest.skip(f'this machine stood still for {stood_still() * 1e3:.0f} ms; code {result.code}')
         skip_if_late(f'code {result.code}')
         return result

@@ -1,5 +1,7 @@
 """Each node is taken down to unconfigured and up again while the rest of the graph runs."""
 
+import time
+
 import pytest
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -11,15 +13,18 @@ from mount_ros.nodes.hosting import ros_context
 from mount_ros.testing import wait_until
 
 LIMIT = 180.0  # s: other tests run at the same time, only a failure takes so long
+STEP = 0.5  # s: how often the process is looked at while a service is awaited
+POLL = 0.02  # s: the graph needs the machine more than who waits for it
 DOWN = Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP
 UP = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
 NODES = 'mount_driver', 'mount_sim', 'mount_init', 'mount_control'
 
 
 class Operator:
-    """Asks services, as `ros2 lifecycle` and `ros2 service` do."""
+    """Asks services, as `ros2 lifecycle` and `ros2 service` do, of the graph of a `process`."""
 
     def __init__(self, context):
+        self.process = None
         self._node = Node('operator', context=context)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self._node)
@@ -27,13 +32,26 @@ class Operator:
     def ask(self, kind, service, **request):
         client = self._node.create_client(kind, service)
         try:
-            assert client.wait_for_service(LIMIT), service
+            self._wait(lambda: client.wait_for_service(STEP), service)
             answer = client.call_async(kind.Request(**request))
-            self._executor.spin_until_future_complete(answer, LIMIT)
-            assert answer.done(), service
+            self._wait(lambda: self._served(answer), service)
             return answer.result()
         finally:
             self._node.destroy_client(client)
+
+    def _wait(self, step, service):
+        """Take steps until one has succeeded: a service says nothing of a process that has ended."""
+        end = time.monotonic() + LIMIT
+        while not step():
+            self.look()
+            assert time.monotonic() < end, service
+
+    def _served(self, answer):
+        self._executor.spin_until_future_complete(answer, STEP)
+        return answer.done()
+
+    def look(self):
+        assert self.process.poll() is None, self.process.communicate()[0]
 
     def change(self, node, transition):
         return self.ask(ChangeState, f'/{node}/change_state', transition=Transition(id=transition)).success
@@ -66,14 +84,18 @@ def test_every_node_can_be_taken_down_and_up_and_the_mount_initialised_anew(comm
         '--priority', '0',
     )  # fmt: skip
 
-    def drives():
-        assert process.poll() is None, process.communicate()[0]
-        return all(operator.active(node) for node in NODES)
+    operator.process = process
 
     def damps():
-        return drives() and any(setpoint.current > 0.5 for setpoint in bus_listener[-200:])
+        operator.look()
+        time.sleep(POLL)
+        return any(setpoint.current > 0.5 for setpoint in bus_listener[-200:])
 
-    wait_until(damps, 'damping', LIMIT)
+    def wait_for_damping(when):
+        wait_until(damps, f'damping {when}', LIMIT)
+        assert all(operator.active(node) for node in NODES), when
+
+    wait_for_damping('after the start')
     for walker in ('mount_control', 'mount_init', 'mount_driver', 'mount_sim'):
         for transition in DOWN:
             assert operator.change(walker, transition), (walker, transition)
@@ -82,7 +104,7 @@ def test_every_node_can_be_taken_down_and_up_and_the_mount_initialised_anew(comm
         assert operator.change(walker, UP[0]), walker
         operator.change(walker, UP[1])  # init and control refuse it: the mount must be initialised first
         wait_until(operator.reinitialize, f'initialisation after the walk of {walker}', LIMIT)
-        wait_until(damps, f'damping after the walk of {walker}', LIMIT)
+        wait_for_damping(f'after the walk of {walker}')
     said = (out / 'log' / 'mount_control.log').read_text()
     assert 'but mount_control hears the measurements since' in said
     assert 'another node sent a current_setpoint' in (out / 'log' / 'mount_init.log').read_text()
