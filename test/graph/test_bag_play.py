@@ -81,8 +81,9 @@ def setpoints(folder):
     return stamps[after], series['coil_current'][first][after]
 
 
+@pytest.mark.real_time
 def test_a_recorded_drive_played_to_the_control_gives_the_recorded_setpoints(replay, tmp_path):
-    code, output = replay(bag=str(REFERENCE), rate='0.25')  # a machine with other work keeps up
+    code, output = replay(bag=str(REFERENCE), rate='0.25')  # beside three other suites samples were lost
     assert code == 0, output
     recorded_stamps, recorded = setpoints(REFERENCE)
     stamps, currents = setpoints_of_replay(tmp_path / 'again', recorded_stamps[0])
