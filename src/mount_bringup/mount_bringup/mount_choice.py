@@ -5,7 +5,6 @@ from typing import Any
 
 from mount_control.settings import defaults
 from mount_models.quantity import ParameterError
-from mount_sim.parameters import SimParameters
 
 ALWAYS_ON = 'friction_always_on'
 NEEDED = {'policy': 'switched_viscous', 'switching': 'always'}
@@ -14,7 +13,7 @@ NEEDED = {'policy': 'switched_viscous', 'switching': 'always'}
 
 def seat_of(settings: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the name of the mount in the seat; a real one is a friction mount."""
-    return str(settings.get('mount_sim', {}).get('mount', SimParameters().mount))
+    return str(settings.get('mount_sim', {}).get('mount', 'friction'))
 
 
 def with_control_of_mount(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

@@ -13,7 +13,7 @@ from mount_bags.audit.audit import audit
 from mount_bags.audit.losses import Losses, losses
 from mount_bags.bag.recording import Recording, open_recording
 from mount_bags.run.screen import Screen
-from mount_bringup.graph.errors import GraphError
+from mount_bringup.graph.nodes import GraphError
 from mount_experiments.check.evaluation import Beside, Driven, figures_of
 from mount_experiments.check.suite import Manoeuvre
 from mount_experiments.sensitivity.grid import TruthOnly

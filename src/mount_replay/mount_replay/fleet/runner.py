@@ -8,7 +8,7 @@ from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from mount_bringup.graph.ending_signals import remembered_interrupts
+from mount_bringup.graph.shutdown import remembered_interrupts
 from mount_replay.fleet.cluster import LOCAL, SchedulerLostError, connected
 
 if TYPE_CHECKING:

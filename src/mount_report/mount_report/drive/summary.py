@@ -16,7 +16,7 @@ from mount_bags.events.switching_changes import switching_times
 from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.run.screen import Screen, Table
 from mount_bringup.chosen import Parameters, policy_of
-from mount_bringup.graph.restarts import Restart
+from mount_bringup.graph.failures import Restart
 from mount_bringup.mount_choice import seat_of
 from mount_report.drive.evaluation import tracking_error
 from mount_report.drive.signals import DriveSignals, excitation_stamp
@@ -121,12 +121,12 @@ def late_control(figures: Mapping[str, Any]) -> list[str]:
 
 
 def _restart(restart: Restart, zero: int) -> dict[str, Any]:
-    loss = restart.loss
+    failure = restart.failure
     return {
         'time_s': (restart.time - zero) / 1e9,
-        'nodes': [node.name for node in loss.nodes],
-        'reason': loss.reason,
-        'remedy': restart.remedy.value,
+        'nodes': [node.name for node in failure.nodes],
+        'reason': failure.reason,
+        'remedy': restart.action.value,
         'took_s': restart.took,
     }
 

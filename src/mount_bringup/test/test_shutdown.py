@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from mount_bringup.graph.ending_signals import (
+from mount_bringup.graph.shutdown import (
     ending_signals,
     interrupt_and_remember,
     remembered_interrupts,

@@ -1,10 +1,18 @@
-"""Ctrl-C and its kin, handed to who can end in order instead of tearing what runs."""
+"""Turns SIGINT, SIGTERM and SIGHUP into an orderly shutdown."""
 
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+INTERRUPTED = 130
+"""The exit code of a command that the user has ended, as a shell reports SIGINT."""
+
+
+class Interrupted(Exception):  # noqa: N818 - no error: the user ends it
+    """The user ended the run; the text, if any, says what stands then."""
+
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _unheard: list[int] = []  # interrupts that came while nobody was there who can end in order
