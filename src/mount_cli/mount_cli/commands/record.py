@@ -57,10 +57,10 @@ def record(
     from mount_bags.recorder.parameters import RecorderParameters
     from mount_bags.run.folder import new_place
     from mount_bringup.graph.domain import chosen_domain
-    from mount_bringup.graph.record import RecordOrder
-    from mount_bringup.graph.record import record as run_record
     from mount_cli.screen import TerminalScreen
     from mount_replay.drive.recorder_options import checked_recorder, recorder_options
+    from mount_replay.record import RecordOrder
+    from mount_replay.record import record as run_record
 
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')

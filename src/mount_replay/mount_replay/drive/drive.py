@@ -26,7 +26,6 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.reports import GraphObserver
 from mount_bringup.graph.shutdown import ending_signals
 from mount_bringup.graph.supervisor import Supervisor
-from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
@@ -36,6 +35,7 @@ from mount_replay.drive.brought import FOLDER, Brought, provenance, written
 from mount_replay.drive.happenings import Happenings, line
 from mount_replay.drive.preflight import preflight
 from mount_replay.drive.progress import DriveProgress
+from mount_replay.keyboard import MARK_KEYS, Keyboard
 from mount_replay.loop.recording import record_car, record_core
 from mount_sim.diagnosis import beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation

@@ -20,7 +20,7 @@ from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.recorder.snapshot import snapshot_folder
 from mount_bags.run.screen import Screen
 from mount_bringup.graph.shutdown import ending_signals
-from mount_bringup.keyboard import MARK_KEYS, Keyboard
+from mount_replay.keyboard import MARK_KEYS, Keyboard
 from mount_ros.environment import loopback_refusal
 from mount_ros.nodes.aside import wake
 from mount_ros.nodes.hosting import ros_context, transition
