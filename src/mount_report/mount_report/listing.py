@@ -13,10 +13,10 @@ from mount_bags.run.folder import RunFolder
 from mount_bags.run.place import open_run
 from mount_bags.run.session import session_parameters
 from mount_bags.run.told import duration_of, started_of, told_session
-from mount_bringup.recorded_mount import simulated_mounts
 from mount_signals.sources.local import local_path
 from mount_signals.sources.source import SourceError
 from mount_signals.sources.stores import is_local, outline
+from mount_sim.mount_choice import simulated_mounts
 
 _SOUND = 'nothing lost, no faults'
 _COUNTS = {

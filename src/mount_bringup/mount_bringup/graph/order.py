@@ -22,7 +22,6 @@ from mount_bringup.graph.nodes import (
     name_in,
     of_mounts,
 )
-from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.mounts import settings_of_mount
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.sample_rate import NODES, check_sample_rate
@@ -67,9 +66,9 @@ def launch_order(
     arguments: Sequence[LaunchArgument],
     given: Texts,
     scenario: str,
-    check_mount: Callable[[Settings], None] = lambda settings: None,
+    checked_mount: Callable[[Settings], Settings] = lambda settings: settings,
 ) -> LaunchOrder:
-    """Return the graph of `nodes`; `check_mount` takes the settings of each mount before a node does."""
+    """Return the graph of `nodes`; `checked_mount` checks and completes the settings of each mount."""
     records = is_recorded(given)
     mounts = _mount_names(given['mounts'])
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
@@ -83,11 +82,10 @@ def launch_order(
         _tell_buses_apart(mounts, settings, given)
     settings = checked_settings(settings, known)
     for mount in mounts or ('',):
-        own = with_control_of_mount(settings_of_mount(settings, mount))
+        own = checked_mount(settings_of_mount(settings, mount))
         settings[name_in(mount, CONTROL.name)] = own[CONTROL.name]
         check_damper(given['damper'], own)
         _check(own, known)
-        check_mount(own)
     chosen = of_mounts([node for node in nodes if records or node is not RECORDER], mounts)
     return LaunchOrder(
         nodes=chosen,
@@ -231,5 +229,4 @@ def _check(settings: Settings, known: Settings) -> None:
     for node, defaults in sets:
         with_flattened(defaults, settings.get(node.name, {}))
     check_sample_rate(settings, [name for name in NODES if name in known])
-    check_control_of_mount(settings)
     chosen_control(settings)

@@ -6,6 +6,7 @@ from mount_bringup.graph.order import LaunchOrder, Settings, Texts, launch_order
 from mount_models.quantity import with_flattened
 from mount_sim.electronics.faults.schedule import FORM, told_faults
 from mount_sim.excitation.scenario import build_excitation
+from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.places import mount_names
@@ -27,7 +28,7 @@ SIM_ARGUMENTS = (
 def sim_order(given: Texts) -> LaunchOrder:
     """Return the graph with the simulated car; a `ValueError` says what cannot be."""
     mount_names(given['mounts'])
-    order = launch_order(SIMULATED, SIM_ARGUMENTS, given, '', _check_mount)
+    order = launch_order(SIMULATED, SIM_ARGUMENTS, given, '', _checked_mount)
     values = order.settings.parameters[SIM.name]
     sim = mount_parameters(values)
     if values.get('mounts'):
@@ -35,9 +36,12 @@ def sim_order(given: Texts) -> LaunchOrder:
     return order._replace(scenario=sim.scenario)
 
 
-def _check_mount(settings: Settings) -> None:
-    """Refuse what the simulator cannot work with."""
+def _checked_mount(settings: Settings) -> Settings:
+    """Return the settings as the mount in the seat needs them; refuse what the simulator cannot work with."""
+    settings = with_control_of_mount(settings)
+    check_control_of_mount(settings)
     sim = with_flattened(SimParameters(), settings[SIM.name])
     seated_mount(sim.mount)
     told_faults(sim.faults)
     build_excitation(sim)
+    return settings

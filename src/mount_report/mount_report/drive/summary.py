@@ -17,9 +17,9 @@ from mount_bags.recorder.parameters import RecorderParameters
 from mount_bags.run.screen import Screen, Table
 from mount_bringup.chosen import Parameters, policy_of
 from mount_bringup.graph.failures import Restart
-from mount_bringup.mount_choice import seat_of
 from mount_report.drive.evaluation import tracking_error
 from mount_report.drive.signals import DriveSignals, excitation_stamp
+from mount_sim.mount_choice import seat_of
 from mount_sim.plant.mounts import without_friction
 
 _UM, _MM, _US = 1e6, 1e3, 1e6
