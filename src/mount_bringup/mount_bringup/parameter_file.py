@@ -1,4 +1,4 @@
-"""Parameter files of ROS 2 read before a node starts, for ROS ignores silently what it does not know."""
+"""Parameter files of ROS 2, checked before a node starts: ROS itself ignores an unknown name silently."""
 
 import re
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Parameters of the nodes as given by the user: names known, types as declared, before a node starts."""
+"""The settings of a user for the nodes: names known, types as declared, before a node starts."""
 
 import contextlib
 import difflib
