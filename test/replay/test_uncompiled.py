@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from mount_bags.compare.reference import differences_from_reference
+from engine_mount.recordings.compare.reference import differences_from_reference
 
 REFERENCES = sorted(
     folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()

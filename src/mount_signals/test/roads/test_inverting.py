@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_bags.signals.signal import signal_of
+from engine_mount.recordings.signals.signal import signal_of
 from mount_models.road import RandomRoad, random_road
 from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
 from mount_signals.roads.inversion import BAND, chassis_response, in_band, road_of
