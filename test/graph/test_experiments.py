@@ -9,6 +9,8 @@ import engine_mount
 from engine_mount.recordings.run.session import recorded_session
 from mount_cli.command import main
 
+pytestmark = pytest.mark.slow
+
 
 def _setpoints(run):
     series = engine_mount.open(run / 'recording')['current_setpoint']

@@ -57,6 +57,7 @@ def truth(folder, name):
     return np.asarray(open_recording(folder / 'recording')['/sim/truth'][name])
 
 
+@pytest.mark.slow
 def test_belgian_blocks_are_driven_at_three_speeds_by_each_policy_and_the_hydromount(blocks, tmp_path):
     figures = tmp_path / 'figures.json'
     own = (f'measured_road.road={blocks}', 'measured_road.speeds=30,60,120', 'measured_road.workers=1')

@@ -33,6 +33,8 @@ from mount_report.drive.signals import load_drive
 from mount_sim.rack.coil import drawn_rack
 from mount_sim.rack.friction import drawn_friction
 
+pytestmark = pytest.mark.slow
+
 MAKEFILE = Path(__file__).resolve().parents[3] / 'Makefile'
 SEED = (
     4  # 1 % noise on every sensor; actuator, coil and pads are drawn from it, no contact value near default
