@@ -13,7 +13,6 @@ from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
-from mount_bags.run.folder import next_recording
 from mount_bringup.graph.activation import Activation
 from mount_bringup.graph.failures import (
     FailureCount,
@@ -27,6 +26,7 @@ from mount_bringup.graph.failures import (
 from mount_bringup.graph.graph import CONFIGURE, DEACTIVATE, Graph
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphError, GraphNode, is_set
 from mount_bringup.graph.processes import NodeProcesses
+from mount_recorder.folders import next_recording
 
 _START_LIMIT = 60.0  # s, chosen
 _REQUEST_PERIOD = 0.5  # s, chosen: the middleware may still know the dead predecessor, and ask that one

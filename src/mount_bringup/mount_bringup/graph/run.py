@@ -12,7 +12,6 @@ from pathlib import Path
 
 from rclpy.logging import get_logger
 
-from mount_bags.run.session import new_session, session_text
 from mount_bringup.graph.domain import domain_locks
 from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS, LaunchArgument, texts_of
 from mount_bringup.graph.nodes import GraphError
@@ -21,6 +20,7 @@ from mount_bringup.graph.player import Player
 from mount_bringup.graph.shutdown import Interrupted, ending_signals
 from mount_bringup.graph.supervisor import Parameters, Supervisor
 from mount_bringup.settings import SettingError
+from mount_recorder.session import new_session, session_text
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process
 
