@@ -7,12 +7,12 @@ from far_end import CODEC, sample
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mount_driver.bus import Frame, _message
 from mount_driver.can_library import pack_message
 from mount_driver.clock import CounterClock
-from mount_driver.codec import Status, WrongCrcError, WrongLengthError
-from mount_driver.frame import Frame
+from mount_driver.layout import WrongCrcError, WrongLengthError
 from mount_driver.link import Link
-from mount_driver.loopback import _message
+from mount_driver.protocol import Status
 from mount_ros.testing import mutated
 
 SEEDS = st.integers(0, 1 << 62)

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from car import MS, Car
 
-from mount_driver.codec import Status
-from mount_driver.diagnosis import Past, judge
+from mount_driver.health import Health
 from mount_driver.node import MountDriver
 from mount_driver.parameters import DriverParameters
-from mount_driver.snapshot import snapshot
+from mount_driver.protocol import Status
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_models.coil.heating import CoilHeating, warmed
 from mount_ros.nodes.diagnostics import Level
@@ -30,8 +29,7 @@ def car():
 
 
 def verdict(car):
-    now = snapshot(car.exchange, car.now, 0)
-    return judge(now, Past(now, now), DriverParameters(heating=QUICK), lockstep=False)
+    return Health(car.exchange, DriverParameters(heating=QUICK), 0, lockstep=False).judge(car.now)
 
 
 def test_3_ampere_for_long_are_lowered_smoothly_before_the_limit_and_the_coil_is_not_doubted(car):

@@ -99,16 +99,13 @@ class SupplyCarrier:
         """Return an inductance (H) at a `voltage` (V), of which the coil holds R i = `held` (V), carried."""
         if not 0.0 <= held < voltage or held >= self._voltage:
             return inductance
-        ratio = self._shape(held / self._voltage) / self._shape(held / voltage)
+        shapes, values = self._shapes, []
+        for volts in (self._voltage, voltage):
+            place = 0.5 * (held / volts) / _DUTY_STEP
+            below = min(int(place), _DUTIES - 2)
+            values.append(shapes[below] + (place - below) * (shapes[below + 1] - shapes[below]))
+        ratio = values[0] / values[1]
         return inductance / (1.0 + (1.0 - inductance * self._gap) * (ratio - 1.0))
-
-    def _shape(self, share: float) -> float:
-        place = 0.5 * share / _DUTY_STEP
-        below = int(place)
-        if below > _DUTIES - 2:
-            below = _DUTIES - 2
-        shapes = self._shapes
-        return shapes[below] + (place - below) * (shapes[below + 1] - shapes[below])
 
 
 def gap_of_crossing(law: RippleLaw, current: float) -> float:

@@ -88,7 +88,7 @@ class RippleWatch:
     def __init__(self, parameters: RippleWatchParameters, law: RippleLaw, heating: CoilHeating):
         self._parameters, self._law, self._heating = parameters, law, heating
         self._duration = round(1e9 * parameters.duration)
-        self._turns_area = law.turns_area
+        self._turns_area, self._crossing_per_gap = law.turns_area, crossing_per_gap(law)
         self._carrier = SupplyCarrier(law)
         self._sweep = Sweep()
         self._reference: Reference | None = None
@@ -149,7 +149,14 @@ class RippleWatch:
             volts = flux_volts + self._resistance * current
             mean = self._volts
             self._volts = mean + _SHARE * (volts - mean) if mean == mean else volts
-        finding = self._find(current)
+        # What is wrong with the readings at present, empty where nothing is.
+        p, supply = self._parameters, self._supply
+        finding = 'noise' if self._noise > p.noise_limit else ''
+        limit = p.voltage_limit * supply + self._unknown_resistance * current
+        if self._missing > 0.5:
+            finding = 'missing'
+        elif self._volts - supply > limit or supply - self._volts > limit:  # not so for an unknown supply
+            finding = 'voltage'
         if finding or self._finding:
             sentence = self._lasting(finding, now)
             if sentence:
@@ -161,17 +168,6 @@ class RippleWatch:
         if self._reference is None:
             return self._learn(current, inductance) if self._sweep.take(current, inductance) else ''
         return self._compare(self._reference, current, inductance, now)
-
-    def _find(self, current: float) -> str:
-        """Return what is wrong with the readings at present, empty where nothing is."""
-        p = self._parameters
-        if self._missing > 0.5:
-            return 'missing'
-        deviation = self._volts - self._supply
-        limit = p.voltage_limit * self._supply + self._unknown_resistance * current
-        if deviation > limit or -deviation > limit:  # not so where the supply is not known
-            return 'voltage'
-        return 'noise' if self._noise > p.noise_limit else ''
 
     def _learn(self, current: float, inductance: float) -> str:
         p = self._parameters
@@ -192,27 +188,24 @@ class RippleWatch:
         self._noise += _NOISE_SHARE * (_TO_STD * (step if step < _ODD else _ODD) - self._noise)
         if self._noise > self._parameters.noise_limit:  # such readings tell nothing of the gap
             return ''
-        tolerance = reference.tolerance[place] + self._wider
+        sentence, tolerance = '', reference.tolerance[place] + self._wider
         excess = deviation / tolerance
         excess = _FARTHEST if excess > _FARTHEST else -_FARTHEST if excess < -_FARTHEST else excess
         if -_NEAR < current - reference.crossing_current < _NEAR:
             self._note_gap(deviation * expected / -reference.slope[place])
-        at = current, expected, tolerance
-        mean = self._beyond_mean(place >> 1, excess, now)
-        if _BLIND < current < reference.crossing_current + _NEAR:
-            self._joint_at = at
-            self._beyond_mean(_JOINT, excess, now)
-        if not mean and self._beyond[_JOINT] >= _CERTAIN and self._has_lasted(_JOINT, now):
-            at, mean = self._joint_at, self._means[_JOINT]
-        return self._gap_sentence(*at, mean) if mean else ''
-
-    def _beyond_mean(self, zone: int, excess: float, now: int) -> float:
-        """Take a deviation (tolerances) into a zone's mean; return it if it has long been beyond, else 0."""
-        self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
-        if -1.0 <= mean <= 1.0:
-            self._beyond[zone] = 0
-            return 0.0
-        return mean if self._lasts_beyond(zone, now) else 0.0
+        # A mean for each 0.1 A, and one over all currents at which worn pads show.
+        joint = _BLIND < current < reference.crossing_current + _NEAR
+        if joint:
+            self._joint_at = current, expected, tolerance
+        for zone in (place >> 1, _JOINT) if joint else (place >> 1,):
+            self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
+            if -1.0 <= mean <= 1.0:
+                self._beyond[zone] = 0
+            elif self._lasts_beyond(zone, now) and zone != _JOINT:
+                sentence = self._gap_sentence(current, expected, tolerance, mean)
+        if not sentence and self._beyond[_JOINT] >= _CERTAIN and self._has_lasted(_JOINT, now):
+            return self._gap_sentence(*self._joint_at, self._means[_JOINT])
+        return sentence
 
     def _lasts_beyond(self, zone: int, now: int) -> bool:
         """Whether the mean of a zone, now beyond its limit, has stayed there for long enough."""
@@ -227,7 +220,7 @@ class RippleWatch:
 
     def _note_gap(self, current: float) -> None:
         """Take by how much (A) the crossing has moved by the last reading."""
-        change = current / crossing_per_gap(self._law)
+        change = current / self._crossing_per_gap
         before = self._change if self._change == self._change else 0.0
         self._change = before + _SLOW_SHARE * (change - before)
 
