@@ -14,8 +14,8 @@ from dataclasses import replace
 from mount_driver.bus import CanLinkError, Frame, Reception, may_have_frames, open_bus
 from mount_driver.can_library import can
 from mount_driver.clock import Clock
-from mount_driver.layout import WrongCrcError, WrongLengthError
-from mount_driver.link import NO_LIMITS, Arrival, Counts, Fault, Link, Refusal, Stamped
+from mount_driver.layout import FrameError
+from mount_driver.link import Arrival, Counts, Fault, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec, Setpoint
 from mount_driver.watches.guard import Guard
@@ -56,8 +56,6 @@ class Exchange:
     ):
         sample_time = sample_time_ns(parameters.sample_rate)
         self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9), sample_time)
-        self.judgement = NO_LIMITS
-        """What the watches said of the last sample."""
         self.reception = Reception()
         self.failure = ''
         """Why the exchange has ended on its own; empty while it runs."""
@@ -83,8 +81,7 @@ class Exchange:
         self._bus: can.BusABC | None = None
         self._alive = 0  # counter of the next frame
         self._frame = Frame(codec.setpoint.frame_id, bytes(codec.setpoint.length))
-        self._sending = threading.Lock()  # between setpoints, judgements, the watch and the end
-        self._unjudged: tuple[Stamped, int] | None = None  # the newest sample and when it came (ns)
+        self._sending = threading.RLock()  # between setpoints, judgements, the watch and the end
         self._accepting = False
         self._ending = threading.Event()
         self._threads: list[threading.Thread] = []
@@ -99,7 +96,9 @@ class Exchange:
         self._bus = self._open()
         self._accepting = True
         atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
-        loops = {'can_receive': self._serve, 'can_watch': self._watch_hold} if threaded else {}
+        loops = {'can_receive': self._serve} if threaded else {}
+        if threaded and not self._lockstep:  # where only frames move time, see `_receive`
+            loops['can_watch'] = self._watch_hold
         self._threads = [threading.Thread(target=loops[name], name=name, daemon=True) for name in loops]
         for thread in self._threads:
             thread.start()
@@ -123,10 +122,11 @@ class Exchange:
             if not self._accepting or self.bus_off or self.trouble:
                 link.refuse(Refusal.BUS_LOST)
                 return False
-            if self._unjudged is not None:
-                self._judge()
+            guard = self.guard
+            if guard.unjudged is not None and (fault := guard.judge_sample()) is not None:
+                self.switch_off(fault)
             now = self._clock.now(0) if self._lockstep else self._steady()
-            setpoint = link.answer(stamp, current, now, self.judgement)
+            setpoint = link.answer(stamp, current, now, guard.limits)
             sent = setpoint is not None and self._send(setpoint)
             if link.double_answer and not link.fault:
                 self._send(link.switch_off(Fault(link.double_answer, foreign_writer=True)))
@@ -138,38 +138,38 @@ class Exchange:
 
         The first fault stays, but for a graver one, or for one that names who answers beside the other.
         """
-        if fault is not None:
-            with self._sending:
-                self._switch_off(fault)
+        if fault is None:
+            return
+        with self._sending:
+            link = self.link
+            graver = link.needs_initialisation and not fault.needs_initialisation
+            if not link.fault or graver or link.nameless:
+                self._send(link.switch_off(fault))
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
         bus = self._bus
         return bus is not None and may_have_frames(bus) and self._attempt(0.0)
 
-    def watch(self) -> None:
-        """Send 0 A if the sample that was answered last is too old for its current."""
-        if self._lockstep and self.link.latest is None:
-            return  # time has not begun
+    def watch(self) -> float:
+        """Send 0 A if the sample that was answered last is too old for its current; return s until then."""
         with self._sending:
-            if self._accepting and self.link.off_is_due(self._now()):
+            now = self._now()
+            if self.link.off_is_due(now):
                 self._send(self.link.off())
+            return 1e-9 * self.link.time_until_off(now)
 
     def _serve(self) -> None:
         while not self._ending.is_set() and not self.failure:
             self._attempt(_WAKE)
 
     def _watch_hold(self) -> None:
-        """Look whenever 0 A may be due; in lock-step only frames move time, see `_receive`."""
+        """Look whenever 0 A may be due."""
         try:
-            while not self._lockstep and not self._ending.wait(self._time_until_off()):
-                self.watch()
+            while not self._ending.wait(self.watch()):
+                pass
         except BaseException as error:
             self._fail(error)
-
-    def _time_until_off(self) -> float:
-        with self._sending:
-            return max(0.0, 1e-9 * self.link.time_until_off(self._now()))
 
     def _attempt(self, wait: float) -> bool:
         """Handle the frame that comes within `wait` s; what cannot be recovered ends the exchange safely."""
@@ -206,21 +206,26 @@ class Exchange:
             else:
                 # The displacement leaves first, as its answer is waited for; no answer leaves unjudged.
                 self.bus_off, self.last_received = False, received
-                self._unjudged = stamped, stamped.stamp if self._lockstep else received
+                guard = self.guard
+                guard.unjudged = stamped, stamped.stamp if self._lockstep else received
                 self._on_sample(stamped)
                 with self._sending:
-                    if self._unjudged is not None:
-                        self._judge()
+                    if guard.unjudged is not None and (fault := guard.judge_sample()) is not None:
+                        self.switch_off(fault)
                 self._on_judged(stamped)
-        if self._lockstep:
+        if self._lockstep and self.link.latest is not None:  # else time has not begun
             self.watch()
         return message is not None
 
     def _take_unused(self, received: int) -> None:
         """Take a measurement frame that is no new sample."""
         self.switch_off(self.guard.judge_frame(received))
-        if self.link.arrival is Arrival.RESENT:
-            self._answer_again()
+        latest = self.link.latest
+        if self.link.arrival is Arrival.RESENT and latest is not None:
+            with self._sending:
+                setpoint = self.link.answer_again(latest.sample.sample_counter, self._now())
+                if setpoint is not None:
+                    self._send(setpoint)
 
     def _take_other(self, message: can.Message) -> None:
         """Take a frame that is no measurement."""
@@ -231,21 +236,6 @@ class Exchange:
             self._take_status(message)
         elif message.arbitration_id == self._codec.setpoint.frame_id:
             self._take_foreign_setpoint(message)
-
-    def _judge(self) -> None:
-        """Let the watches judge the newest sample, which they have not; call it with the lock held."""
-        assert self._unjudged is not None
-        unjudged, self._unjudged = self._unjudged, None
-        self.judgement = judgement = self.guard.judge_sample(*unjudged)
-        if judgement.fault is not None:
-            self._switch_off(judgement.fault)
-
-    def _switch_off(self, fault: Fault) -> None:
-        """See `switch_off`; call it with the lock held."""
-        link = self.link
-        graver = link.needs_initialisation and not fault.needs_initialisation
-        if not link.fault or graver or link.nameless:
-            self._send(link.switch_off(fault))
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
@@ -260,22 +250,12 @@ class Exchange:
     def _take_foreign_setpoint(self, message: can.Message) -> None:
         try:
             _, setpoint = self._codec.decode_setpoint(message.data)
-        except (WrongCrcError, WrongLengthError):
+        except FrameError:
             return  # nor do the electronics use it, and their status reports it
         self.switch_off(self.guard.judge_foreign(setpoint, self._now()))
+        # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
         with self._sending:
-            # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
-            if self._accepting:
-                self._send(self.link.off())
-
-    def _answer_again(self) -> None:
-        with self._sending:
-            latest = self.link.latest
-            if latest is None or not self._accepting:
-                return
-            setpoint = self.link.answer_again(latest.sample.sample_counter, self._now())
-            if setpoint is not None:
-                self._send(setpoint)
+            self._send(self.link.off())
 
     def _now(self) -> int:
         return self._clock.now(self._steady())
@@ -283,7 +263,7 @@ class Exchange:
     def _send(self, setpoint: Setpoint) -> bool:
         """Send one frame and return whether the bus took it; call it with the lock held."""
         bus = self._bus
-        if bus is None:
+        if bus is None or not self._accepting:
             self.unsent_reason = self.trouble
             return False
         try:
@@ -301,13 +281,12 @@ class Exchange:
     def _leave_off(self) -> None:
         """Send 0 A and nothing more; raises `CanLinkError` where the bus did not take it."""
         taken: list[bool] = []
-        with self._sending:
+        with self._sending, ExitStack() as steps:  # what interrupts one frame must not keep back the others
             if not self._accepting:
                 return
-            self._accepting = False
-            with ExitStack() as frames:  # what interrupts one frame must not keep back the others
-                for _ in range(_OFF_FRAMES):
-                    frames.callback(lambda: taken.append(self._send(self.link.off())))
+            steps.callback(setattr, self, '_accepting', False)  # the last step
+            for _ in range(_OFF_FRAMES):
+                steps.callback(lambda: taken.append(self._send(self.link.off())))
         if not all(taken):
             raise CanLinkError(
                 f'{taken.count(False)} of {_OFF_FRAMES} frames with 0 A were not taken by the bus '

@@ -28,12 +28,8 @@ class OutOfRangeError(ValueError):
     """A value lies outside the limits that the DBC gives for its signal."""
 
 
-class WrongLengthError(ValueError):
-    """A frame has not the length of its message."""
-
-
-class WrongCrcError(ValueError):
-    """A frame's CRC does not fit its bytes and its data id: it was damaged or is not what its id says."""
+class FrameError(ValueError):
+    """A frame has not the length of its message, or its CRC does not fit: it is damaged, or another one."""
 
 
 class Scaling:
@@ -107,13 +103,11 @@ class MessageLayout:
         return data
 
     def unpack(self, data: bytes | bytearray) -> tuple[int, ...]:
-        """Return the raw numbers of a message; raises `WrongLengthError` or `WrongCrcError`."""
+        """Return the raw numbers of a message; raises `FrameError`."""
         if len(data) != self.length:
-            raise WrongLengthError(
-                f'frame 0x{self.frame_id:X} has {len(data)} bytes; the DBC says {self.length}'
-            )
+            raise FrameError(f'frame 0x{self.frame_id:X} has {len(data)} bytes; the DBC says {self.length}')
         if not e2e_p05_check(data, self.data_id):
-            raise WrongCrcError(f'frame 0x{self.frame_id:X} fails its CRC; the frame is not used')
+            raise FrameError(f'frame 0x{self.frame_id:X} fails its CRC; the frame is not used')
         return self.from_wire(self.unpack_bits(data[::-1]))
 
 

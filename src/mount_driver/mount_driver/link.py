@@ -96,17 +96,16 @@ class Fault(NamedTuple):
     """Another node publishes setpoints: the graph goes on at 0 A, and records, until a user has ended it."""
 
 
-class Judgement(NamedTuple):
-    """What the watches say of a sample."""
+class Limits(NamedTuple):
+    """What the watches allow an answer."""
 
-    current_limit: float = HIGHEST_CURRENT
-    """What the coil may carry from now on, A."""
+    current: float = HIGHEST_CURRENT
+    """What the coil may carry at present, A."""
     held: str = ''
     """Why every answer is lowered to 0 A at present; empty while none is."""
-    fault: Fault | None = None
 
 
-NO_LIMITS = Judgement()
+NO_LIMITS = Limits()
 
 
 class Stamped(NamedTuple):
@@ -210,9 +209,7 @@ class Link:
 
     # To the electronics.
 
-    def answer(
-        self, stamp: int, current: float, now: int, judgement: Judgement = NO_LIMITS
-    ) -> Setpoint | None:
+    def answer(self, stamp: int, current: float, now: int, limits: Limits = NO_LIMITS) -> Setpoint | None:
         """Return the setpoint that answers the sample of `stamp` (ns), or None: see `last_refusal`.
 
         `current` in A; above what it may be by the DBC and by the watches it is limited.
@@ -242,7 +239,7 @@ class Link:
             self.refuse(refusal)
             return None
         self._answered_stamp, self._answered_current = stamp, current
-        current_limit, held, _ = judgement
+        current_limit, held = limits
         if current > self._highest_current:
             counts.limited += 1
             current = self._highest_current

@@ -107,8 +107,8 @@ class MountCodec:
     """Encodes and decodes the messages of `mount.dbc`; no state but its tables, so one serves all threads.
 
     Encoding takes the alive counter (0..255) of the frame, decoding returns it with the message. Decoding
-    raises `WrongLengthError` or `WrongCrcError` before it looks at any number. What a message says by its raw
-    numbers, without these checks, is for `E2EReceiver`.
+    raises `FrameError` before it reads any number. `E2EReceiver` makes the same checks, then calls
+    `measurement_of`, `setpoint_of` or `status_of`.
     """
 
     def __init__(self, database_file: Path = DATABASE_FILE):

@@ -8,7 +8,7 @@ from far_end import CODEC, sample
 from mount_driver.clock import ElectronicsClock
 from mount_driver.exchange import Exchange
 from mount_driver.health import Health
-from mount_driver.link import Judgement, Refusal
+from mount_driver.link import Limits, Refusal
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import Status
 from mount_driver.watches.heat_watch import HeatWatch
@@ -46,7 +46,8 @@ def change(exchange, changes):
         elif counting is not None and isinstance(value, int):
             setattr(counting, name, getattr(counting, name) + value)
         else:
-            setattr(counting or (exchange if hasattr(exchange, name) else link), name, value)
+            owners = (counting, exchange.guard, exchange, link)
+            setattr(next(owner for owner in owners if hasattr(owner, name)), name, value)
 
 
 def verdict(*, lockstep=False, age=0.0, **changes):
@@ -79,7 +80,7 @@ def test_a_sound_link_is_ok_with_its_figures():
             Level.ERROR,
             'switched off: too hot, then activate mount_driver, mount_init',
         ),
-        ({'judgement': Judgement(held='no sensor')}, Level.ERROR, 'coil at 0 A while this lasts: no sensor'),
+        ({'limits': Limits(held='no sensor')}, Level.ERROR, 'coil at 0 A while this lasts: no sensor'),
         ({'fault': 'too hot', 'refused': 9, 'age': 9.0, 'driving': False}, Level.ERROR, 'too hot'),
         ({'setpoint_errors': 1}, Level.WARN, 'damaged, repeated or of wrong sequence; they do not use'),
         ({'status': Status(13.8, 120.1)}, Level.WARN, r'120\.1 degC\) is above 120 degC; lower'),

@@ -160,7 +160,7 @@ def test_without_a_status_for_1_s_there_are_0_ampere(car):
     assert car.on_bus().current == 3.0
     car.drive(3, car.answer, electronics=measuring_alone)
     assert car.on_bus().current == 0.0
-    assert 'no status' in car.exchange.judgement.held
+    assert 'no status' in car.exchange.guard.limits.held
 
 
 class SilentBus:

@@ -7,7 +7,7 @@ from collections import deque
 
 from mount_driver.clock import Clock
 from mount_driver.layout import MessageLayout
-from mount_driver.link import Fault, Judgement, Link, Stamped
+from mount_driver.link import NO_LIMITS, Fault, Limits, Link, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec, Setpoint, Status
 from mount_driver.watches.coil_watch import CoilWatch
@@ -18,6 +18,7 @@ from mount_driver.watches.ripple_watch import RippleWatch
 from mount_models.sampling import sample_time_ns
 
 _ALONE = 'take every node but the electronics that sends it off the bus'
+_HEATING_STEP = 100_000_000  # ns, chosen: 10 times a second the model of the coil's temperature goes on
 _NOTED = 256  # setpoints, chosen: between two samples there are a few; of more the oldest are forgotten
 _new = tuple.__new__  # makes a named tuple without the call of a Python function
 
@@ -38,6 +39,10 @@ class Guard:
         """Sound setpoint frames of another sender."""
         self.writer_doubt = ''
         """Why another node may publish setpoints, so that answers are 0 A; empty where none may."""
+        self.limits = NO_LIMITS
+        """What the watches allow since the last sample that they judged."""
+        self.unjudged: tuple[Stamped, int] | None = None
+        """The newest sample and when it came (ns), until it is judged."""
         self.sent: deque[Setpoint] = deque(maxlen=_NOTED)
         """The setpoints that have left since the last sample was judged."""
         self.heat = heat
@@ -50,6 +55,8 @@ class Guard:
         self._setpoints: MessageLayout = codec.setpoint
         self._foreign_at: int | None = None
         self._sent_last = 0.0  # A
+        self._heating_since: int | None = None  # stamp from which the squares of the current are summed
+        self._squares, self._summed = 0.0, 0
         self._breaks = 0
         heat.begin()
 
@@ -65,25 +72,38 @@ class Guard:
         times = (self._foreign_at, self._samples.last, self._statuses.last)
         return max((time for time in times if time is not None), default=None)
 
-    def judge_sample(self, stamped: Stamped, now: int) -> Judgement:
-        """Return what the watches say of a new sample, which arrived at `now`."""
-        (stamp, sample), heat, health, sent = stamped, self.heat, self._health, self.sent
+    def judge_sample(self) -> Fault | None:
+        """Return what follows from the newest sample, which is then judged; `limits` change with it."""
+        assert self.unjudged is not None
+        ((stamp, sample), now), self.unjudged = self.unjudged, None
+        heat, health, sent = self.heat, self._health, self.sent
         if sent:
             self._sent_last = sent[-1].current
-        heat.take(stamp, sample.coil_current, self._sent_last)
+        # The greater of measured and sent current heats, the sent one where the other is not valid (NaN).
+        current, since = sample.coil_current, self._heating_since
+        if not current > self._sent_last:
+            current = self._sent_last
+        self._squares += current * current
+        self._summed += 1
+        if since is None:
+            self._heating_since = stamp
+        elif stamp - since >= _HEATING_STEP:
+            heat.warm(self._squares / self._summed, 1e-9 * (stamp - since))
+            self._heating_since, self._squares, self._summed = stamp, 0.0, 0
         held = self.writer_doubt
         if health.valid_until is None or now > health.valid_until or health.sensor_fault:
             held = health.hold(now) or held
+        self.limits = _new(Limits, (heat.current_limit, held))
         breaks = self._link.counts.jumps + self._clock.restarts
         if breaks != self._breaks:
             self._breaks = breaks
-            return Judgement(heat.current_limit, held, Fault(self._restart_sentence(), True))
+            return Fault(self._restart_sentence(), needs_initialisation=True)
         sentence = self._link.rate_objection or self._coil.judge(sample, sent)
         sent.clear()
         sentence = sentence or self.ripple.judge(
             sample.coil_current, sample.current_rate, sample.flux_rate, sample.enabled, now
         )
-        return _new(Judgement, (heat.current_limit, held, Fault(sentence) if sentence else None))
+        return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:
         """Return what follows from a measurement frame that was not used, or a sample that came once more."""

@@ -26,7 +26,7 @@ told also if none comes again.
 
 from typing import Annotated, NamedTuple
 
-from mount_driver.watches.ripple_law import RippleLaw, SupplyCarrier, crossing_per_gap, warmth
+from mount_driver.watches.ripple_law import DUTY_STEP, RippleLaw, crossing_per_gap, skin_table, warmth
 from mount_driver.watches.ripple_sweep import NODE, Reference, Sweep, objection
 from mount_models.coil.heating import COPPER_CELSIUS, CoilHeating
 from mount_models.quantity import Quantity
@@ -89,7 +89,7 @@ class RippleWatch:
         self._parameters, self._law, self._heating = parameters, law, heating
         self._duration = round(1e9 * parameters.duration)
         self._turns_area, self._crossing_per_gap = law.turns_area, crossing_per_gap(law)
-        self._carrier = SupplyCarrier(law)
+        self._link_voltage, self._skin = law.bridge.link_voltage, skin_table(law)
         self._sweep = Sweep()
         self._reference: Reference | None = None
         self._means = [0.0] * (_ZONES + 1)  # of the deviations in tolerances, each of 0.1 A, and over zones
@@ -163,18 +163,22 @@ class RippleWatch:
                 return sentence
         if not valid or finding in _NOTHING_KNOWN:
             return ''
-        held = self._resistance * current
-        inductance = self._carrier.carried(flux_volts / current_rate, held, self._volts) * self._cold
-        if self._reference is None:
-            return self._learn(current, inductance) if self._sweep.take(current, inductance) else ''
-        return self._compare(self._reference, current, inductance, now)
+        return self._judge_inductance(current, flux_volts / current_rate, now)
 
-    def _learn(self, current: float, inductance: float) -> str:
-        p = self._parameters
-        self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
-        return '' if self._reference is None else objection(self._reference, self._law, self._wider)
-
-    def _compare(self, reference: Reference, current: float, inductance: float, now: int) -> str:
+    def _judge_inductance(self, current: float, inductance: float, now: int) -> str:
+        # Carried to voltage and temperature of the gap curves, as `mount_models.coil.duty` does.
+        held, volts, skin = self._resistance * current, self._link_voltage, []
+        if 0.0 <= held < self._volts and held < volts:
+            for supply in (volts, self._volts):
+                place = 0.5 * (held / supply) / DUTY_STEP
+                below = min(int(place), len(self._skin) - 2)
+                skin.append(self._skin[below] + (place - below) * (self._skin[below + 1] - self._skin[below]))
+            share = 1.0 - inductance * self._law.gap_reluctance
+            inductance /= 1.0 + share * (skin[0] / skin[1] - 1.0)
+        inductance *= self._cold
+        reference = self._reference
+        if reference is None:
+            return self._learn() if self._sweep.take(current, inductance) else ''
         place = int(current / NODE + 0.5)
         if place >= len(reference.inductance):
             return ''
@@ -206,6 +210,12 @@ class RippleWatch:
         if not sentence and self._beyond[_JOINT] >= _CERTAIN and self._has_lasted(_JOINT, now):
             return self._gap_sentence(*self._joint_at, self._means[_JOINT])
         return sentence
+
+    def _learn(self) -> str:
+        """Take the sweep that has ended for the reference; return what speaks against it."""
+        p = self._parameters
+        self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
+        return '' if self._reference is None else objection(self._reference, self._law, self._wider)
 
     def _lasts_beyond(self, zone: int, now: int) -> bool:
         """Whether the mean of a zone, now beyond its limit, has stayed there for long enough."""
