@@ -75,6 +75,7 @@ def test_import(made, tmp_path):
     assert acceleration[::5][40:360] == pytest.approx(SHAKING[40:360] + GRAVITY, abs=2e-4)
 
 
+@pytest.mark.slow  # src/mount_replay/test/test_fleet_foreign.py indexes foreign files as well
 @each_format
 def test_fleet_index(made, tmp_path):
     files = tmp_path / 'drives'

@@ -62,6 +62,7 @@ def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equal
     assert losses(recording, audit(recording)).sound
 
 
+@pytest.mark.slow
 def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switching_too(command):
     options = (
         '--mount', 'hydro', '--set', 'mount_control.policy=switched_viscous',
@@ -81,6 +82,7 @@ def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switchin
     assert bool(active[200:].all()) is True
 
 
+@pytest.mark.slow
 def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(command):
     options = ('--sample-rate', '2000', '--scenario', 'bench', '--duration', '0.5')
     options += ('--set', 'mount_sim.timeline.start=2.9')
@@ -98,6 +100,7 @@ def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(comman
     assert replayed.agreement.equal
 
 
+@pytest.mark.slow
 def test_lockstep_equals_the_core_run_over_a_measured_road(command):
     places = np.arange(0.0, 12.0, 0.02)  # m
     height = 0.01 * np.sin(2.0 * np.pi * places / 1.1) + 0.004 * np.sin(2.0 * np.pi * places / 0.3)

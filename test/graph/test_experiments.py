@@ -9,6 +9,8 @@ import mount_bags
 from mount_bags.run.session import recorded_session
 from mount_cli.command import main
 
+pytestmark = pytest.mark.slow
+
 
 def _setpoints(run):
     series = mount_bags.open(run / 'recording')['current_setpoint']

@@ -95,6 +95,7 @@ def test_what_cannot_be_compared_is_not_called_different(run, tmp_path):
     assert 'nope' in command('compare', run(), tmp_path / 'nope').output
 
 
+@pytest.mark.slow
 def test_of_two_mounts_in_one_recording_both_are_compared_and_drawn_by_their_names(
     run, tmp_path, monkeypatch
 ):

@@ -3,6 +3,7 @@
 import tracemalloc
 
 import numpy as np
+import pytest
 from recorded_drive import PERIOD, START, joint_state, write_drive
 from seen_memory import SEEN
 
@@ -33,6 +34,7 @@ def all_figures(recording):
     recorded_events(recording)
 
 
+@pytest.mark.slow
 def test_an_audit_needs_few_bytes_for_each_message(tmp_path, monkeypatch):
     monkeypatch.setattr(packed_column, 'BLOCK', 512)
     monkeypatch.setattr(packed_column, '_SLAB', 512)

@@ -68,6 +68,7 @@ def test_a_recorder_that_stands_still_counts_as_dead_after_the_limit(tmp_path, d
         assert f'{told}: look for' in graph.restarts[0].sentence
 
 
+@pytest.mark.slow
 def test_one_that_stands_still_for_less_goes_on(tmp_path, domain):
     with recording_graph(tmp_path, domain) as graph:
         process = pid_of(graph)
@@ -79,6 +80,7 @@ def test_one_that_stands_still_for_less_goes_on(tmp_path, domain):
         assert graph.restarts == []
 
 
+@pytest.mark.slow
 def test_a_recorder_that_dies_too_often_ends_the_graph(tmp_path, domain):
     with recording_graph(tmp_path, domain, limit=1) as graph:
         lose(graph, signal.SIGKILL)
@@ -86,6 +88,7 @@ def test_a_recorder_that_dies_too_often_ends_the_graph(tmp_path, domain):
             lose(graph, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_in_lock_step_the_first_loss_ends_the_graph(tmp_path, domain):
     with recording_graph(tmp_path, domain, lockstep=True) as graph:
         os.kill(pid_of(graph), signal.SIGKILL)

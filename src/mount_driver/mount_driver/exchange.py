@@ -263,8 +263,9 @@ class Exchange:
     def _send(self, setpoint: Setpoint) -> bool:
         """Send one frame and return whether the bus took it; call it with the lock held."""
         bus = self._bus
-        if bus is None or not self._accepting:
+        if bus is None:
             self.unsent_reason = self.trouble
+        if bus is None or not self._accepting:
             return False
         try:
             self.guard.sent.append(setpoint)

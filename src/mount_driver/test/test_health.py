@@ -12,8 +12,7 @@ from mount_driver.link import Limits, Refusal
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import Status
 from mount_driver.watches.heat_watch import HeatWatch
-from mount_ros.nodes.diagnostics import Level, Standing
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level
 
 PARAMETERS = DriverParameters(interface='socketcan', channel='can0', coil_celsius_before=20.0)
 MS, S = 1_000_000, 1_000_000_000
@@ -179,7 +178,7 @@ def fifth(value, tenth):
 
 @pytest.mark.parametrize('burst', COUNTS)
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(burst):
-    exchange, standing, told = driving(), Standing(), []
+    exchange, standing, told = driving(), ActiveFindings(), []
     health = Health(exchange, PARAMETERS, BEGIN, lockstep=False)
     for tenth in range(300):
         now = exchange.last_received = BEGIN + tenth * S // 10

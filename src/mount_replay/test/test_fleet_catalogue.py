@@ -110,6 +110,7 @@ def test_a_second_place_is_added_to_what_the_catalogue_holds(drives, tmp_path, i
     assert both.vanished == 0
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_from_any_number_of_workers(drives, tmp_path):
     for workers in (1, 2):
         table_of([drives], tmp_path / str(workers), workers=workers)

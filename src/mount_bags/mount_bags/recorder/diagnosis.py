@@ -9,8 +9,7 @@ from mount_bags.messages.stamp_watch import StampWatch
 from mount_bags.messages.stamps import FARTHEST
 from mount_bags.recorder.recorder import RecorderFigures, Unobserved
 from mount_bags.recorder.snapshot import SnapshotFigures
-from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 
 LEAST_FREE = 1 << 30  # bytes, chosen
 LEAST_TIME = 60.0  # s, chosen: how long the disk must last at the present rate
