@@ -35,7 +35,7 @@ _MOST_UNREADABLE = 1000  # without a pause, chosen: then the bus itself is taken
 _LOOPBACK = '127.0.0.1'
 _LARGEST_DATAGRAM = 4096  # bytes; a frame takes about 200
 _SO_ATTACH_FILTER = 26  # Linux, asm-generic/socket.h
-_SO_TIMESTAMPNS = 35  # Linux, asm-generic/socket.h: the kernel tells when a datagram arrived
+_SO_TIMESTAMPNS = 35  # Linux, asm-generic/socket.h: the kernel adds the time of arrival
 _TIME = struct.Struct('@ll')  # s, ns
 _ROOM_FOR_TIME = socket.CMSG_SPACE(_TIME.size)
 
@@ -164,13 +164,13 @@ class LoopbackMulticastBus(can.BusABC):
         try:
             if not self._poll.poll(None if timeout is None else max(timeout, 0.0) * 1e3):
                 return None, False
-            datagram, told, _, _ = self._socket.recvmsg(_LARGEST_DATAGRAM, _ROOM_FOR_TIME)
+            datagram, ancillary, _, _ = self._socket.recvmsg(_LARGEST_DATAGRAM, _ROOM_FOR_TIME)
         except BlockingIOError:
             return None, False
         except OSError as error:
             raise can.CanOperationError(f'receiving failed: {error.strerror}', error.errno) from error
-        message = _message(datagram, _arrival(told))
-        # Like SocketCAN: error frames pass the filter, because they tell the state of the bus.
+        message = _message(datagram, _arrival(ancillary))
+        # Like SocketCAN: error frames pass the filter, because they show the state of the bus.
         return message, message.is_error_frame or message.arbitration_id in self._received
 
     def _apply_filters(self, filters: Any) -> None:
@@ -254,9 +254,9 @@ def _receiving_socket(channel: str, port: int) -> socket.socket:
     return sock
 
 
-def _arrival(told: list[tuple[int, int, bytes]]) -> float:
+def _arrival(ancillary: list[tuple[int, int, bytes]]) -> float:
     """Return the system time (s) at which the kernel received the datagram; NaN where it did not say."""
-    for level, kind, data in told:
+    for level, kind, data in ancillary:
         if (level, kind) == (socket.SOL_SOCKET, _SO_TIMESTAMPNS):
             seconds, nanoseconds = _TIME.unpack_from(data)
             return seconds + 1e-9 * nanoseconds

@@ -37,7 +37,7 @@ class Exchange:
     it leaves; then `on_judged(stamped)`. `on_temperature(stamp_ns, celsius)` is called for a status with a
     coil temperature, with the last sample's stamp. A callback that hangs does not
     hold up the watch of the hold.
-    `clock` gives the stamps and says by which time ages are judged; `steady() -> ns` is the steady clock.
+    `clock` gives the stamps and the time by which ages are judged; `steady() -> ns` is the steady clock.
     `heat` is the coil's temperature from before, which an activation does not cool; `law` is the ripple's.
     """
 
@@ -112,7 +112,9 @@ class Exchange:
         with ExitStack() as steps:  # the last one first
             steps.callback(atexit.unregister, self.stop)
             steps.callback(self._close)
-            steps.callback(self._join)
+            for thread in self._threads:
+                if thread is not threading.current_thread():
+                    steps.callback(thread.join)
             steps.callback(self._leave_off)
 
     def send_setpoint(self, stamp: int, current: float) -> bool:
@@ -294,18 +296,13 @@ class Exchange:
                 f'({self.unsent_reason}); the electronics go to 0 A by their own watch'
             )
 
-    def _join(self) -> None:
-        for thread in self._threads:
-            if thread is not threading.current_thread():
-                thread.join()
-
     def _recover(self, error: can.CanError) -> None:
         """Open the bus again and again until it works, `stop` is called, or the time is over."""
         self.trouble = str(error)
         deadline = time.monotonic() + self._parameters.recovery_time
         while not self._ending.is_set():
             with self._sending:
-                with suppress(Exception):  # it is lost already: how it ends says nothing new
+                with suppress(Exception):  # it is lost already: how it ends is of no interest
                     self._close()
                 try:
                     self._bus = self._open()

@@ -31,7 +31,7 @@ class Health:
         self._unheard = SlidingWindow(False, _SECOND)
 
     def judge(self, now: int, *, name_awaited: bool = False) -> Verdict:
-        """Return the verdict at `now` (steady clock, ns): the gravest finding speaks, all figures follow.
+        """Return the verdict at `now` (steady clock, ns): its sentence is that of the gravest finding, all figures follow.
 
         With `name_awaited`, discovery may soon name the other sender of a fault: nothing ends before.
         """
@@ -113,7 +113,7 @@ class Health:
             limit = f'the hotter, the less current it is let, 0 A at {heating.limit_celsius:g} degC'
             yield 'heat', f'{text}: {limit}; damp less or cool the mount'
         if warning := exchange.guard.ripple.warning:
-            # Its first words say which it is, the value stands in the figures.
+            # Its first words are its key, the value stands in the figures.
             yield ' '.join(warning.split()[:2]), warning
         missing = recent.lost + recent.corrupt
         share = missing / max(recent.samples + missing, 1)

@@ -105,7 +105,7 @@ class MessageLayout:
     def unpack(self, data: bytes | bytearray) -> tuple[int, ...]:
         """Return the raw numbers of a message; raises `FrameError`."""
         if len(data) != self.length:
-            raise FrameError(f'frame 0x{self.frame_id:X} has {len(data)} bytes; the DBC says {self.length}')
+            raise FrameError(f'frame 0x{self.frame_id:X} has {len(data)} bytes; the DBC has {self.length}')
         if not e2e_p05_check(data, self.data_id):
             raise FrameError(f'frame 0x{self.frame_id:X} fails its CRC; the frame is not used')
         return self.from_wire(self.unpack_bits(data[::-1]))

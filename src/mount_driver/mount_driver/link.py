@@ -154,11 +154,11 @@ class Link:
         self._off_rate = 0  # samples in a row that came at another rate
         self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, oldest first
         self._answered_stamp = -1
-        self._answered_current = 0.0  # A, as it was asked for
+        self._answered_current = 0.0  # A, before it was limited
         self._answered_twice: deque[int] = deque(maxlen=_DOUBLE_ANSWERS)  # stamps of such samples
         # No sample of the first minute bears this number: 0 A sent before any answer answers nothing.
         self._last_setpoint = Setpoint(0.0, _COUNTER_MASK, False)
-        self._off_at: int | None = None  # time after which 0 A is due; the watch begins with its first look
+        self._off_at: int | None = None  # time after which 0 A is due; the watch begins with its first call
 
     # From the electronics.
 

@@ -123,7 +123,11 @@ class MountDriver(SafeLifecycleNode):
         before = self._heat
         if before is None:
             return HeatWatch(settings.heating, settings.coil_celsius_before)
-        return before if before.heating == settings.heating else HeatWatch(settings.heating, before.told)
+        return (
+            before
+            if before.heating == settings.heating
+            else HeatWatch(settings.heating, before.known_celsius)
+        )
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()

@@ -85,7 +85,7 @@ class Setpoint(NamedTuple):
     answered_counter: int
     """`sample_counter` of the sample that this setpoint answers."""
     enable: bool = True
-    """False: the coil driver shall be off, whatever `current` says."""
+    """False: the coil driver shall be off, whatever `current` is."""
 
 
 class Status(NamedTuple):

@@ -1,7 +1,7 @@
 """Whether the measured coil current follows the setpoints that were sent: bounds from a model of the loop.
 
 No bus and no clock here: time is counted in samples of the electronics, so neither a late frame nor a driver
-that stood still and then takes many samples at once looks like a coil at fault.
+that stood still and then takes many samples at once is a deviation of the coil.
 
 Which setpoint the electronics follow at a sample is known only by their contract (`mount.dbc`): one that
 answers a sample of the last 20 ms, or none. So two bounds are kept. The upper one rises at once to the

@@ -15,7 +15,7 @@ from mount_models.coil.heating import CoilHeating, highest_current, hottest_by_c
 from mount_models.sampling import HIGHEST_CURRENT
 
 _LONGEST_STEP = 2.0  # s, chosen: of a longer pause nothing is known, so the coil has not cooled
-_AGE = 10.0  # s, chosen: a temperature told from before is no older; 3 A may have flowed since it was told
+_AGE = 10.0  # s, chosen: a temperature from before is no older; 3 A may have flowed since
 _SPARE = 12.0  # A^2 s, chosen: a ramp takes 7.2; 12 warm the shipped coil by 0.5 K
 _NEAR = 5.0  # K, chosen: so near to its limit nothing is spared
 
@@ -36,7 +36,7 @@ class HeatWatch:
             self._set(hottest_by_current(heating, HIGHEST_CURRENT))
 
     @property
-    def told(self) -> float:
+    def known_celsius(self) -> float:
         """The temperature for a watch that follows this one, degC; NaN where it is not known."""
         return self.celsius if self.known else float('nan')
 

@@ -75,13 +75,13 @@ class StatusLimits(NamedTuple):
 
 
 class StatusWatch:
-    """Keeps what the newest status says, and until when it counts."""
+    """Keeps the newest status and the time until which it counts."""
 
     def __init__(self, limits: StatusLimits):
         self._limits = limits
         self._timeout = round(1e9 * limits.timeout)
         self.valid_until: int | None = None
-        """Time from which on a status is missing; None before the first look."""
+        """Time from which on a status is missing; None before the first call."""
         self.sensor_fault = False
         """Whether the newest status reports a fault of the displacement sensor."""
 

@@ -41,7 +41,7 @@ class RippleLaw(NamedTuple):
 
 
 def ripple_law(specimen: 'Specimen') -> RippleLaw:
-    """Return what a specimen says of the ripple; without a temperature compensation it holds at any."""
+    """Return the law of the ripple of a specimen; without a temperature compensation it holds at any."""
     curves, temperature = specimen.gap_curves, specimen.temperature
     low, high = curves.crossing_current_of_gap.low, curves.crossing_current_of_gap.high
     middle = 0.5 * (low + high)

@@ -3,9 +3,9 @@
 No bus and no clock here: times are ns by the clock that judges ages (`Clock.now`).
 
 Two questions. Does the voltage that drives the ripple, N A dB/dt + R(T) i, agree with the supply that the
-status tells? Other turns, another scale of dB/dt or none show at any current. And is the incremental
+status reports? Other turns, another scale of dB/dt or none show at any current. And is the incremental
 inductance L_i = N A (dB/dt) / (di/dt), Eq (5), at this current the one of the ramp (`ripple_sweep`)? There
-the gap of every current passed by once; the means of the deviation, one for each 0.1 A, tell a gap that has
+the gap of every current passed by once; the means of the deviation, one for each 0.1 A, show a gap that has
 changed.
 
 What the gap does to L_i at a given current, with the shipped actuator: at 0.5 A a blocked gap lowers it by
@@ -16,12 +16,12 @@ below 0.7 A; above 1.8 A, where the core is full, only missing pads show.
 Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that of the reference. The limit of
 5 % lies 16 sigma away, and 8 behind an error of temperature and supply of 2.5 %: 6e-16 for each mean, and so
 less than one false alarm in 1e5 years. The mean shows a missing pad after 5 readings within 0.1 A and a
-blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Told is what lasts for `duration`:
+blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Reported is what lasts for `duration`:
 three statuses, as supply and temperature are that late.
 
 Worn pads show between 0.75 A and the crossing, where an engine that is damped once for 0.1 s may come by only
 once, with a few readings in each zone. There a mean over all currents joins them; after 48 readings it is
-told also if none comes again.
+reported also if none comes again.
 """
 
 from typing import Annotated, NamedTuple
@@ -40,10 +40,10 @@ _TO_STD = 0.886  # sqrt(pi) / 2: from the mean difference of two readings to the
 _UNKNOWN_CELSIUS = 0.1  # 1, chosen: what 100 K do
 _UNKNOWN_RESISTANCE = 0.4  # 1, chosen: likewise
 _BLIND = 0.75  # A, chosen: up to here worn pads change L_i by less than 1 % for each 10 um
-_NEAR = 0.2  # A, chosen: so near to the crossing a deviation is told as a gap
+_NEAR = 0.2  # A, chosen: so near to the crossing a deviation is reported as a gap
 _PAUSE = 50_000_000  # ns, chosen: of a longer time without samples nothing is known
 _SURE = 24  # readings: so many sound ones bring a mean of `_FARTHEST` back below 1
-_CERTAIN = 48  # readings over the zones, chosen: told though none comes again, for an engine is damped once
+_CERTAIN = 48  # readings over the zones, chosen: enough without a later one, as an engine may be damped once
 _JOINT = _ZONES = 32
 _JUMP = 0.03  # 1, chosen: another 35 K from one status to the next; a coil takes a minute for it
 _NOTHING_KNOWN = ('missing', 'voltage')  # findings with which no reading is compared
@@ -190,7 +190,7 @@ class RippleWatch:
         self._last = deviation
         step = step if step >= 0.0 else -step
         self._noise += _NOISE_SHARE * (_TO_STD * (step if step < _ODD else _ODD) - self._noise)
-        if self._noise > self._parameters.noise_limit:  # such readings tell nothing of the gap
+        if self._noise > self._parameters.noise_limit:  # such readings show no gap
             return ''
         sentence, tolerance = '', reference.tolerance[place] + self._wider
         excess = deviation / tolerance
@@ -212,7 +212,7 @@ class RippleWatch:
         return sentence
 
     def _learn(self) -> str:
-        """Take the sweep that has ended for the reference; return what speaks against it."""
+        """Take the sweep that has ended for the reference; return why it cannot be right, empty if it may."""
         p = self._parameters
         self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
         return '' if self._reference is None else objection(self._reference, self._law, self._wider)
@@ -239,7 +239,7 @@ class RippleWatch:
         """Return what is to be warned of, empty where nothing is."""
         p = self._parameters
         change = self._change
-        slow = self._judged - self._beyond_last > 2 * self._duration  # else a fault is about to be told
+        slow = self._judged - self._beyond_last > 2 * self._duration  # else a fault is about to be reported
         if slow and (change > p.gap_warning or -change > p.gap_warning):
             return (
                 f'closed gap has changed by {1e6 * change:+.0f} um since the initialisation (limit '
