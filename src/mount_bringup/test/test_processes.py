@@ -25,10 +25,12 @@ def test_the_loop_is_given_the_priority_and_the_recorder_one_behind_it(
     assert process.log_file.read_text().strip() == told
 
 
-def test_modules_in_the_working_directory_are_not_imported(tmp_path, monkeypatch):
+@pytest.mark.parametrize('path', ['', ':/nowhere', '/nowhere::/elsewhere', ':'])
+def test_modules_in_the_working_directory_are_not_imported(tmp_path, monkeypatch, path):
     for module in ('yaml', 'queue'):
         (tmp_path / f'{module}.py').write_text('raise SystemExit("foreign code ran")')
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('PYTHONPATH', path)
     monkeypatch.setattr(processes, '_program', lambda *_: 'import queue, yaml')
     process = processes.NodeProcess([CONTROL], GraphSettings(), tmp_path)
     assert process.wait() == 0, process.last_words()
@@ -65,6 +67,15 @@ def test_a_process_loads_at_once_and_makes_its_nodes_when_told_to(held):
 def test_a_process_that_has_made_nothing_yet_is_ended_without_a_complaint(held):
     assert processes.end_all([held]) == []
     assert held.exit_code is not None
+
+
+def test_a_process_that_still_loads_is_ended_quietly_and_without_a_complaint(tmp_path, monkeypatch):
+    (tmp_path / 'loading.py').write_text('import time; print("up", flush=True); time.sleep(600)')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    program = processes._program([CONTROL], '').replace('mount_control.node', 'loading')
+    process = started(monkeypatch, tmp_path, CONTROL, program)
+    assert processes.end_all([process]) == []
+    assert process.log_file.read_text() == 'up\n'
 
 
 @pytest.mark.parametrize('at_once', [True, False])

@@ -71,3 +71,17 @@ def test_what_a_node_told_before_its_activation_does_not_take_it_back(verdicts):
     assert verdicts.figures(DRIVER)['state'] == 'active'
     tell(verdicts, 'car/mount_driver', 'inactive', time.time_ns(), state='inactive')
     assert verdicts.figures(DRIVER)['state'] == 'inactive'
+
+
+@pytest.mark.parametrize('newer', [True, False])
+def test_a_clock_that_steps_back_after_an_activation_hides_no_end_of_it(verdicts, monkeypatch, newer):
+    """Neither after a newer stamp nor after a moment: then every stamp is older for an hour."""
+    now = time.time_ns()
+    verdicts.note_active(DRIVER)
+    if newer:
+        tell(verdicts, 'car/mount_driver', 'active', time.time_ns(), state='active')
+    else:
+        later = time.monotonic() + 3.0
+        monkeypatch.setattr(time, 'monotonic', lambda: later)
+    tell(verdicts, 'car/mount_driver', 'inactive', now - 3600 * 10**9, state='inactive')
+    assert verdicts.figures(DRIVER)['state'] == 'inactive'

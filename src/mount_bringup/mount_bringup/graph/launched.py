@@ -163,7 +163,10 @@ def main() -> None:
     )
     graph = LaunchedGraph(nodes, settings, player)
     graph.tell_loss = get_logger(SUPERVISOR).error
-    end_process(_supervise(graph, chosen.scenario, chosen.duration))
+    code = _supervise(graph, chosen.scenario, chosen.duration)
+    for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C
+        signal.signal(number, signal.SIG_IGN)
+    end_process(code)
 
 
 def _supervise(graph: Bringup, scenario: str, duration: float) -> int:

@@ -125,7 +125,7 @@ def end_all(processes: list[NodeProcess], at_once: bool = False) -> list[str]:
             process.ask_to_end()
         begin = time.monotonic()
         code = process.wait()
-        if code == 0 or process in told:
+        if code in (0, -signal.SIGINT) or process in told:  # -SIGINT: it did not take signals yet
             continue
         when = 'before it was told to end' if process in died else f'after {time.monotonic() - begin:.1f} s'
         complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
@@ -144,16 +144,18 @@ def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder:
 
 
 def node_environment(nodes: Sequence[GraphNode], priority: int) -> dict[str, str]:
-    """Return what a process is told: its `nodes`, its starter, which is this process, and its priority."""
+    """Return the variables of a process: its `nodes`, its starter (this process), priority, safe imports."""
     share = _RECORDER_SHARE if RECORDER in nodes else 1.0
     given = environment_of_children(max(1, round(share * priority)) if priority else 0)
-    return {**given, NODES_OF_PROCESS: ' '.join(node.full_name for node in nodes)}
+    # Modules in the working directory are foreign: an empty part of the path means it too.
+    path = os.pathsep.join(filter(None, os.environ.get('PYTHONPATH', '').split(os.pathsep)))
+    python = {'PYTHONSAFEPATH': '1', 'PYTHONPATH': path}
+    return {**given, **python, NODES_OF_PROCESS: ' '.join(node.full_name for node in nodes)}
 
 
 def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
     own = node_environment(nodes, settings.priority)
-    python = {'PYTHONUNBUFFERED': '1', 'PYTHONSAFEPATH': '1'}  # modules in the working directory are foreign
-    return {**own, **python, 'ROS_DOMAIN_ID': str(settings.domain)}
+    return {**own, 'PYTHONUNBUFFERED': '1', 'ROS_DOMAIN_ID': str(settings.domain)}
 
 
 def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
@@ -167,7 +169,8 @@ def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
     else:
         classes = ', '.join(node.class_name for node in nodes)
     run = 'from mount_ros.nodes.process import run_nodes'
-    return f'{imports}; {run}; import sys; sys.stdin.read(); run_nodes([{classes}])'
+    quiet = 'import signal; signal.signal(signal.SIGINT, signal.SIG_DFL)'  # until `run_nodes` takes signals
+    return f'{quiet}; {imports}; {run}; import sys; sys.stdin.read(); run_nodes([{classes}])'
 
 
 def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:

@@ -21,6 +21,7 @@ from mount_bags.recorder.snapshot import snapshot_folder
 from mount_bags.run.screen import Screen
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
+from mount_ros.environment import loopback_refusal
 from mount_ros.nodes.aside import wake
 from mount_ros.nodes.hosting import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic
@@ -57,6 +58,8 @@ class RecordOutcome:
 def record(order: RecordOrder, screen: Screen) -> RecordOutcome:
     """Record until Ctrl-C, SIGTERM or the end of the duration; raises a `ValueError` with the reason."""
     names = chosen_topics(order.topics)
+    if refusal := loopback_refusal():
+        raise RecordingError(refusal)
     asked: list[bool] = []  # to end, by a signal; no lock: a second one may come amid the first
     with ending_signals(lambda: asked.append(True)), ros_context(order.domain) as context:
         recorder = _LoneRecorder(order, names, context)

@@ -13,6 +13,7 @@ from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.nodes.diagnostics import Level
 
 _NANOSECONDS = 1_000_000_000
+_UNDER_WAY = 2.0  # s, chosen: diagnostics that were sent before an activation arrive within
 
 
 class Witness:
@@ -38,7 +39,8 @@ class Verdicts:
         self._names = {node.full_name for node in nodes}
         self._space = f'{namespace.strip("/")}/'.lstrip('/')
         self._figures: dict[str, dict[str, str]] = {}
-        self._activated: dict[str, int] = {}  # system clock, ns, as the stamps of diagnostics
+        self._activated: dict[str, tuple[int, float]] = {}
+        # When a node was activated: system clock, ns, as the stamps of diagnostics; steady clock, s.
 
     def take(self, message: DiagnosticArray) -> None:
         """Take what a node tells."""
@@ -57,7 +59,7 @@ class Verdicts:
                 'level': str(told.level),
                 'sentence': told.sentence,
             }
-            if sent < self._activated.get(name, 0):
+            if self._sent_before_activation(name, sent):
                 self._figures[name]['state'] = 'active'  # it was under way when the node was activated
             if name in self._names:
                 self.witness.told(name, self._figures[name])
@@ -68,9 +70,20 @@ class Verdicts:
 
     def note_active(self, node: GraphNode) -> None:
         """Note that a node was activated, which it tells only with its next diagnostics."""
-        self._activated[node.full_name] = time.time_ns()
+        self._activated[node.full_name] = time.time_ns(), time.monotonic()
         self._figures.setdefault(node.full_name, {'level': '0', 'sentence': ''})['state'] = 'active'
         self.witness.state(node, 'active')
+
+    def _sent_before_activation(self, name: str, sent: int) -> bool:
+        """Return whether diagnostics with this stamp were under way when the node was activated.
+
+        The mark is removed after a moment: the system clock may have stepped back, and all stamps with it.
+        """
+        stamp, begin = self._activated.get(name, (0, 0.0))
+        if sent < stamp and time.monotonic() < begin + _UNDER_WAY:
+            return True
+        self._activated.pop(name, None)
+        return False
 
     def forget(self, node: GraphNode) -> None:
         """Forget what a node has told: it holds no more."""
