@@ -44,9 +44,10 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     inherited = drop_real_time()
     real_time = RealTime(given_priority() or inherited)
     prepare_environment()
+    over = _Ending()
+    over.listen(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     nodes = _created(creates, args)
     data_thread = DataThread(nodes[0].context, nodes[0].report_failure)
-    over = _Ending()
     for node in nodes:
         node.data_thread = data_thread
         node.after_configure = _freeze
@@ -55,7 +56,6 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     logger = nodes[0].get_logger()
     if inherited:
         logger.warning(started_in_real_time(inherited))
-    over.listen(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     _freeze()
     real_time.keep_memory()
     services = [_Service(node, over) for node in nodes]
@@ -74,6 +74,8 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     left = leave_middleware(partial(_take_down, nodes), code=code)
     if over.starter.ended:
         remove_abandoned_of_the_dead()  # that of the starter; what it started takes its own
+    for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C: Python restores other handlers first
+        signal.signal(number, signal.SIG_IGN)
     if not left or code:
         end_process(code)
 

@@ -1,0 +1,49 @@
+"""Controller, policy and specimen that the parameters of a run choose, as the nodes choose them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mount_control.parameters import ControlParameters
+from mount_control.policy.contract import Policy
+from mount_control.policy.registry import UNPREFIXED
+from mount_control.settings import ControlSettings, control_settings, policy_parameters
+from mount_models.quantity import with_flattened
+from mount_models.specimen import Specimen
+from mount_models.specimen import chosen_specimen as specimen_of
+
+Parameters = Mapping[str, Mapping[str, Any]]
+"""{node: {parameter: value}}, as given to the nodes."""
+
+
+def control_parameters(parameters: Parameters) -> ControlParameters:
+    """Return the controller's parameters of a run that every policy has."""
+    return with_flattened(ControlParameters(), parameters.get('mount_control', {}))
+
+
+def check_policy(parameters: Parameters) -> None:
+    """Refuse parameters with which the chosen policy cannot work; raises a `ValueError`."""
+    policy, own = policy_of(parameters)
+    policy.design(own, 1.0 / control_parameters(parameters).sample_rate)
+
+
+def policy_of(parameters: Parameters) -> tuple[Policy, Any]:
+    """Return the policy of a run and its own parameters."""
+    return policy_parameters(parameters.get('mount_control', {}))
+
+
+def with_recorded_policy(parameters: Parameters) -> dict[str, dict[str, Any]]:
+    """Return the parameters of a session; one that names no policy was made with the first."""
+    named = {node: dict(values) for node, values in parameters.items()}
+    named.setdefault('mount_control', {}).setdefault('policy', UNPREFIXED)
+    return named
+
+
+def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specimen:
+    """Return the specimen of a run, as `node` loads it."""
+    values = parameters.get(node, {})
+    return specimen_of(values.get('parameters_file', ''), values.get('specimen', ''))
+
+
+def chosen_control(parameters: Parameters) -> ControlSettings:
+    """Return what the controller of a run is set up with; a `ValueError` says what cannot be."""
+    return control_settings(parameters.get('mount_control', {}), chosen_specimen(parameters, 'mount_control'))

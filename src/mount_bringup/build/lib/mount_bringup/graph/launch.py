@@ -1,0 +1,83 @@
+"""The launch files: they check the arguments, and start the supervisor, which owns all other processes.
+
+Needs the `launch` of a ROS 2 installation; where there is none, the executable `mount_supervisor` takes the
+same arguments.
+"""
+
+import signal
+import sys
+from functools import partial
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, LogInfo, OpaqueFunction
+from launch.events import Shutdown
+from launch.events.process import ProcessExited
+from launch.logging import get_logger
+
+from mount_bringup.graph.launch_arguments import texts_of
+from mount_bringup.graph.processes import QUIET_START
+from mount_bringup.graph.run import GRAPHS, SUPERVISOR
+from mount_models.arithmetic.compiled import compilation_told
+from mount_ros.environment import prepare_environment
+from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
+from mount_ros.nodes.starter import environment_of_children
+
+_PATIENCE = '86400'  # s, chosen: the supervisor has limits of its own, and a recorder may write for long
+
+
+def launch_description(graph: str, config: str = '') -> LaunchDescription:
+    """Return the launch file of a graph; `config` is the name of a shipped parameter file, the default."""
+    prepare_environment()  # discovery on this machine only, unless the user has chosen otherwise
+    defaults = {}
+    if config:
+        folder = Path(get_package_share_directory('mount_bringup')) / 'config'
+        defaults['config'] = str(folder / config)
+    arguments, _ = GRAPHS[graph]()
+    declared = [
+        DeclareLaunchArgument(
+            argument.name,
+            default_value=defaults.get(argument.name, argument.default),
+            description=argument.description,
+            choices=list(argument.choices) or None,
+        )
+        for argument in arguments
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=partial(_supervisor, graph))])
+
+
+def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEntity]:
+    arguments, order_of = GRAPHS[graph]()
+    given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
+    with compilation_told(get_logger('mount_bringup').info):  # the checks compute with the laws
+        # Where another launch file includes ours, an argument may be for that one.
+        if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
+            texts_of([word for word in sys.argv if ':=' in word], arguments)
+        order_of(given)
+    inherited = drop_real_time()
+    if inherited and given['priority'] == '0':
+        given['priority'] = str(inherited)
+    process = ExecuteProcess(
+        cmd=[
+            *(sys.executable, '-c', f'{QUIET_START}from mount_bringup.graph.run import main; main()', graph),
+            *(f'{name}:={text}' for name, text in given.items()),
+        ],
+        name=SUPERVISOR,
+        additional_env=environment_of_children(0),
+        sigterm_timeout=_PATIENCE,
+        sigkill_timeout=_PATIENCE,
+        output='both',
+        on_exit=_on_exit,
+    )
+    notes = [LogInfo(msg=started_in_real_time(inherited))] if inherited else []
+    return [*notes, process]
+
+
+def _on_exit(event: ProcessExited, _: LaunchContext) -> EmitEvent:
+    if event.returncode not in (0, -signal.SIGINT):  # the latter came before it could listen
+        reason = ', for the reason in its log' if event.returncode > 0 else ''
+        raise RuntimeError(  # by which launch ends with exit code 1
+            f'{SUPERVISOR} ended with code {event.returncode}{reason}'
+        )
+    return EmitEvent(event=Shutdown(reason=f'{SUPERVISOR} has ended'))

@@ -1,0 +1,194 @@
+"""The processes of the graph: started with their parameters, watched, ended in order."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import yaml
+
+from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups, name_in
+from mount_ros.nodes.starter import environment_of_children
+
+QUIET_START = 'import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); '
+"""The begin of a program: until it takes signals, SIGINT ends it at once and without a traceback."""
+
+_INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that does not end is terminated
+_TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
+_RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for what it misses is gone
+
+
+class NodeProcess:
+    """One process of the graph with the nodes that live in it.
+
+    It loads what it needs at once, and makes its nodes after `begin`.
+    """
+
+    def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
+        self.nodes = tuple(nodes)
+        self.name = ' + '.join(node.full_name for node in nodes)
+        self.reported = False
+        """Whether the user knows of its end."""
+        stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
+        self.log_file = folder / f'{stem}.log'
+        self._settings = settings
+        parameter_file = folder / f'{stem}.yaml'
+        parameter_file.write_text(parameter_text(nodes, settings))
+        self._command = [
+            *(sys.executable, '-c', _program(nodes, settings.namespace), '--ros-args'),
+            *('--params-file', str(parameter_file), '--log-level', settings.log_level),
+        ]
+        self._process = self._start()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        with contextlib.ExitStack() as files:
+            log = None if self._settings.log_to_screen else files.enter_context(self.log_file.open('ab'))
+            return subprocess.Popen(
+                self._command,
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                env={**os.environ, **_environment(self.nodes, self._settings)},
+                start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
+            )
+
+    def begin(self) -> None:
+        """Let it make its nodes."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+    @property
+    def begun(self) -> bool:
+        """Whether it makes or has made its nodes."""
+        return self._process.stdin is None or self._process.stdin.closed
+
+    def start_again(self) -> None:
+        """Kill what is left of the process and start it with the same parameters; its log goes on."""
+        self._process.kill()
+        self._process.wait()
+        self._process, self.reported = self._start(), False
+        self.begin()
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while the process runs."""
+        return self._process.poll()
+
+    def last_words(self) -> str:
+        """Return the last error line of the log, or its last line."""
+        if self._settings.log_to_screen:
+            return '(see its log above)'
+        lines = [line for line in self.log_file.read_text(errors='replace').splitlines() if line.strip()]
+        errors = [line for line in lines if '[ERROR]' in line or '[FATAL]' in line or 'Error: ' in line]
+        return (errors or lines or ['(its log is empty)'])[-1]
+
+    def interrupt(self) -> None:
+        """Send SIGINT: a node goes to 0 A and ends with code 0."""
+        if self.exit_code is None:
+            self._process.send_signal(signal.SIGINT if self.begun else signal.SIGKILL)
+
+    def wait(self) -> int:
+        """Return the exit code; a node that does not end is terminated, then killed.
+
+        Not a recorder while its recording grows: on a slow disk it may need long for what it holds.
+        """
+        for limit, harder in ((_INTERRUPT_LIMIT, signal.SIGTERM), (_TERMINATE_LIMIT, signal.SIGKILL)):
+            written = -1
+            while written < (written := self._written()):
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    return self._process.wait(limit)
+            self._process.send_signal(harder)
+        return self._process.wait()
+
+    def _written(self) -> int:
+        """Return how many bytes of recordings there are, 0 where it records none."""
+        uri = self._settings.parameters.get(RECORDER.name, {}).get('uri') if RECORDER in self.nodes else None
+        folder = Path(str(uri))
+        files = folder.parent.glob(f'{folder.name}*/*') if uri else ()
+        return sum(file.stat().st_size for file in files)
+
+
+class NodeProcesses:
+    """All processes of a graph, in start order."""
+
+    def __init__(self) -> None:
+        self._processes: list[NodeProcess] = []
+
+    def start(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> None:
+        """Start the processes of `nodes`; parameter files and logs are in `folder`."""
+        for group in groups(nodes, settings.grouping):
+            self._processes.append(NodeProcess(group, settings, folder))
+
+    def begin(self) -> None:
+        """Let them make their nodes."""
+        for process in self._processes:
+            process.begin()
+
+    def ended(self) -> NodeProcess | None:
+        """Return the first process that has ended, which counts as reported from now on."""
+        for process in self._processes:
+            if process.exit_code is not None:
+                process.reported = True
+                return process
+        return None
+
+    def start_again(self, nodes: Sequence[GraphNode]) -> None:
+        """End what is left of the processes of `nodes`, and start them again."""
+        for process in self._processes:
+            if {*process.nodes} & {*nodes}:
+                process.start_again()
+
+    def end(self, *, at_once: bool = False) -> list[str]:
+        """End all, last started first; return a sentence per unclean end.
+
+        One after the other, so that none drives the coil without those that watch it, or `at_once`.
+        """
+        processes = self._processes[::-1]
+        known = [process for process in processes if process.reported or not process.begun]
+        died = [process for process in processes if process.exit_code is not None]
+        complaints = []
+        for process in processes if at_once else ():
+            process.interrupt()
+        for process in processes:
+            if not at_once:
+                process.interrupt()
+            begin = time.monotonic()
+            code = process.wait()
+            if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
+                after = f'after {time.monotonic() - begin:.1f} s'
+                when = 'before it was told to end' if process in died else after
+                complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
+        return complaints
+
+
+def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
+    share = _RECORDER_SHARE if RECORDER in nodes else 1.0
+    priority = max(1, round(share * settings.priority)) if settings.priority else 0
+    # Modules in the working directory are foreign: an empty part of the path means it too.
+    path = os.pathsep.join(filter(None, os.environ.get('PYTHONPATH', '').split(os.pathsep)))
+    python = {'PYTHONUNBUFFERED': '1', 'PYTHONSAFEPATH': '1', 'PYTHONPATH': path}
+    return {**environment_of_children(priority), **python, 'ROS_DOMAIN_ID': str(settings.domain)}
+
+
+def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
+    """Return a program of Python; each node has a namespace, which no remapping of ROS could tell apart."""
+    imports = ''.join(f'from {node.package}.node import {node.class_name}; ' for node in dict.fromkeys(nodes))
+    creates = []
+    for node in nodes:
+        space = '/' + name_in(namespace.strip('/'), node.mount).rstrip('/')
+        creates.append(f'partial({node.class_name}, namespace={space!r})')
+    run = 'from functools import partial; from mount_ros.nodes.process import run_nodes; import sys; '
+    return f'{QUIET_START}{imports}{run}sys.stdin.read(); run_nodes([{", ".join(creates)}])'
+
+
+def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
+    """Return a parameter file of ROS for these nodes, whatever their namespace."""
+    tables = {
+        f'/**/{node.full_name}': {'ros__parameters': dict(settings.parameters.get(node.full_name, {}))}
+        for node in nodes
+    }
+    return yaml.safe_dump(tables, sort_keys=True)

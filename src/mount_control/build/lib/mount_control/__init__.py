@@ -1,0 +1,1 @@
+"""Switched, viscous-like friction damping at 1 kHz."""

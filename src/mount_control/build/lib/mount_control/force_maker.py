@@ -1,0 +1,117 @@
+"""From a wanted friction force to a coil current, the same for every policy.
+
+Friction can only oppose motion, and its coefficient depends on the normal force; so the friction law is
+inverted for the force and carried on by one step, and the current-force table of the activation gives the
+current.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mount_control import force_to_current
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.friction.simplified import normal_force_for, simplified_step_with, speed_terms
+
+FADE_TIME = 0.050
+"""s, chosen: in it the current goes over to a new law: first it stands for a sample, and its distance from
+what the new law asks for then falls evenly to zero."""
+
+
+class Law(NamedTuple):
+    """The friction that is assumed of the pads, and the limits of the current."""
+
+    friction: FrictionCoefficients
+    contact: FrictionContact
+    limits: force_to_current.CurrentLimits
+    sample_time: float
+    fade_samples: int
+
+
+STATE = record_type(
+    [
+        ('deflection', 'f8'),
+        ('normal_force', 'f8'),
+        ('current', 'f8'),
+        ('distance', 'f8'),
+        ('fading', 'i8'),
+        ('on', 'i8'),
+    ]
+)
+
+
+def design(
+    friction: FrictionCoefficients,
+    contact: FrictionContact,
+    limits: force_to_current.CurrentLimits,
+    sample_time: float,
+) -> Law:
+    """Return the law for samples that come `sample_time` s apart."""
+    return Law(friction, contact, limits, sample_time, round(FADE_TIME / sample_time))
+
+
+@compiled
+def rest(state):
+    """Set the memory to pads that are not pressed."""
+    state.deflection = 0.0
+    state.normal_force = 0.0
+    state.current = 0.0
+    state.distance = 0.0
+    state.fading = 0
+    state.on = 0
+
+
+@compiled
+def begin_fade(law, state):
+    """Let the current go over to a new law from where it is; off, the new law acts at once."""
+    state.fading = law.fade_samples if state.on == 1 else 0
+
+
+@compiled
+def make(law, currents, state, force, velocity, active):
+    """Return (normal force N, friction coefficient, current A) that make a friction `force` (N).
+
+    `velocity` (m/s) is that at which it will act. At `active` 0 all is off: 0 N, no coefficient, 0 A. Else
+    the current is at least the offset current, at most its limit; a force against the sign of the velocity
+    counts as 0 N, for friction cannot make it.
+    """
+    normal_force, coefficient, current = 0.0, np.nan, 0.0
+    of_speed = speed_terms(law.friction, velocity)
+    state.on = 1 if active != 0.0 else 0
+    if state.on == 1:
+        wanted = 0.0 if force * velocity < 0.0 else force
+        normal_force, coefficient = _normal_force(of_speed, law, currents, state, wanted, velocity)
+        current = _faded(law, state, force_to_current.current_for(currents, law.limits, normal_force))
+    else:
+        state.fading = 0
+    state.current = current
+    _, state.deflection, _ = simplified_step_with(
+        of_speed, law.contact, law.friction, state.deflection, velocity, normal_force, law.sample_time
+    )
+    state.normal_force = normal_force
+    return normal_force, coefficient, current
+
+
+@compiled
+def _faded(law, state, wanted):
+    """Return the current (A) instead of the `wanted` one, beside it for a while after a change of the law."""
+    if state.fading == 0:
+        return wanted
+    if state.fading == law.fade_samples:
+        state.distance = state.current - wanted
+    current = wanted + state.distance * state.fading / law.fade_samples
+    state.fading -= 1
+    return min(max(current, law.limits.offset_current), law.limits.highest_current)
+
+
+@compiled
+def _normal_force(of_speed, law, currents, state, wanted, velocity):
+    """Return (normal force N, friction coefficient) that make the wanted force, within the table."""
+    direction = -1.0 if velocity < 0.0 else 1.0
+    force, coefficient = normal_force_for(
+        of_speed, law.friction, wanted, velocity, direction * state.deflection, state.normal_force
+    )
+    return min(force, force_to_current.highest_force(currents)), coefficient

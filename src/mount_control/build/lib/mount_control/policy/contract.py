@@ -1,0 +1,100 @@
+"""What a policy declares, and what it can rely on.
+
+A policy looks at the displacement sample by sample and says which friction force is wanted, at which
+velocity it will act, and whether to damp at all. The rest is the same for all: `force_maker` turns the force
+into a current within its limits, `controller` refuses what is no displacement, bridges missing samples by a
+straight line (one `step` for each) and clears a memory that holds what is no finite number.
+
+The names that each policy's module has:
+
+`Parameters`
+    NamedTuple with defaults; numbers as `Annotated[float, Quantity(...)]`, or texts. On ROS they are called
+    `<name of the policy>.<parameter>`, those of `switched_viscous` by their own name alone.
+`Law`
+    NamedTuple of numbers, or of such: what `design` works out of the parameters.
+`STATE`
+    `record_type` of the memory, of `f8` and `i8`; the latter never negative, at least one field.
+`TRACE`
+    {field: unit} of the policy's own intermediates, all `f8`, one of them `predicted_velocity`, the velocity
+    that `step` returns. Those in m or m/s are 0 at the first sample after `start` at its displacement:
+    so a replay finds where the controller began.
+`design(parameters, sample_time) -> Design`
+    Plain Python; what it makes has the same time constants at every `sample_time` (s). Raises a
+    `ValueError` with value, limit and remedy for what cannot work together.
+
+and compiled, with the records of `Law` and `STATE`:
+
+`start(law, state, window, displacement)`
+    Set every field to a mount at rest at `displacement` (m), damping off.
+`transfer(law, new_law, state, window, new_window)`
+    Make the memory that of other parameters, without a jump.
+`step(law, table, state, window, trace, displacement) -> (force, velocity, active)`
+    Take one sample (m) and fill the own fields of `trace`. `force` (N) is the wanted friction force, signed
+    like `velocity` (m/s); `active` lies within 0 .. 1, and at exactly 0 the current is exactly 0 A.
+
+What a report says about a policy beyond that, each may be left out:
+
+`levels(parameters) -> {label: m}`
+    Displacements at which something changes, drawn as lines in pictures.
+`wanted_force(parameters, velocity, sample_time) -> force`
+    The friction force (N, (n,)) that would be ideal at the true velocity of the mount (m/s, (n,), samples
+    `sample_time` s apart), without any delay. Without it a report takes `desired_force` of the trace,
+    when it acts.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_models.arithmetic.record import record_type
+from mount_models.quantity import ParameterError
+
+_BEFORE = {'displacement': 'm', 'velocity': 'm/s'}
+_BEHIND = {
+    'damping_active': '1',
+    'desired_force': 'N',
+    'friction_deflection': 'm',
+    'friction_coefficient': '1',
+    'normal_force': 'N',
+    'current': 'A',
+    'bridged_samples': '1',
+}
+
+
+class Design(NamedTuple):
+    """A law, a `table` (n,) that it looks up, and how many numbers of memory it needs as a `window`."""
+
+    law: Any
+    table: NDArray[np.float64] = np.zeros(0)
+    window: int = 0
+
+
+class Policy(Protocol):
+    """A module that declares a policy, see above."""
+
+    Parameters: Any
+    Law: Any
+    STATE: np.dtype
+    TRACE: Mapping[str, str]
+    design: Callable[[Any, float], Design]
+    start: Callable[..., None]
+    transfer: Callable[..., None]
+    step: Callable[..., tuple[float, float, float]]
+
+
+def trace_fields(policy: Policy) -> dict[str, str]:
+    """Return {name: unit} of all that is traced of one step with this policy, in the order of the message."""
+    common = {*_BEFORE, *_BEHIND} & set(policy.TRACE)
+    if common or 'predicted_velocity' not in policy.TRACE:
+        raise ParameterError(
+            f'the trace of a policy must hold predicted_velocity and no field that every policy has; '
+            f'instead received {", ".join(policy.TRACE)}'
+        )
+    return {**_BEFORE, **policy.TRACE, **_BEHIND}
+
+
+def trace_dtype(policy: Policy) -> np.dtype:
+    """Return the record type of one traced step."""
+    return record_type([(name, 'f8') for name in trace_fields(policy)])

@@ -1,0 +1,1 @@
+"""CAN FD link to the electronics of the engine mount."""

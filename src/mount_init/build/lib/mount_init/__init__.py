@@ -1,0 +1,1 @@
+"""Air gap and current-force table of the engine mount, estimated at each activation."""

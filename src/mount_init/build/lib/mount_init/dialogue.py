@@ -1,0 +1,194 @@
+"""The dialogue with the electronics: which ripple sample is answered, and the end at 0 A in every case.
+
+Samples and setpoints come in on the thread of the data path, the ramp is run by the thread of the
+lifecycle transition. Each sample is answered at most once, so that electronics which wait for the answer
+(lock-step) are served exactly. The wall clock only ends a ramp that went silent; it never alters a result.
+"""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mount_init.errors import CoilBusyError, DriverRefusalError, InitialisationError
+from mount_init.initialisation import OFF, Initialisation
+
+_LOOK_PERIOD = 0.05  # s: how soon silence, a timeout or the end of the process is noticed
+
+
+@dataclass
+class _Sample:
+    stamp: int
+    current: float
+    current_rate: float
+    flux_rate: float
+
+
+class CoilDialogue:
+    """Answers ripple samples while a ramp runs; `publish(stamp, current)` sends a setpoint (ns, A)."""
+
+    def __init__(self, publish: Callable[[int, float], None]):
+        self._publish = publish
+        self._lock = threading.RLock()
+        self._over = threading.Event()
+        self._ramp: Initialisation | None = None
+        self._ramp_start: int | None = None  # stamp of the first sample of the ramp
+        self._intruder: InitialisationError | None = None
+        self._newest: _Sample | None = None
+        self._newest_heard = -math.inf  # s, steady clock
+        self._answered: int | None = None  # stamp of the newest sample that we answered
+        self._last_setpoint = OFF
+        self._own: set[tuple[int, float]] = set()  # setpoints that have not come back to us yet
+        self._foreign_stamp: int | None = None
+        self._foreign_heard = -math.inf
+
+    # What the data path brings.
+
+    def take_ripple(self, stamp: int, current: float, current_rate: float, flux_rate: float) -> None:
+        """Take a ripple sample of time `stamp` (ns); answer it if a ramp runs."""
+        with self._lock:
+            if self._newest is not None and stamp <= self._newest.stamp:
+                if self._ramp is not None:
+                    return  # a sample that comes twice or late is not answered again
+                if stamp < self._newest.stamp:
+                    self._answered = self._foreign_stamp = None  # the electronics' time has started anew
+            self._newest = _Sample(stamp, current, current_rate, flux_rate)
+            self._newest_heard = time.monotonic()
+            if self._ramp is not None:
+                self._answer(self._newest)
+
+    def take_setpoint(self, stamp: int, current: float) -> None:
+        """Take a setpoint (A) seen on the topic, ours or another node's, in answer to sample `stamp`."""
+        with self._lock:
+            if (stamp, current) in self._own:
+                self._own.discard((stamp, current))
+                return
+            self._foreign_stamp = stamp
+            self._foreign_heard = time.monotonic()
+            if self._ramp is not None and self._ramp_start is not None and stamp >= self._ramp_start:
+                self._intruder = CoilBusyError(
+                    f'another node sent a current_setpoint of {current:.3f} A during the ramp; deactivate '
+                    f'mount_control before mount_init is activated'
+                )
+                self._end()
+
+    def give_way(self, sentence: str) -> None:
+        """End the ramp, if one runs, because of what `sentence` says; `run` raises it."""
+        with self._lock:
+            if self._ramp is not None:
+                self._intruder = CoilBusyError(sentence)
+                self._end()
+
+    # What the transition does.
+
+    def forget_streams(self) -> None:
+        """Begin anew after a time without subscriptions: another node may have sent setpoints until now."""
+        with self._lock:
+            self._newest = None
+            self._newest_heard = -math.inf
+            self._foreign_heard = time.monotonic()
+
+    def await_quiet(self, duration: float, ending: threading.Event) -> None:
+        """Return when no other node has sent a setpoint for `duration` (s), or raise `CoilBusyError` soon.
+
+        A node that has just been deactivated is given the time to fall silent.
+        """
+        remaining = self._unquiet_for(duration)
+        if remaining > 0.0:
+            ending.wait(remaining)
+        remaining = self._unquiet_for(duration)
+        if remaining > 0.0:
+            raise CoilBusyError(
+                f'another node sent a current_setpoint {(duration - remaining) * 1e3:.0f} ms ago, needed are '
+                f'{duration * 1e3:.0f} ms without any; deactivate mount_control first'
+            )
+
+    def run(
+        self,
+        ramp: Initialisation,
+        silence_timeout: float,
+        total_timeout: float,
+        ending: threading.Event,
+        objection: Callable[[], str] = str,
+    ) -> None:
+        """Answer samples until `ramp` is finished; an unanswered sample that is already here comes first.
+
+        Raises `InitialisationError` after `silence_timeout` (s) without a sample, after `total_timeout` (s),
+        if another node answers too, if `objection` says something, and if the process is ending. Leaves 0 A
+        behind in every case.
+        """
+        try:
+            self._begin(ramp)
+            start = time.monotonic()
+            while not self._over.wait(_LOOK_PERIOD):
+                self._check_progress(ramp, start, silence_timeout, total_timeout, ending)
+                if reason := objection():
+                    raise DriverRefusalError(reason)
+            if self._intruder is not None:
+                raise self._intruder
+        finally:
+            self.switch_off()
+
+    def switch_off(self) -> None:
+        """End the ramp, if one runs, and send 0 A unless that was our last setpoint."""
+        with self._lock:
+            self._end()
+            if self._last_setpoint != OFF and self._answered is not None:
+                self._send(self._answered, OFF)
+
+    def _begin(self, ramp: Initialisation) -> None:
+        with self._lock:
+            self._over.clear()
+            self._intruder = None
+            self._own.clear()  # those that never came back
+            self._ramp, self._ramp_start = ramp, None
+            if self._newest is not None and self._is_unanswered(self._newest.stamp):
+                self._answer(self._newest)
+
+    def _check_progress(
+        self,
+        ramp: Initialisation,
+        start: float,
+        silence_timeout: float,
+        total_timeout: float,
+        ending: threading.Event,
+    ) -> None:
+        now = time.monotonic()
+        if ending.is_set():
+            raise InitialisationError('the ramp was given up because the process is ending; start it again')
+        if now - max(start, self._newest_heard) > silence_timeout:
+            raise ramp.silence(silence_timeout)
+        if now - start > total_timeout:
+            raise InitialisationError(
+                f'air gap not estimated: {ramp.readings.received} of {ramp.length} ripple samples in '
+                f'{total_timeout:.1f} s; is mount_driver overloaded, or the measurement rate too low?'
+            )
+
+    def _is_unanswered(self, stamp: int) -> bool:
+        answers = [answer for answer in (self._answered, self._foreign_stamp) if answer is not None]
+        return all(stamp > answer for answer in answers)
+
+    def _answer(self, sample: _Sample) -> None:
+        ramp = self._ramp
+        assert ramp is not None
+        if self._ramp_start is None:
+            self._ramp_start = sample.stamp
+        setpoint = ramp.step(sample.stamp, sample.current, sample.current_rate, sample.flux_rate)
+        self._answered = sample.stamp
+        self._send(sample.stamp, setpoint)
+        if ramp.finished:
+            self._end()
+
+    def _send(self, stamp: int, setpoint: float) -> None:
+        self._own.add((stamp, setpoint))
+        self._last_setpoint = setpoint
+        self._publish(stamp, setpoint)
+
+    def _end(self) -> None:
+        self._ramp = None
+        self._over.set()
+
+    def _unquiet_for(self, duration: float) -> float:
+        """Return how much longer (s) it must stay quiet, at most 0 if it has been quiet for long enough."""
+        return self._foreign_heard + duration - time.monotonic()

@@ -1,0 +1,237 @@
+"""The voltage of the bridge during the ramp, and the inductances carried from it to that of the gap curves.
+
+Each ripple sample tells it by itself, with its own stamp: U = n A dB/dt + R i. So neither a supply that
+changes during the ramp nor one that the status tells late or wrongly moves the gaps; that the ripple agrees
+with the status is what `mount_driver` watches.
+"""
+
+import contextlib
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from mount_init.errors import AmbiguousCurveError, SupplyError
+from mount_init.estimation import FloatArray
+from mount_init.parameters import InitParameters
+from mount_init.ramp import Ramp
+from mount_init.readings import Readings
+from mount_models.coil.crossing import CrossingError, find_crossing
+from mount_models.coil.duty import at_calibrated_duty, duty, gap_reluctance, skin_ratio
+from mount_models.coil.gap import OutsideCurveError, ScaledPolynomial, evaluate
+from mount_models.coil.resistance import (
+    CoilResistance,
+    DriftingResistance,
+    measured_resistance,
+    resistance_at,
+    resistance_beside_drift,
+)
+from mount_models.coil.temperature import crossing_at_calibration, inductance_at_calibration
+from mount_models.specimen import Specimen
+
+_BLOCK = 0.02  # s, chosen: of so many readings the median is taken; 1 % of noise leaves 0.3 %
+_STEADY = 0.015  # 1, chosen: five standard deviations of a block
+_AS_CALIBRATED = 0.01  # 1, chosen: so much of R / U is 0.5 um of the contact gap
+_UNCOMPENSATED = 0.08  # 1, chosen: 4 um of the contact gap
+_UNEVEN = 0.01  # of the voltage, chosen: a change that no straight line follows
+_FULL = 0.04  # of the voltage, chosen: what is left of it when the bridge can drive no more
+_PEAK = 5  # samples of each ramp, chosen
+
+
+class RampSupply(NamedTuple):
+    """Lowest and highest voltage of the bridge in the ramp (V), and what that tells of the resistance.
+
+    `whole` is that of a voltage which stays the same. Where it changed, `parts` holds those of the way up and
+    down, none of a part in which it changed too unevenly to tell. `carried`: the inductances were carried to
+    the voltage of the gap curves.
+    """
+
+    lowest: float
+    highest: float
+    steady: bool
+    whole: CoilResistance
+    parts: tuple[DriftingResistance, ...]
+    carried: bool
+
+
+def inductance_at_supply_of_curves(
+    specimen: Specimen, parameters: InitParameters, ramp: Ramp, readings: Readings, celsius: float
+) -> tuple[FloatArray, RampSupply]:
+    """Return L_i (H), shape (N,), as it would be at the voltage of the gap curves, and the supply.
+
+    At that voltage, within 1 % of R / U, they are the readings themselves, to the bit. Raises `SupplyError`,
+    and `AmbiguousCurveError` where no crossing is found. `celsius` may be NaN, if the temperature is unknown.
+    """
+    current, inductance = readings.current, readings.inductance(specimen.turns_area)
+    volts = specimen.turns_area * readings.flux_rate
+    moved = slice(ramp.up.start, ramp.down.stop)
+    whole = measured_resistance(specimen.turns_area, current[moved], readings.flux_rate[moved])
+    driven = slice(ramp.dwell_before.start, ramp.dwell_after.stop)
+    expected = None
+    if specimen.coil_resistance is not None and not math.isnan(celsius):
+        expected = resistance_at(specimen.coil_resistance, celsius)
+
+    resistance = whole.ohm
+    voltage = _smooth(volts + resistance * current, driven, parameters)
+    spread = voltage[driven].max() - voltage[driven].min()
+    steady = bool(spread <= 2.0 * _STEADY * abs(whole.link_voltage))
+    if steady:
+        voltage = np.full(current.size, whole.link_voltage)
+    else:  # a straight line over the current tells no resistance then
+        resistance = expected or specimen.coil_resistance or specimen.heating.resistance
+        voltage = _smooth(volts + resistance * current, driven, parameters)
+    lowest, highest = float(voltage[driven].min()), float(voltage[driven].max())
+    parts = () if steady else _parts(specimen, ramp, readings, lowest)
+    supply = RampSupply(lowest, highest, steady, whole, parts, carried=True)
+    _check_range(specimen, supply)
+
+    at_curves = expected or resistance, specimen.bridge.link_voltage
+    if specimen.temperature is None:
+        _check_without_compensation(specimen, supply)
+        return inductance, supply._replace(carried=False)
+    relative = (resistance / whole.link_voltage) / (at_curves[0] / at_curves[1]) - 1.0
+    if steady and abs(relative) <= _AS_CALIBRATED:
+        return inductance, supply._replace(carried=False)
+    bridge = specimen.bridge
+    ratio = skin_ratio(bridge, duty(resistance, current, voltage), duty(at_curves[0], current, at_curves[1]))
+    return _carried(specimen, parameters, ramp, current, inductance, ratio, celsius), supply
+
+
+def check_reach(specimen: Specimen, readings: Readings, ramp: Ramp) -> None:
+    """Raise `SupplyError` where the supply leaves nothing to drive the current as high as the ramp asks."""
+    peak = slice(ramp.up.stop - _PEAK, ramp.down.start + _PEAK)
+    current, flux_rate = readings.current[peak], readings.flux_rate[peak]
+    if np.isfinite(flux_rate).any():
+        doubt = saturated(specimen, float(np.nanmedian(current)), float(np.nanmedian(flux_rate)))
+        if doubt:
+            raise SupplyError(doubt)
+
+
+def saturated(specimen: Specimen, current: float, flux_rate: float) -> str:
+    """Return why a current (A) cannot rise, by dB/dt (T/s): hardly any voltage is left; else empty."""
+    left = specimen.turns_area * flux_rate
+    held = left + (specimen.coil_resistance or specimen.heating.resistance) * current
+    if current < 0.5 * specimen.current_limit or not 0.0 <= left < _FULL * held:
+        return ''
+    return (
+        f'the supply drives no more than {current:.2f} A through the coil: {left:.2f} V are left to change '
+        f'it, needed are {_FULL * held:.2f} V; charge the battery, let the coil cool down, or lower '
+        'peak_current'
+    )
+
+
+def _smooth(values: FloatArray, driven: slice, parameters: InitParameters) -> FloatArray:
+    """Return the medians of blocks of the driven samples, with straight lines between them."""
+    size = max(5, round(_BLOCK * parameters.sample_rate))
+    starts = range(driven.start, driven.stop - size + 1, size)
+    medians = np.array([_median(values[start : start + size]) for start in starts])
+    known = np.isfinite(medians)
+    latest = np.maximum.accumulate(np.where(known, np.arange(medians.size), int(np.argmax(known))))
+    medians = medians[latest]  # a block without readings has what was known last
+    place = (np.arange(values.size) - starts[0] - 0.5 * (size - 1)) / size
+    place = np.clip(place, 0.0, medians.size - 1.0)
+    before = np.minimum(place.astype(int), max(0, medians.size - 2))
+    after = np.minimum(before + 1, medians.size - 1)
+    return np.asarray(medians[before] + (place - before) * (medians[after] - medians[before]))
+
+
+def _median(values: FloatArray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else math.nan
+
+
+def _check_range(specimen: Specimen, supply: RampSupply) -> None:
+    bridge = specimen.bridge
+    if supply.lowest >= bridge.lowest_voltage and supply.highest <= bridge.highest_voltage:
+        return
+    raise SupplyError(
+        f'voltage of the bridge by the coil ripple ({supply.lowest:.1f} .. {supply.highest:.1f} V) must lie '
+        f'within {bridge.lowest_voltage:g} .. {bridge.highest_voltage:g} V, where the gap curves of '
+        f'{specimen.name} hold; check battery, generator and the ripple measurement, and activate again'
+    )
+
+
+def _parts(
+    specimen: Specimen, ramp: Ramp, readings: Readings, lowest: float
+) -> tuple[DriftingResistance, ...]:
+    found = (
+        resistance_beside_drift(specimen.turns_area, readings.current[part], readings.flux_rate[part])
+        for part in (ramp.up, ramp.down)
+    )
+    return tuple(each for each in found if each.misfit <= _UNEVEN * lowest)
+
+
+def _check_without_compensation(specimen: Specimen, supply: RampSupply) -> None:
+    voltage = specimen.bridge.link_voltage
+    low, high = (1.0 - _UNCOMPENSATED) * voltage, (1.0 + _UNCOMPENSATED) * voltage
+    if supply.lowest < low or supply.highest > high:
+        raise SupplyError(
+            f'voltage of the bridge by the coil ripple ({supply.lowest:.1f} .. {supply.highest:.1f} V) must '
+            f'lie within {low:.1f} .. {high:.1f} V, as {specimen.name} has no temperature compensation, '
+            'which also tells what the supply does; calibrate at two temperatures'
+        )
+
+
+def _carried(
+    specimen: Specimen,
+    parameters: InitParameters,
+    ramp: Ramp,
+    current: FloatArray,
+    inductance: FloatArray,
+    ratio: FloatArray,
+    celsius: float,
+) -> FloatArray:
+    """Return the inductances (H) at the duty of the curves, in the dwells and in the ramp by their gaps."""
+    result = inductance.copy()
+    moved = slice(ramp.up.start, ramp.down.stop)
+    for dwell in (ramp.dwell_before, ramp.dwell_after):
+        gap = _likely_rest_gap(specimen, float(np.nanmedian(inductance[dwell])), celsius)
+        result[dwell] = at_calibrated_duty(inductance[dwell], _reluctance(specimen, gap), ratio[dwell])
+    gap = specimen.gap_curves.crossing_current_of_gap.centre
+    for _ in range(2):
+        result[moved] = at_calibrated_duty(inductance[moved], _reluctance(specimen, gap), ratio[moved])
+        gap = _likely_crossing_gap(specimen, parameters, current[ramp.up], result[ramp.up], celsius)
+    result[moved] = at_calibrated_duty(inductance[moved], _reluctance(specimen, gap), ratio[moved])
+    return result
+
+
+def _reluctance(specimen: Specimen, gap: float) -> float:
+    assert specimen.temperature is not None
+    resistance = specimen.coil_resistance or specimen.heating.resistance
+    return gap_reluctance(
+        specimen.bridge, specimen.gap_curves, specimen.temperature, resistance, specimen.rest_current, gap
+    )
+
+
+def _likely_rest_gap(specimen: Specimen, inductance: float, celsius: float) -> float:
+    assert specimen.temperature is not None
+    if not math.isnan(celsius):
+        with contextlib.suppress(OutsideCurveError):  # `rest_gap` tells
+            inductance = inductance_at_calibration(
+                specimen.temperature, specimen.gap_curves, inductance, celsius
+            )
+    return _within(specimen.gap_curves.gap_of_inductance, inductance)
+
+
+def _likely_crossing_gap(
+    specimen: Specimen,
+    parameters: InitParameters,
+    current: FloatArray,
+    inductance: FloatArray,
+    celsius: float,
+) -> float:
+    assert specimen.temperature is not None
+    try:
+        found = find_crossing(
+            current, inductance, specimen.crossing_inductance, parameters.crossing_half_width
+        ).current
+    except CrossingError as error:
+        raise AmbiguousCurveError(str(error)) from error
+    if not math.isnan(celsius):
+        with contextlib.suppress(OutsideCurveError):
+            found = crossing_at_calibration(specimen.temperature, specimen.gap_curves, found, celsius)
+    return _within(specimen.gap_curves.gap_of_crossing_current, found)
+
+
+def _within(curve: ScaledPolynomial, value: float) -> float:
+    return float(evaluate(curve, min(max(value, curve.low), curve.high)))

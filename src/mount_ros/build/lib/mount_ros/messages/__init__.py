@@ -1,0 +1,1 @@
+"""Messages as numbers and back, without an executor."""

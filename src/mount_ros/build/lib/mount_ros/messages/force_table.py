@@ -1,0 +1,114 @@
+"""The current-force table as a `std_msgs/Float64MultiArray`, built and read in this one file.
+
+Row-major, shape (2, N). Dimension 0: label `rows: current (A), normal_force (N)`; dimension 1: label
+`activation <stamp>`, the stamp in ns of the `air_gap` message that belongs to the table.
+"""
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:  # loading messages and middleware takes a fifth of a second, which readers do without
+    from std_msgs.msg import Float64MultiArray
+
+from mount_models.sampling import HIGHEST_CURRENT
+
+FloatArray = npt.NDArray[np.float64]
+
+_ROWS_LABEL = 'rows: current (A), normal_force (N)'
+_ACTIVATION_LABEL = 'activation '
+
+
+class ForceTableMessageError(ValueError):
+    """A current-force table message holds no usable table; the text says why and the remedy."""
+
+
+class ForceTable(NamedTuple):
+    """What a message holds: `stamp` (ns) of its air_gap, `current` (A), `normal_force` (N), shape (N,)."""
+
+    stamp: int
+    current: FloatArray
+    normal_force: FloatArray
+
+
+def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
+    """Return the message of a table of shape (2, N), rows current (A) and normal force (N).
+
+    `stamp` (ns) is that of the `air_gap` message. Raises `ForceTableMessageError` for a table
+    that `from_message` would refuse.
+    """
+    from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+    rows = np.asarray(table, float)
+    if rows.ndim != 2:
+        raise _refusal(f'must have 2 rows of N columns; instead received an array of shape {rows.shape}')
+    _check(rows)
+    count = int(rows.shape[1])
+    dimensions = [
+        MultiArrayDimension(label=_ROWS_LABEL, size=2, stride=2 * count),
+        MultiArrayDimension(label=f'{_ACTIVATION_LABEL}{stamp}', size=count, stride=count),
+    ]
+    return Float64MultiArray(layout=MultiArrayLayout(dim=dimensions), data=rows.ravel().tolist())
+
+
+def from_message(message: 'Float64MultiArray') -> ForceTable:
+    """Return activation stamp and table of `message`, or raise `ForceTableMessageError`."""
+    dimensions = list(message.layout.dim)
+    if len(dimensions) != 2 or dimensions[0].size != 2:
+        sizes = [dimension.size for dimension in dimensions]
+        raise _refusal(f'must have dimensions 2 x N; instead received {sizes}')
+    if dimensions[0].label != _ROWS_LABEL:
+        raise _refusal(f'must have the label {_ROWS_LABEL!r}; instead received {dimensions[0].label!r}')
+    count = dimensions[1].size
+    offset = message.layout.data_offset
+    if offset != 0 or len(message.data) != 2 * count or dimensions[1].stride != count:
+        raise _refusal(
+            f'must hold 2 x {count} numbers, row by row; instead it holds {len(message.data)} with stride '
+            f'{dimensions[1].stride} and offset {offset}'
+        )
+    rows = np.array(message.data, float).reshape(2, count)
+    _check(rows)
+    return ForceTable(_activation(dimensions[1].label), rows[0], rows[1])
+
+
+def from_bytes(raw: bytes) -> ForceTable:
+    """Like `from_message`, from the serialised message that a data path hands over."""
+    from rclpy.serialization import deserialize_message
+    from std_msgs.msg import Float64MultiArray
+
+    return from_message(deserialize_message(raw, Float64MultiArray))
+
+
+def _activation(label: str) -> int:
+    digits = label.removeprefix(_ACTIVATION_LABEL)
+    if digits == label or not (digits.isascii() and digits.isdigit()):
+        raise _refusal(
+            f'must name its activation as "{_ACTIVATION_LABEL}<stamp ns>"; instead received {label!r}'
+        )
+    return int(digits)
+
+
+def _check(rows: FloatArray) -> None:
+    if rows.shape[0] != 2 or rows.shape[1] < 2:
+        raise _refusal(f'must have 2 rows of at least 2 columns; instead received shape {rows.shape}')
+    if not np.isfinite(rows).all():
+        column = int(np.argwhere(~np.isfinite(rows))[0][1])
+        raise _refusal(f'must be finite; column {column} is {rows[0, column]} A, {rows[1, column]} N')
+    for name, unit, row in zip(('current', 'normal force'), ('A', 'N'), rows.tolist(), strict=True):
+        for column, (one, following) in enumerate(pairwise(row)):
+            if not following > one:
+                raise _refusal(
+                    f'must rise strictly; {name} at columns {column} and {column + 1} is '
+                    f'{one:g} and {following:g} {unit}'
+                )
+    low, high = float(rows[0, 0]), float(rows[0, -1])
+    if low < 0.0 or high > HIGHEST_CURRENT:
+        raise _refusal(
+            f'must keep the current within 0 .. {HIGHEST_CURRENT:g} A; it spans {low:g} .. {high:g} A'
+        )
+
+
+def _refusal(what: str) -> ForceTableMessageError:
+    return ForceTableMessageError(f'current_force_table {what}; activate mount_init again')

@@ -1,0 +1,1 @@
+"""Lifecycle nodes that fail closed: parameters, diagnostics, processes."""

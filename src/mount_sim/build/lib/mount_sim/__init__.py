@@ -1,0 +1,1 @@
+"""The far end of the CAN bus: electronics, actuator, friction contact and vehicle, simulated."""

@@ -1,0 +1,1 @@
+"""The electronics' end of the CAN bus: sensors, current loop, faults."""

@@ -1,0 +1,1 @@
+"""What can go wrong in electronics, sensors, coil, pads and on the bus; several faults at once."""

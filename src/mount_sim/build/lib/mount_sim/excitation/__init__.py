@@ -1,0 +1,1 @@
+"""What shakes the plant: scenarios, roads, recorded accelerations."""

@@ -1,0 +1,255 @@
+"""The simulated electronics at work on the bus: in real time, or in lock-step with the answers."""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from mount_driver.protocol import Status
+from mount_ros.timing import LatencyHistogram
+from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
+from mount_sim.electronics.electronics import ElectronicsParameters, status_every
+from mount_sim.plant.simulated_car import CarMount
+from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
+
+LOCKSTEP_WAIT = 0.1
+"""Seconds: how often a loop in lock-step looks whether it shall end."""
+
+_REMEMBERED = 1024  # samples whose sending time is kept
+_NS = 1000  # ns per us
+_DISCHARGED = 0.01  # A, chosen: a coil with less carries no current
+_DISCHARGE_LIMIT = 0.1  # s, chosen: the setpoint timeout, then several times what a sound coil needs
+
+_FORGOTTEN = 0.01  # chosen: of the longest time that the work took, from one sample to the next
+_RESERVE = 1.5  # chosen: times the work's longest time are kept for it
+
+
+class NoAnswerError(RuntimeError):
+    """In lock-step a sample was not answered in time."""
+
+
+def until_ending(ending: threading.Event, discharged: Callable[[], bool]) -> Iterator[None]:
+    """Yield for each sample until `ending` is set and the coils are `discharged`, or 0.1 s after `ending`.
+
+    Electronics outlive the graph: its last setpoint is followed, and the truth shows that the current goes.
+    """
+    while not ending.is_set():
+        yield
+    limit = time.monotonic() + _DISCHARGE_LIMIT
+    while not discharged() and time.monotonic() < limit:
+        yield
+
+
+@dataclass
+class LoopFigures:
+    """What happened on the bus so far; times in s."""
+
+    samples: int = 0
+    answered: int = 0
+    overruns: int = 0
+    wall_time: float = 0.0
+    latency: LatencyHistogram = field(default_factory=LatencyHistogram)
+    failure: str = ''
+    beyond_range: BeyondRange = field(default_factory=BeyondRange)
+
+
+class OwnWork:
+    """How long the simulator's own work on a sample takes, which waits until the graph has answered.
+
+    Electronics have a processor of their own; with two of them the simulator would take one from the graph.
+    """
+
+    def __init__(self, longest: float):
+        """`longest` in s: what is to be expected at first."""
+        self._longest = longest
+        self._begin = 0.0
+
+    def latest_begin(self, end: float) -> float:
+        """Return when it must begin so that it is done at `end` (s)."""
+        return end - _RESERVE * self._longest
+
+    def __enter__(self) -> None:
+        self._begin = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        taken = time.monotonic() - self._begin
+        self._longest = max(taken, (1.0 - _FORGOTTEN) * self._longest)
+
+
+class ElectronicsLoop:
+    """Measures, sends, lets the plant go on, takes setpoints over; `publish` shows each sample's truth."""
+
+    def __init__(
+        self,
+        mount: SimulatedMount | CarMount,
+        can_end: CanEnd,
+        electronics: ElectronicsParameters,
+        publish: Callable[[int], None],
+    ):
+        self._mount = mount
+        self._can_end = can_end
+        self._status_every = status_every(mount.sample_rate)
+        self._electronics = electronics
+        self._publish = publish
+        self._sent_at = [math.nan] * _REMEMBERED
+        self._asked: int | None = None  # lock-step: the sample that waits for its answer
+        self._answer: ReceivedSetpoint | None = None
+        self._taken: tuple[float | None, int] = (None, 0)  # current (A), and how many samples late
+        self._counted = 0  # the newest sample as the electronics count it, not yet cut to its width
+        self._asked_at = 0.0
+        self._answered_first = math.nan
+        self._failed_told = 0  # setpoint frames that had failed their check by the last status
+        self._beyond_told = 0  # samples beyond the sensor's range, when the last status was sent
+        self.figures = LoopFigures(beyond_range=mount.beyond_range)
+        self.last_latency = math.nan
+
+    def run_in_real_time(self, ending: threading.Event) -> None:
+        """Sample by the electronics' clock until `ending` is set and the coil is discharged.
+
+        So it goes on behind the end of the run: electronics do not fall silent when a drive is over; if they
+        did, the control would rightly report it.
+        """
+        period = 1.0 / self._mount.sample_rate / (1.0 + self._electronics.clock_drift)
+        own = OwnWork(period)
+        begin = time.monotonic()
+        for _ in until_ending(ending, self.discharged):
+            self.send_sample()
+            self.wait_for_answer(own.latest_begin(begin + (self._mount.sample + 1) * period))
+            with own:
+                self.go_on()
+            self.figures.wall_time = time.monotonic() - begin
+            remaining = begin + self._mount.sample * period - time.monotonic()
+            if remaining > 0.0:
+                time.sleep(remaining)
+            else:
+                self.figures.overruns += 1  # the next sample follows at once: none is skipped
+
+    def step_in_real_time(self) -> None:
+        """Take the next sample with the newest setpoint, whether or not one has come."""
+        self.send_sample()
+        self.go_on()
+
+    def discharged(self) -> bool:
+        """Whether the coil carries no current any more."""
+        return abs(self._mount.truth['coil_current']) < _DISCHARGED
+
+    def send_sample(self) -> None:
+        """Send the next sample, and take the newest setpoint, if one has come, for the time from it on."""
+        self._taken = self._send(self._can_end.newest())
+
+    def wait_for_answer(self, end: float) -> None:
+        """Return when a frame has come, or at `end` (s, steady clock)."""
+        self._can_end.wait_for_frame(max(0.0, end - time.monotonic()))
+
+    def go_on(self) -> None:
+        """Let the plant go on to the next sample, and show the truth of the last."""
+        self._publish(self._mount.sample)
+        self._mount.advance(*self._taken)
+        self.figures.samples += 1
+
+    def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
+        """Sample as fast as the answers come; raise `NoAnswerError` after `patience` s without one."""
+        while not self.finished and not ending.is_set():
+            self.step_in_lockstep(patience, LOCKSTEP_WAIT)
+
+    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
+        """Take the next sample if the last one is answered within `wait` s; return whether it was.
+
+        Raises `NoAnswerError` when no answer came for `patience` s; the first sample waits for the
+        activation of the node that answers it.
+        """
+        if self._asked is not None:
+            answer = self._can_end.wait_for_answer(self._asked, wait)
+            if answer is None:
+                self._check_patience(self._asked, patience)
+                return False
+            self._take_answer(answer)
+        if self._mount.finished:
+            return False
+        answer, self._answer = self._answer, None
+        self._taken = self._send(answer)
+        self.go_on()
+        self._asked, self._asked_at = self._counted, time.monotonic()
+        return True
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run is over, in lock-step with its last sample answered."""
+        return self._mount.finished and self._asked is None
+
+    def _send(self, received: ReceivedSetpoint | None) -> tuple[float | None, int]:
+        """Send the next sample; return what `received` lets the plant take over from it on."""
+        mount, number = self._mount, self._mount.sample
+        reading = mount.measure()
+        microseconds = self._count(number)
+        taken = self._valid(received)
+        frames = [
+            self._can_end.measurement_frame(
+                self._counted, microseconds, reading, enabled=mount.driver_on, unheard=not mount.enabled
+            )
+        ]
+        if number % self._status_every == 0:
+            frames.append(self._can_end.status_frame(mount.faults.status(self._status())))
+        if mount.faults.present:
+            frames = mount.faults.on_bus(frames)
+        self._sent_at[self._counted % _REMEMBERED] = time.time()
+        for frame in frames:
+            self._can_end.send_frame(frame)
+        return taken
+
+    def _count(self, number: int) -> int:
+        """Note sample `number` as the electronics count it; return their clock in us."""
+        faults, microseconds = self._mount.faults, number * self._mount.sample_time // _NS
+        self._counted = number
+        if faults.present:
+            self._counted, microseconds = faults.counted(number, microseconds)
+            if faults.restarts:
+                self._can_end.restart()
+                self._mount.forget()
+        return microseconds
+
+    def _valid(self, received: ReceivedSetpoint | None) -> tuple[float | None, int]:
+        """Return the current (A) to take over, None if there is none, and how many samples late it is."""
+        if received is None or self._mount.faults.deaf:
+            return None, 0
+        late = received.late(self._counted)
+        if late >= self._mount.patience:
+            return None, 0  # an answer to a sample of the past must not keep the coil on
+        self._note(received)
+        return received.setpoint.current if received.setpoint.enable else 0.0, late
+
+    def _note(self, received: ReceivedSetpoint) -> None:
+        if not received.setpoint.enable:
+            return
+        self.figures.answered += 1
+        sent = self._sent_at[received.setpoint.answered_counter % _REMEMBERED]
+        self.last_latency = received.arrival - sent
+        if self.last_latency == self.last_latency:  # the bus tells when its frames arrive
+            self.figures.latency.add(self.last_latency)
+
+    def _take_answer(self, answer: ReceivedSetpoint) -> None:
+        now = time.monotonic()
+        if math.isnan(self._answered_first):
+            self._answered_first = now
+        self.figures.wall_time = now - self._answered_first
+        self._asked, self._answer = None, answer
+        if self._mount.finished:
+            self._note(answer)
+
+    def _check_patience(self, number: int, patience: float) -> None:
+        first = math.isnan(self._answered_first)
+        if not first and time.monotonic() - self._asked_at >= patience:
+            at = number / self._mount.sample_rate
+            raise NoAnswerError(f'sample {number} ({at:.3f} s) was not answered within {patience:g} s')
+
+    def _status(self) -> Status:
+        failed, self._failed_told = self._failed_told, self._can_end.failed_setpoints
+        beyond, self._beyond_told = self._beyond_told, self._mount.beyond_range.samples
+        return Status(
+            displacement_sensor=self._beyond_told > beyond,
+            supply_voltage=self._electronics.supply_voltage,
+            coil_temperature_celsius=self._electronics.coil_temperature,
+            setpoint_timeout=not self._mount.enabled,
+            e2e_error=self._failed_told > failed,
+        )

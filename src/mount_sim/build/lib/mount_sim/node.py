@@ -1,0 +1,257 @@
+"""ROS 2 node of the simulator: parameters in, CAN frames and the rack's instruments out."""
+
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from functools import partial
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from std_srvs.srv import SetBool
+
+from mount_driver.bus import open_bus
+from mount_driver.can_library import can
+from mount_driver.parameters import DriverParameters
+from mount_models.arithmetic.compiled import compilation_told
+from mount_models.quantity import ParameterError, flattened
+from mount_ros import topics
+from mount_ros.data_path import DataPath
+from mount_ros.messages.level_imu import level_imu
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
+from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.parameters import declare, read
+from mount_ros.nodes.process import run_node
+from mount_ros.nodes.real_time import LoopTiming, RealTimeThreads
+from mount_ros.private_rclpy import given_at_start
+from mount_sim.car_loop import CarLoop
+from mount_sim.diagnosis import Counted, car_verdict, counted, verdict
+from mount_sim.electronics.can_end import CanEnd
+from mount_sim.electronics.faults.schedule import Faults, injected_faults, texts_of_mount
+from mount_sim.excitation.scenario import build_excitation
+from mount_sim.loop import ElectronicsLoop, NoAnswerError
+from mount_sim.parameters import NodeParameters, SimParameters
+from mount_sim.plant.places import general_name, mount_names, values_of_mount
+from mount_sim.plant.simulated_car import CarMount, SimulatedCar, mount_parameters
+from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
+
+INJECT = 'inject'
+"""The parameter whose faults the service `~/inject_fault` begins."""
+
+_ALONE = ''  # name of the mount where there is one
+
+
+class MountSim(SafeLifecycleNode):
+    """Stands in for the hardware: everything behind the CAN connectors of one mount or of several."""
+
+    run_time_parameters = frozenset({INJECT})
+    real_time_threads = RealTimeThreads(frozenset({'electronics'}))
+
+    def __init__(self, **arguments):
+        super().__init__('mount_sim', **arguments)
+        declare(self, SimParameters())
+        declare(self, DriverParameters(), only=('interface', 'channel', 'port'))
+        declare(self, NodeParameters())
+        self.create_service(SetBool, '~/inject_fault', self._inject, callback_group=self.transitions)
+        self._own = _declare_own(self)
+        self._ending = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._loop: ElectronicsLoop | CarLoop | None = None
+        self._loops: dict[str, ElectronicsLoop] = {}
+        self._can_ends: list[CanEnd] = []
+        self._counted: SlidingWindow[dict[str, Counted]] = SlidingWindow({})
+
+    def configure(self) -> None:
+        self._settings = read(self, SimParameters())
+        self._values: dict[str, Any] = flattened(self._settings)
+        for name in ('channel', 'port', *self._own):
+            self._values[name] = self.get_parameter(name).value
+        self._names = mount_names(self._settings.mounts) or (_ALONE,)
+        with compilation_told(self.get_logger().info):
+            self._excitation = build_excitation(self._settings)
+            self._prepare_mounts()
+        path = self.open_data_path()
+        self._instruments = {name: _Instruments(path, name) for name in self._names}
+        path.start()
+        self._path = path
+
+    def activate(self) -> None:
+        interface = self.get_parameter('interface').value
+        if any(mount.sample for mount in self._mounts.values()):
+            self._prepare_mounts()
+        self._loops = {}
+        for name, mount in self._mounts.items():
+            can_end = CanEnd(self._open_bus(interface, name), self._settings.sample_rate)
+            self._can_ends.append(can_end)
+            self._loops[name] = ElectronicsLoop(
+                mount,
+                can_end,
+                mount_parameters(self._values, name).electronics,
+                partial(self._publish, name),
+            )
+        drift = self._settings.electronics.clock_drift
+        self._loop = self._loops.get(_ALONE) or CarLoop(self._loops, drift, self._settings.sample_rate)
+        self._counted = SlidingWindow({})
+        self._ending.clear()
+        self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
+        self._patience = self.get_parameter('answer_patience').value
+        if self.lockstep and interface == 'virtual':
+            # Both ends of the bus are in this process: the answering node works in the data thread.
+            self._path.add_poll(self._step)
+        else:
+            self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
+            self._thread.start()
+
+    def deactivate(self) -> None:
+        self._ending.set()
+        self._path.remove_polls()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        while self._can_ends:
+            self._can_ends.pop().close()
+
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        for texts in self._injected(values[INJECT]).values():
+            injected_faults(texts)
+
+    def judge(self) -> Verdict:
+        figures = {name: loop.figures for name, loop in self._loops.items()}
+        run = next(iter(self._mounts.values())).run
+        now = {name: counted(each) for name, each in figures.items()}
+        earlier = self._counted.earlier(time.monotonic(), now)
+        if _ALONE in figures:
+            return verdict(figures[_ALONE], run, earlier.get(_ALONE, Counted()), lockstep=self.lockstep)
+        return car_verdict(figures, run, earlier, lockstep=self.lockstep)
+
+    def _injected(self, text: str) -> dict[str, str]:
+        """Return the faults to inject by mount."""
+        parts = [part.strip() for part in text.split(',')]
+        return {name: ', '.join(texts_of_mount(parts, name, self._names)) for name in self._names}
+
+    def _inject(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Begin the faults that `inject` names, or end all that were begun so."""
+        try:
+            if not self.active:
+                raise ParameterError('mount_sim is not active: activate it first')
+            told = self._injected(str(self.get_parameter(INJECT).value))
+            said = []
+            for name, mount in self._mounts.items():
+                if told[name] or not request.data or name == _ALONE:
+                    what = mount.faults.inject(told[name]) if request.data else mount.faults.end_injected()
+                    said.append(f'{name}: {what}' if name else what)
+            response.message, response.success = '; '.join(said), True
+            self.get_logger().warning(f'injected faults {response.message}')
+        except ParameterError as error:
+            response.message = str(error)
+        return response
+
+    def loop_timing(self) -> LoopTiming:
+        figures = [loop.figures for loop in self._loops.values()]
+        if not figures:
+            return LoopTiming()
+        return LoopTiming(min(each.samples for each in figures), max(each.overruns for each in figures))
+
+    def _open_bus(self, interface: str, name: str) -> can.BusABC:
+        """Return the bus of a mount; no two mounts may have the same."""
+        own = {other: values_of_mount(self._values, other) for other in self._names}
+        bus = own[name]['channel'], own[name]['port']
+        for other in self._names:
+            if other != name and (own[other]['channel'], own[other]['port']) == bus:
+                raise ParameterError(
+                    f'the mounts {other} and {name} have one CAN bus (channel {bus[0]}, port {bus[1]}): give '
+                    f'each its own, as in mount_{name}.port'
+                )
+        return open_bus(interface, bus[0], port=bus[1])
+
+    def _prepare_mounts(self) -> None:
+        self._mounts = self._simulated(self._settings.faults)
+        for mount in self._simulated(()).values():
+            mount.measure()  # a rehearsal: loads the compiled plant before simulated time begins
+            mount.advance(0.0)
+
+    def _simulated(self, faults: Sequence[str]) -> dict[str, SimulatedMount | CarMount]:
+        if _ALONE in self._names:
+            settings = self._settings
+            present = Faults(faults, settings.seed, settings.sample_rate)
+            mount = SimulatedMount(
+                settings.plant, self._excitation, settings.seed, present, settings.sample_rate
+            )
+            return {_ALONE: mount}
+        return {**SimulatedCar({**self._values, 'faults': faults}, self._excitation).mounts}
+
+    def _run(self) -> None:
+        assert self._loop is not None
+        try:
+            if self.lockstep:
+                self._loop.run_in_lockstep(self._ending, self._patience)
+            else:
+                self._loop.run_in_real_time(self._ending)
+        except Exception as error:  # the border of the thread, whatever the reason
+            self._fail(error)
+
+    def _step(self) -> bool:
+        loop = self._loop
+        if loop is None or any(each.figures.failure for each in self._loops.values()):
+            return False
+        try:
+            return loop.step_in_lockstep(self._patience)
+        except Exception as error:  # the same
+            self._fail(error)
+            return False
+
+    def _fail(self, error: Exception) -> None:
+        known = isinstance(error, (NoAnswerError, DivergedError, OSError, can.CanError))
+        sentence = str(error) if known else f'the run has ended: {type(error).__name__}: {error}'
+        for loop in self._loops.values():
+            loop.figures.failure = sentence
+        self.get_logger().error(sentence)
+
+    def _publish(self, name: str, number: int) -> None:
+        mount = self._mounts[name]
+        truth = mount.truth
+        if not self.lockstep:
+            truth['setpoint_latency'] = self._loops[name].last_latency
+        stamp = self._time_zero + number * mount.sample_time
+        self._instruments[name].publish(stamp, truth, mount.truth_bytes)
+
+
+def _declare_own(node: SafeLifecycleNode) -> list[str]:
+    """Declare the parameters of single mounts that were given at the start and return their names."""
+    own = []
+    for name in sorted(given_at_start(node)):
+        try:
+            general = general_name(name)
+        except ParameterError:
+            continue  # it is refused as unknown when the node is configured
+        if general != name and node.has_parameter(general):
+            node.declare_parameter(
+                name, node.get_parameter(general).value, deepcopy(node.describe_parameter(general))
+            )
+            own.append(name)
+    return own
+
+
+class _Instruments:
+    """Publishes truth, acceleration and force of one mount, the one `name` of several or the only one."""
+
+    def __init__(self, path: DataPath, name: str = ''):
+        self._truth = ScalarsLayout(topics.SIM_TRUTH)
+        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
+        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        self._send_truth = path.sender(topics.SIM_TRUTH, name)
+        self._send_acceleration = path.sender(topics.SIM_CHASSIS_ACCELERATION, name)
+        self._send_force = path.sender(topics.SIM_MOUNT_FORCE, name)
+
+    def publish(self, stamp: int, truth: np.void, truth_bytes: bytes) -> None:
+        """Publish what was true at the time `stamp` (ns)."""
+        self._send_truth(self._truth.pack_record(stamp, truth_bytes))
+        self._send_acceleration(self._acceleration.pack(stamp, truth['chassis_acceleration']))
+        self._send_force(self._force.pack(stamp, truth['mount_force']))
+
+
+def main() -> None:
+    """Run the node as a process."""
+    run_node(MountSim)

@@ -1,0 +1,1 @@
+"""The plant behind the electronics and its laws: coil, actuator, mount, vehicle."""

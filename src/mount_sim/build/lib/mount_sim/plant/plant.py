@@ -1,0 +1,306 @@
+"""The simulated truth in one compiled step: coil, actuator, the mount, and what moves around them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
+from mount_models.quantity import checked
+from mount_ros.topics import SIM_TRUTH
+from mount_sim.electronics.electronics import ElectronicsParameters, advance_current, read_sensors
+from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
+from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.closing import ClosingMechanics, checked_closing, closed_state
+from mount_sim.plant.elastomer import branch_step, elastomer_force
+from mount_sim.plant.energy import ACCOUNT, book_step, new_account
+from mount_sim.plant.friction import full_step
+from mount_sim.plant.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
+from mount_sim.plant.mounts import Contents, SeatedMount
+from mount_sim.plant.reluctance import ReluctanceActuator, gap_flux_density
+from mount_sim.plant.ripple import RippleCoil
+from mount_sim.plant.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
+
+_PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
+_BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
+_VEHICLE = int(Seat.VEHICLE)
+
+
+class Plant(NamedTuple):
+    """All parameters of the simulated truth; none of them is known to the controller."""
+
+    actuator: ReluctanceActuator = ReluctanceActuator()
+    coil: RippleCoil = RippleCoil()
+    temperature: TemperatureCoefficients = TemperatureCoefficients()
+    mechanics: ClosingMechanics = ClosingMechanics()
+    friction: FrictionCoefficients = FrictionCoefficients()
+    contact: FrictionContact = FrictionContact()
+    vehicle: Vehicle = Vehicle()
+    engine: Engine = Engine()
+    electronics: ElectronicsParameters = ElectronicsParameters()
+    hydromount: Hydromount = Hydromount()
+    mount: SeatedMount = SeatedMount()
+
+
+PLANT = record_dtype(Plant)
+"""The plant's parameters in compiled code."""
+
+STATE = record_type(
+    [
+        ('vehicle', VEHICLE_STATE),
+        ('engine', ENGINE_STATE),
+        ('hydromount', HYDROMOUNT_STATE),
+        *(
+            (name, 'f8')
+            for name in (
+                'current',
+                'wanted_current',
+                'gap',
+                'normal_force',
+                'slider_position',
+                'deflection',
+                'displacement',
+                'velocity',
+                'slow_force',
+                'middle_force',
+                'fast_force',
+                'friction_force',
+                'mount_force',
+                'chassis_acceleration',
+                'road_height',
+            )
+        ),
+    ]
+)
+"""What the plant remembers from step to step, SI."""
+
+TRUTH = record_type([(name, 'f8') for name in SIM_TRUTH.names])
+"""What no sensor sees, SI: the scalars of the topic `sim/truth` in its order."""
+
+
+class Memory(NamedTuple):
+    """Bytes of parameters and state, the seat's number, step of the plant in s."""
+
+    plant: NDArray[np.uint8]
+    state: NDArray[np.uint8]
+    seat: int
+    step_time: float
+
+
+class PlantSimulation:
+    """The plant with its state; `read` looks at it, `advance` moves it on by some steps."""
+
+    def __init__(self, plant: Plant, seat: Seat, step_time: float):
+        plant = Plant(*(checked(part) for part in plant))
+        checked_closing(plant.mechanics, plant.actuator)
+        self._plant = record_bytes(_warm(plant))
+        self._seat = int(seat)
+        self._step_time = step_time
+        self._state = np.zeros(1, STATE).view(np.uint8)
+        self._truth = np.zeros(1, TRUTH).view(np.uint8)
+        self._truth_record = self._truth.view(TRUTH)[0]
+        self._state.view(STATE)['gap'] = plant.mechanics.rest_gap
+        self._account = new_account().view(np.uint8)
+
+    @property
+    def memory(self) -> Memory:
+        """What the compiled `read` and `advance` need, for a compiled loop that calls them."""
+        return Memory(self._plant, self._state, self._seat, self._step_time)
+
+    def stand_in(self, plant: NDArray[np.uint8], state: NDArray[np.uint8]) -> None:
+        """Have parameters and state in these bytes from now on, where those of several mounts stand."""
+        plant[:], state[:] = self._plant, self._state
+        self._plant, self._state = plant, state
+
+    @property
+    def truth(self) -> np.void:
+        """The truth at the last `read`."""
+        return self._truth_record
+
+    @property
+    def truth_bytes(self) -> bytes:
+        """The truth at the last `read` as little-endian float64 numbers."""
+        return self._truth.tobytes()
+
+    def read(self, noise: NDArray[np.float64]) -> tuple[float, float, float, float]:
+        """Return the sensors' readings (displacement, current, di/dt, dB/dt; SI) and note the truth."""
+        return read(self._plant, self._state, self._truth, noise)
+
+    def advance(
+        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
+    ) -> None:
+        """Advance by one step for each of the excitation's `values`, with a current setpoint in A.
+
+        `engine_forces` (N, upwards) act on the engine in the same steps; a bench holds the engine.
+        """
+        advance(self._plant, self._state, self._seat, values, engine_forces, wanted_current, self._step_time)
+
+    def change(self, plant: Plant) -> None:
+        """Go on from the present state with other parameters; a fault's need not lie within their ranges."""
+        self._plant[:] = record_bytes(_warm(plant))
+
+    @property
+    def account(self) -> np.void:
+        """The energy since the first `advance_with_books`, a record of `mount_sim.plant.energy.ACCOUNT`."""
+        return self._account.view(ACCOUNT)[0]
+
+    def advance_with_books(
+        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
+    ) -> None:
+        """Advance as `advance` does, to the bit, and keep account of the energy; for a vehicle only."""
+        if self._seat != int(Seat.VEHICLE):
+            raise ValueError(
+                'energy is accounted for in a vehicle only: a rack or a given acceleration has no limit '
+                'to what it gives; choose the scenario motorway or sweep'
+            )
+        advance_with_books(
+            self._plant, self._state, self._account, values, engine_forces, wanted_current, self._step_time
+        )
+
+
+def _warm(plant: Plant) -> Plant:
+    """Return the plant with coil and core at their temperature."""
+    celsius = plant.electronics.coil_temperature
+    return plant._replace(coil=coil_at(plant.coil, plant.temperature, celsius))
+
+
+@compiled
+def read(plant, state, truth, noise):
+    """Return sensor readings and fill `truth`; arguments are the bytes of records, `noise` as in `Noise`.
+
+    The displacement is NaN where anything of the state is no finite number.
+    """
+    law, now, seen = plant.view(PLANT)[0], state.view(STATE)[0], truth.view(TRUTH)[0]
+    seen.displacement = now.displacement
+    seen.velocity = now.velocity
+    seen.coil_current = now.current
+    seen.current_setpoint = now.wanted_current
+    seen.gap = now.gap
+    seen.flux_density = gap_flux_density(law.actuator, now.current, now.gap)
+    seen.normal_force = now.normal_force
+    seen.friction_force = now.friction_force
+    seen.mount_force = now.mount_force
+    seen.road_height = now.road_height
+    seen.engine_displacement = now.vehicle.engine_height
+    seen.chassis_displacement = now.vehicle.chassis_height
+    seen.chassis_acceleration = now.chassis_acceleration
+    seen.rest_gap = law.mechanics.rest_gap
+    seen.contact_gap = law.mechanics.contact_gap
+    seen.setpoint_latency = np.nan
+    displacement = now.displacement if _finite(now) else np.nan
+    return read_sensors(
+        law.electronics, law.coil, law.actuator, displacement, now.velocity, now.current, now.gap, noise
+    )
+
+
+@compiled
+def _finite(now):
+    motion = now.displacement + now.velocity + now.chassis_acceleration + now.vehicle.wheel_height
+    forces = now.mount_force + now.friction_force + now.normal_force + now.deflection
+    return np.isfinite(motion + forces + now.current + now.gap)
+
+
+@compiled
+def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
+    """Advance the state by one step of `dt` s for each excitation value; see `PlantSimulation.advance`."""
+    law, now = plant.view(PLANT)[0], state.view(STATE)[0]
+    now.wanted_current = wanted_current
+    for index in range(len(values)):
+        advance_magnet(law, now, dt)
+        if seat == _BENCH:
+            _advance_bench(law, now, values[index], dt)
+        elif seat == _ACCELERATED_CHASSIS:
+            beside = force_beside_elastomer(law, now, now.displacement, dt)
+            motion = engine_step(law.engine, now.engine, values[index], engine_forces[index], beside, dt)
+            take_motion(law, now, motion, dt)
+        else:
+            now.road_height = values[index]
+            beside = force_beside_elastomer(law, now, now.displacement, dt)
+            motion = vehicle_step(law.vehicle, now.vehicle, values[index], engine_forces[index], beside, dt)
+            take_motion(law, now, motion, dt)
+
+
+@compiled
+def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
+    """Advance as `advance` does in a vehicle and book each step in `account`, the bytes of its record."""
+    law, books = plant.view(PLANT)[0], account.view(ACCOUNT)[0]
+    before = state.copy()
+    for k in range(len(values)):
+        before[:] = state
+        advance(plant, state, _VEHICLE, values[k : k + 1], engine_forces[k : k + 1], wanted_current, dt)
+        book_step(
+            books,
+            law.vehicle,
+            law.hydromount,
+            law.contact,
+            before.view(STATE)[0],
+            state.view(STATE)[0],
+            values[k],
+            engine_forces[k],
+            dt,
+        )
+
+
+@compiled
+def advance_magnet(law, now, dt):
+    """Advance current, gap and normal force by `dt` s."""
+    now.current = advance_current(
+        law.electronics, law.coil, law.actuator, now.current, now.gap, now.wanted_current, dt
+    )
+    gap, normal_force = closed_state(law.mechanics, law.actuator, now.current, now.gap)
+    now.gap = gap
+    now.normal_force = normal_force
+
+
+@compiled
+def force_beside_elastomer(law, now, displacement, dt):
+    """Return the force (N) of what acts in the mount at `displacement` (m) beside its elastomer."""
+    if law.mount.contents == _PADS:
+        _rub(law, now, displacement, dt)
+        return now.friction_force
+    if law.mount.contents == _FLUID:
+        return hydromount_force(law.hydromount, now.hydromount)
+    return 0.0
+
+
+@compiled
+def _rub(law, now, displacement, dt):
+    force, slider, deflection, _ = full_step(
+        law.contact, law.friction, now.slider_position, now.deflection, displacement, now.normal_force, dt
+    )
+    now.friction_force = force
+    now.slider_position = slider
+    now.deflection = deflection
+
+
+@compiled
+def _advance_bench(law, now, displacement, dt):
+    """The rack imposes the displacement; the mount answers with its force."""
+    elastomer = law.engine.elastomer
+    change = displacement - now.displacement
+    branches = branch_step(elastomer, (now.slow_force, now.middle_force, now.fast_force), change, dt)
+    now.slow_force, now.middle_force, now.fast_force = branches
+    now.velocity = change / dt
+    now.displacement = displacement
+    _pump(law, now, change, dt)
+    beside = force_beside_elastomer(law, now, displacement, dt)
+    now.mount_force = elastomer_force(elastomer, displacement, branches) + beside
+
+
+@compiled
+def take_motion(law, now, motion, dt):
+    """Note a `MountMotion` and advance what it pumps."""
+    _pump(law, now, motion.displacement - now.displacement, dt)
+    now.displacement = motion.displacement
+    now.velocity = motion.velocity
+    now.mount_force = motion.mount_force
+    now.chassis_acceleration = motion.chassis_acceleration
+
+
+@compiled
+def _pump(law, now, displacement_change, dt):
+    if law.mount.contents == _FLUID:
+        hydromount_step(law.hydromount, now.hydromount, displacement_change, dt)
