@@ -41,7 +41,7 @@ from mount_sim.plant.vehicle import Vehicle
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
 MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themselves
-    'mount_bags/recorder/collector.py',
+    'mount_recorder/collector.py',
     'mount_ros/data_path.py',
     'mount_ros/nodes/diagnostics.py',
     'mount_bringup/graph/own_node.py',
@@ -208,7 +208,7 @@ def ends_of_nodes(kind: str, topic_name: str) -> set[str]:
 
 
 def python_files() -> list[Path]:
-    return sorted(SOURCES.glob('*/mount_*/**/*.py'))
+    return sorted(SOURCES.glob('*/*mount*/**/*.py'))
 
 
 def topics_used_in(file: Path) -> Iterator[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.bag.recording import open_recording
+from engine_mount.recordings.bag.recording import open_recording
 from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.processes import node_environment, parameter_text

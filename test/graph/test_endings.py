@@ -9,9 +9,9 @@ import subprocess
 
 import pytest
 
-import mount_bags
-from mount_bags.audit.audit import audit
-from mount_bags.audit.losses import losses
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
 from mount_ros.testing import wait_until
 
 # One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
@@ -31,7 +31,7 @@ def _node_pids(parent: int) -> dict[str, int]:
     ).stdout
     for line in listing.splitlines():
         pid, _, arguments = line.strip().partition(' ')
-        for name in ('mount_bags', 'mount_driver', 'mount_sim', 'mount_init', 'mount_control'):
+        for name in ('mount_recorder', 'mount_driver', 'mount_sim', 'mount_init', 'mount_control'):
             if f'from {name}.node' in arguments:
                 found[name] = int(pid)
     return found
@@ -74,7 +74,7 @@ def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_list
     assert process.returncode == 1
     assert 'mount_control ended with code -9' in output
     assert bus_listener[-1].current == 0.0
-    assert len(mount_bags.open(out / 'recording')['displacement']) > 1000
+    assert len(engine_mount.open(out / 'recording')['displacement']) > 1000
 
 
 @pytest.mark.slow
@@ -124,7 +124,7 @@ def _drive_with_a_control_that_stands_still(command, bus_listener) -> str:
     assert figures['unanswered_samples'] > 300, output
     assert figures['late_samples'] > 0
     assert any('the coil went to 0 A' in fault['sentence'] for fault in figures['faults'])
-    recording = mount_bags.open(out / 'recording')
+    recording = engine_mount.open(out / 'recording')
     found = losses(recording, audit(recording)).as_json()
     assert found == {name: figures[name] for name in found}
     assert f'samples unanswered: {figures["unanswered_samples"]} of ' in output
@@ -140,7 +140,7 @@ def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
     assert result.code == 1
     assert 'was not answered within 2 s' in result.output
     assert 'mount_driver does not answer' in result.output
-    assert len(mount_bags.open(result.folder / 'recording')['displacement']) == 4000
+    assert len(engine_mount.open(result.folder / 'recording')['displacement']) == 4000
 
 
 @pytest.mark.slow
@@ -161,7 +161,7 @@ def test_a_coil_at_fault_is_switched_off_and_ends_a_run_in_lock_step(command, fa
     )  # fmt: skip
     assert result.code == 1
     assert re.search(rf'mount_driver: .*{sentence}', result.output)
-    sent = mount_bags.open(result.folder / 'recording')['current_setpoint']
+    sent = engine_mount.open(result.folder / 'recording')['current_setpoint']
     assert 5200 < len(sent) < 5400
 
 
@@ -176,7 +176,7 @@ def _interrupt(process) -> None:
 def _expect_a_sound_end(setpoints, out) -> None:
     assert setpoints[-1].current == 0.0
     assert not setpoints[-1].enable
-    recording = mount_bags.open(out / 'recording')
+    recording = engine_mount.open(out / 'recording')
     assert recording.warnings == []
     assert len(recording['displacement']) > 100
 

@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
-import mount_bags
-from mount_bags.compare.compare import compare
-from mount_bags.compare.words import differences
-from mount_bags.run.versions import versions
+import engine_mount
+from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.compare.words import differences
+from mount_recorder.versions import versions
 from mount_ros.topics import EVENT, SESSION, TOPICS
 
 from .made_here import CONTROLS
@@ -67,7 +67,7 @@ def differences_of(here: Path, there: Path) -> list[str]:
     """Return which topics and numbers are other bytes in the second folder, and by how much."""
     told = []
     for path in (*CONTROLS, *(f'replays/{name}/recording' for name in REFERENCES)):
-        a, b = mount_bags.open(here / path), mount_bags.open(there / path)
+        a, b = engine_mount.open(here / path), engine_mount.open(there / path)
         changed = [topic for topic in DATA if topic.name in a and payloads(a, topic) != payloads(b, topic)]
         if changed:
             words = differences(compare(a, b, topics=changed))

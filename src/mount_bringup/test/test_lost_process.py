@@ -6,11 +6,11 @@ import signal
 
 import pytest
 
-import mount_bags
-from mount_bags.run.folder import recordings_of
+import engine_mount
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import RECORDER, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor
+from mount_recorder.folders import recordings_of
 
 LIMIT = 60.0  # s: only a hang takes so long
 
@@ -53,8 +53,8 @@ def test_a_killed_recorder_begins_a_new_recording_and_the_old_one_stays_readable
     assert 'started again with a new recording' in restart.sentence
     first, second = recordings_of(tmp_path / 'recording')
     assert second.name == 'recording_restarted_2'
-    assert len(mount_bags.open(first)['session']) == 1
-    whole = mount_bags.open(second)
+    assert len(engine_mount.open(first)['session']) == 1
+    whole = engine_mount.open(second)
     assert whole.warnings == []
     assert len(whole['session']) == 1  # latched by the supervisor, so the new recording tells what it is
 

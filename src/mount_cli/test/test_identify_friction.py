@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.run.place import recording_hash
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.run.place import recording_hash
+from engine_mount.recordings.signals.signal import SignalError
 from mount_bringup.chosen import chosen_control
 from mount_cli.command import main
 from mount_cli.commands.identify_arguments import with_repeated_options

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import yaml
 
-from mount_bags.bag.recording import open_recording
-from mount_bags.run.place import recording_hash
-from mount_bags.run.session import recorded_session
+from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.run.place import recording_hash
+from engine_mount.recordings.run.session import recorded_session
 from mount_cli.command import main
 from mount_control.policy.registry import POLICIES
 from mount_sim.excitation.road import RandomRoad, random_road

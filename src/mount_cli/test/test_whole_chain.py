@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mount_bags.bag.recording import open_recording
+from engine_mount.recordings.bag.recording import open_recording
 from mount_bringup.chosen import chosen_control, policy_of
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force

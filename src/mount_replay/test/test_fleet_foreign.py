@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.bag.recording import Recording
+from engine_mount.recordings.bag.recording import Recording
 from mount_replay.fleet import before_and_after as pictures
 from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.places import places

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.container.scratch import kept
-from mount_bags.run.session import SessionError, session_content, session_parameters
+from engine_mount.recordings.container.scratch import kept
+from engine_mount.recordings.run.session import SessionError, session_content, session_parameters
 from mount_bringup.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_bringup.mount_choice import seat_of
 from mount_control.policy.contract import Policy

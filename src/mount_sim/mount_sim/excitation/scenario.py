@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Annotated, NamedTuple, Protocol
 
-from mount_bags.signals.even_grid import EvenSignal
+from engine_mount.recordings.signals.even_grid import EvenSignal
 from mount_models.arithmetic.series import StreamedSeries
 from mount_models.quantity import ParameterError, Quantity
 from mount_sim.excitation import excitation
