@@ -32,7 +32,7 @@ from mount_models.quantity import with_flattened
 from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
 from mount_sim.electronics.faults.schedule import told_faults
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import seated_mount
 from mount_sim.plant.places import mount_names

@@ -11,8 +11,8 @@ from mount_models.quantity import with_flattened
 from mount_replay.drive.recorder_options import checked_recorder
 from mount_replay.loop.chain import CoreChain
 from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.excitation.scenario import build_excitation
 from mount_sim.excitation.shaking import steps_of_sample
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant
