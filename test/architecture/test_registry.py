@@ -41,11 +41,10 @@ from mount_sim.plant.vehicle import Vehicle
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
 MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themselves
-    'mount_bags/recorder/collector.py',
+    'mount_recorder/collector.py',
     'mount_ros/data_path.py',
     'mount_ros/nodes/diagnostics.py',
-    'mount_bringup/graph/own_node.py',
-    'mount_bringup/graph/launched.py',  # what a played bag says, so that the control can follow it
+    'mount_bringup/graph/graph.py',
     'mount_cli/bench/relay.py',  # not of the graph: bare rclpy to compare with
 }
 
@@ -208,7 +207,7 @@ def ends_of_nodes(kind: str, topic_name: str) -> set[str]:
 
 
 def python_files() -> list[Path]:
-    return sorted(SOURCES.glob('*/mount_*/**/*.py'))
+    return sorted(SOURCES.glob('*/*mount*/**/*.py'))
 
 
 def topics_used_in(file: Path) -> Iterator[str]:

@@ -14,6 +14,8 @@ from mount_signals.testing import MAKERS, make_csv
 from mount_sim.plant.reluctance import ReluctanceActuator, force
 from mount_sim.rack.friction import RackNoise, sawtooth
 
+pytestmark = pytest.mark.slow
+
 RACK = sawtooth(noise=RackNoise(seed=4), normal_force=70.0, speeds=(0.002, 0.004, 0.006, 0.01), stroke=1e-3)
 TIMES = RACK.time[::2]  # s
 FRICTION = {

@@ -80,6 +80,7 @@ def calibrated(files, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_specimen_meets_the_actuator_it_was_measured_on(calibrated):
     specimen = load_specimen(calibrated / 'left.yaml', 'left')
     assert specimen.bridge.link_voltage == 13.5  # as told

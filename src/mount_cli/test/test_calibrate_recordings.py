@@ -10,7 +10,6 @@ import yaml
 from geometry_msgs.msg import WrenchStamped
 from std_msgs.msg import String
 
-from mount_bags.bag.writer import BagWriter
 from mount_cli.command import main
 from mount_identification.rack.columns import RackRecordingError
 from mount_identification.rack.force_points import read_force
@@ -20,6 +19,7 @@ from mount_models.actuator.law import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
+from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout

@@ -32,6 +32,7 @@ def compared(tmp_path_factory):
     return policy.EXPERIMENT.run(Order(folder, {policy.NAME: SHORT}), lambda share, what: None)
 
 
+@pytest.mark.slow
 def test_figures_are_plain_and_hold_what_is_promised(compared):
     figures = json.loads(json.dumps(compared.figures, allow_nan=False))
     for key in ('sweep_ratio', 'gap_peak_ratio', 'thd', 'energy_j_per_km'):

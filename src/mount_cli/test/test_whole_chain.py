@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mount_bags.bag.recording import open_recording
+from engine_mount.recordings.bag.recording import open_recording
 from mount_bringup.chosen import chosen_control, policy_of
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
@@ -32,6 +32,8 @@ from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.plant.ripple import current_rate, flux_rate
 from mount_sim.rack.coil import drawn_rack
 from mount_sim.rack.friction import drawn_friction
+
+pytestmark = pytest.mark.slow
 
 MAKEFILE = Path(__file__).resolve().parents[3] / 'Makefile'
 SEED = (

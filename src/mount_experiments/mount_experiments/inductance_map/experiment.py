@@ -7,8 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.run.session import new_session, session_text
+from engine_mount.recordings.bag.recording import Recording, open_recording
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -32,6 +31,7 @@ from mount_models.coil.gap import (
 )
 from mount_models.quantity import Quantity, flattened
 from mount_models.specimen import Specimen, default_specimen
+from mount_recorder.session import new_session, session_text
 from mount_replay.loop.recording import record_core
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.run.place import open_run
-from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
-from mount_bags.signals.plausibility import check_size
-from mount_bags.signals.signal import SECOND
+from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.recordings.signals.plausibility import check_size
+from engine_mount.recordings.signals.signal import SECOND
 from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters
 from mount_init.parameters import InitParameters
 from mount_models.arithmetic.averages import mean

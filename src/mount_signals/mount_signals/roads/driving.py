@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.signals.even_grid import EvenSignal
-from mount_bags.signals.resampling import resampled
+from engine_mount.recordings.signals.even_grid import EvenSignal
+from engine_mount.recordings.signals.resampling import resampled
 from mount_signals.importing.provenance import told_provenance
 from mount_signals.roads.iso8608 import unevenness
 from mount_signals.roads.long_waves import LONGEST_WAVE, without_long_waves

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
-from mount_bags.signals.resampling import resampled
-from mount_bags.signals.signal import Signal
+from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.recordings.signals.resampling import resampled
+from engine_mount.recordings.signals.signal import Signal
 from mount_signals.roads.driving import BAND, STEP_TIME
 from mount_signals.roads.inversion import Kept, kept, road_of
 from mount_signals.roads.profile import FloatArray, ProfileError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_bags.signals.signal import signal_of
+from engine_mount.recordings.signals.signal import signal_of
 from mount_signals.roads.inversion import BAND, chassis_response, in_band, road_of
 from mount_signals.roads.inverting import inverted
 from mount_signals.roads.profile import ProfileError

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.signals.even_grid import EvenSignal
+from engine_mount.recordings.signals.even_grid import EvenSignal
 from mount_models.arithmetic.elementary import cosines, sines
 from mount_models.arithmetic.series import StreamedSeries, series_over_time
 from mount_models.quantity import ParameterError, checked

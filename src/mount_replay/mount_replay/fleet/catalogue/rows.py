@@ -7,19 +7,18 @@ from datetime import UTC
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.container.free_memory import give_back
-from mount_bags.events.recorded_events import event_time, recorded_events
-from mount_bags.messages.series import SeriesError
-from mount_bags.run.session import session_parameters
-from mount_bags.run.told import duration_of, started_of, told_session, versions_told
+from engine_mount.recordings.bag.recording import ReadingError, Recording
+from engine_mount.recordings.container.free_memory import give_back
+from engine_mount.recordings.events.recorded_events import event_time, recorded_events
+from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.run.session import session_parameters
+from engine_mount.recordings.run.told import duration_of, started_of, told_session, versions_told
 from mount_bringup.changed_parameters import changed_parameters
 from mount_bringup.chosen import Parameters
-from mount_bringup.mount_choice import seat_of
-from mount_bringup.recorded_mount import simulated_mounts
 from mount_replay.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
 from mount_replay.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures
 from mount_replay.fleet.catalogue.places import Place
+from mount_sim.mount_choice import seat_of, simulated_mounts
 from mount_sim.plant.mounts import without_friction
 
 Row = dict[str, Any]

@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-import mount_bags
-from mount_bags.edit.cut import cut
-from mount_bags.run.session import session_text
-from mount_bags.run.versions import versions
-from mount_bringup.mount_choice import with_control_of_mount
+import engine_mount
+from engine_mount.recordings.edit.cut import cut
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_bringup.sample_rate import with_sample_rate
 from mount_bringup.settings import checked_settings
+from mount_recorder.session import session_text
+from mount_recorder.versions import versions
 from mount_replay.drive.drive import told_parameters
 from mount_replay.drive.preflight import preflight
 from mount_replay.fleet.example.damages import DAMAGES
@@ -28,6 +27,7 @@ from mount_replay.fleet.example.variations import DRIVES, VARIATIONS, Drive, Var
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.loop.recording import record_car, record_core
 from mount_sim.excitation.scenario import SweepScenario
+from mount_sim.mount_choice import with_control_of_mount
 
 WHOLE_FLEET = len(DRIVES) * len(VARIATIONS)
 FEWEST = len(DAMAGES) + 1
@@ -165,5 +165,5 @@ def _piece(order: Ordered, whole: Path, folder: Path) -> Path:
     assert order.variation.cut is not None
     folder.parent.mkdir()
     begin, end = order.variation.cut
-    cut(mount_bags.open(whole), folder, begin, end, made=order.started.isoformat(timespec='seconds'))
+    cut(engine_mount.open(whole), folder, begin, end, made=order.started.isoformat(timespec='seconds'))
     return folder

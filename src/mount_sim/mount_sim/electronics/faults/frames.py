@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
+from mount_driver.bus import Frame
 from mount_driver.can_library import can
-from mount_driver.codec import MountCodec
-from mount_driver.frame import Frame
+from mount_driver.protocol import MountCodec
 from mount_sim.electronics.faults.fault import Fault, Frames
 
 _CODEC = MountCodec()

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from mount_driver.codec import Status
+from mount_driver.protocol import Status
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_sim.electronics.electronics import Reading
 from mount_sim.electronics.faults import frames
