@@ -16,6 +16,7 @@ FLOORS = (
     ('engine_mount.recordings',),  # below the simulator as long as that reads recorded excitations itself
     ('mount_sim',),
     ('mount_bringup',),
+    ('engine_mount.settings',),
     ('mount_signals',),
     ('mount_replay', 'mount_identification', 'mount_report'),
     ('mount_experiments', 'mount_view'),

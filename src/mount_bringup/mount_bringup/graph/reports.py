@@ -1,4 +1,4 @@
-"""The reports of the nodes on `/diagnostics`: what they say, and since when a node is silent."""
+"""The last report of each node on `/diagnostics`, and the nodes that are silent."""
 
 import time
 from collections.abc import Sequence

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from engine_mount.settings.options import with_sample_rate
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (
     CONTROL,
@@ -25,7 +26,6 @@ from mount_bringup.graph.nodes import (
     Grouping,
 )
 from mount_bringup.graph.supervisor import Supervisor
-from mount_bringup.sample_rate import with_sample_rate
 from mount_cli.bench.processes import children, memory, processor_time
 from mount_cli.bench.relay import EVENTS, SPIN
 from mount_models.sampling import SAMPLE_RATE

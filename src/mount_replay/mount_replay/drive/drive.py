@@ -9,6 +9,7 @@ from typing import Any
 
 from engine_mount.recordings.run.folder import RunFolder, make_run_folder
 from engine_mount.recordings.run.screen import Screen
+from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import can_port, domain_locks
 from mount_bringup.graph.nodes import (
@@ -24,7 +25,6 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.reports import GraphObserver
 from mount_bringup.graph.shutdown import ending_signals
 from mount_bringup.graph.supervisor import Supervisor
-from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
