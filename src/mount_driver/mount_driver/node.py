@@ -4,13 +4,11 @@ import math
 import time
 
 from mount_driver.clock import CounterClock, ElectronicsClock
-from mount_driver.codec import MountCodec
-from mount_driver.diagnosis import LinkWatch, judge
 from mount_driver.exchange import Exchange
-from mount_driver.link import Refusal, Stamped
+from mount_driver.health import Health
+from mount_driver.link import Fault, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.snapshot import snapshot
-from mount_driver.watches.guard import Fault
+from mount_driver.protocol import MountCodec
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_models.coil.heating import check_heating
@@ -22,9 +20,9 @@ from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.real_time import Urgent
+from mount_ros.nodes.real_time import RealTimeThreads
+from mount_ros.publishers import UnnamedPublisher
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
-from mount_ros.writers import NamelessWriter
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
 
@@ -32,7 +30,7 @@ _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses
 class MountDriver(SafeLifecycleNode):
     """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
 
-    urgent = Urgent(frozenset({'data', 'can_receive', 'can_watch'}))
+    real_time_threads = RealTimeThreads(frozenset({'data', 'can_receive', 'can_watch'}))
 
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
@@ -42,9 +40,9 @@ class MountDriver(SafeLifecycleNode):
         self._settings, self._law = DriverParameters(), RippleLaw()
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
-        self._watch, self._nameless = LinkWatch(), NamelessWriter()
+        self._health: Health | None = None
+        self._nameless = UnnamedPublisher()
         self._heat: HeatWatch | None = None
-        self._started_ns = 0
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
         self._ripple_layout = ScalarsLayout(COIL_RIPPLE)
@@ -69,7 +67,7 @@ class MountDriver(SafeLifecycleNode):
     def activate(self) -> None:
         assert self._codec is not None
         self.ending.wait(max(0.0, self._not_before - time.monotonic()))
-        self.wait_for_own_writers()
+        self.wait_for_sole_publishers()
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         period = sample_time_ns(self._settings.sample_rate)
@@ -84,21 +82,21 @@ class MountDriver(SafeLifecycleNode):
             heat=self._heat,
             law=self._law,
         )
-        self._watch = LinkWatch()
-        self._started_ns = time.monotonic_ns()
+        started = time.monotonic_ns()
         # In lock-step on a bus within this process, frames only come while the data thread is free.
         attended = self.lockstep and self._settings.interface == 'virtual'
         exchange.start(threaded=not attended)
         self._exchange = exchange
-        self.tell_writers()
+        self._health = Health(exchange, self._settings, started, lockstep=self.lockstep)
+        self.report_publisher_conflict()
         if attended:
-            self._path.attend(exchange.poll)
+            self._path.add_poll(exchange.poll)
 
     def deactivate(self) -> None:
         exchange, self._exchange = self._exchange, None
         if exchange is not None:
             try:
-                self._path.leave_work()
+                self._path.remove_polls()
             finally:
                 exchange.stop()
                 if exchange.link.fault:
@@ -107,27 +105,29 @@ class MountDriver(SafeLifecycleNode):
     def cleanup(self) -> None:
         self._codec = None
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
         exchange = self._exchange
         if exchange is not None:
-            exchange.guard.writer_doubt = doubt
-            exchange.switch_off(Fault(foreign, foreign_writer=True) if foreign else None)
+            exchange.guard.writer_doubt = suspected
+            exchange.switch_off(Fault(confirmed, foreign_writer=True) if confirmed else None)
 
     def judge(self) -> Verdict:
-        exchange = self._exchange
-        if exchange is None:
+        exchange, health = self._exchange, self._health
+        if exchange is None or health is None:
             return Verdict(Level.OK, 'inactive')
-        now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
-        awaited = self._nameless.is_awaited(now.nameless)
-        past = self._watch.past(now)
-        return judge(now, past, self._settings, lockstep=self.lockstep, name_awaited=awaited)
+        awaited = self._nameless.is_awaited(exchange.link.nameless)
+        return health.judge(time.monotonic_ns(), name_awaited=awaited)
 
     def _heat_of(self, settings: DriverParameters) -> HeatWatch:
         """Return what is known of the coil: a new configuration does not cool it."""
         before = self._heat
         if before is None:
             return HeatWatch(settings.heating, settings.coil_celsius_before)
-        return before if before.heating == settings.heating else HeatWatch(settings.heating, before.told)
+        return (
+            before
+            if before.heating == settings.heating
+            else HeatWatch(settings.heating, before.known_celsius)
+        )
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()
