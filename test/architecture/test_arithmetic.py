@@ -49,7 +49,6 @@ ALLOWED = {
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimation', 'np.sum'): 'whole numbers',
     ('engine_mount.recordings.bag.file_blocks', 'np.cumsum'): 'whole numbers',
-    ('mount_recorder.filled_chunk', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.container.stored', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.container.mcap_reading.unpacker', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.container.mcap_reading.chunk_index', 'np.cumsum'): 'whole numbers',

@@ -18,7 +18,7 @@ from engine_mount.recordings.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_replay.given.input import Notes, ReplayError, has, recorded_parameters
 from mount_replay.given.ramps import MeasuredGap, measured_gaps
 from mount_replay.keyboard import Keyboard
