@@ -61,7 +61,6 @@ ALLOWED = {
     ('mount_bags.messages.stamps', '**'): 'rates of topics, for the eye',
     ('mount_bags.messages.stamps', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
-    ('mount_ros.messages.scalars', 'math.prod'): 'whole numbers',
     ('mount_signals.formats.trees.leaves', 'math.prod'): 'whole numbers',
     ('mount_signals.formats.trees.layouts', 'math.prod'): 'whole numbers',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',

@@ -18,7 +18,7 @@ from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
-from mount_ros.messages.temperature import temperature_of
+from mount_ros.messages.sensors import temperature_of
 from mount_ros.messages.verdicts import verdicts_of
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
@@ -119,7 +119,7 @@ class MountInit(SafeLifecycleNode):
 
     def _objection(self) -> str:
         assert isinstance(self.data_path, DataPath)
-        self.data_path.publisher_watch.look()  # a thread that polls the messages does not hear who comes
+        self.data_path.publisher_watch.check()  # a thread that polls the messages does not hear who comes
         return self._driver.refusal
 
     # With the result latched no sample is answered, so the streams are unsubscribed: that saves CPU time.

@@ -16,10 +16,10 @@ from mount_init.node import MountInit
 from mount_init.parameters import InitParameters
 from mount_ros import topics
 from mount_ros.data_path import DataPath
+from mount_ros.messages.cdr import message_class
 from mount_ros.messages.force_table import from_bytes
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.messages.temperature import temperature_layout
-from mount_ros.messages.types import message_class
+from mount_ros.messages.sensors import temperature_layout
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
 

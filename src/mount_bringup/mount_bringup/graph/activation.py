@@ -14,6 +14,7 @@ from mount_bringup.graph.pace import Pace, pace
 from mount_bringup.graph.transitions import FRESH_DIAGNOSTICS, TRANSITION_LIMIT
 from mount_bringup.graph.verdicts import Verdicts
 from mount_models.sampling import SAMPLE_RATE
+from mount_ros.messages.verdicts import flags_of
 
 _LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
 
@@ -68,8 +69,8 @@ class Activation:
 
     def _needs_initialisation(self, node: GraphNode) -> bool:
         """Return whether the driver of this node is off until driver and initialisation begin anew."""
-        told = self._graph.figures(self._driver(node.mount)).get('needs_initialisation')
-        return not node.is_a(DRIVER) and told == 'True'
+        flags = flags_of(self._graph.figures(self._driver(node.mount)))
+        return not node.is_a(DRIVER) and flags.needs_initialisation
 
     def _renew_driver(self, node: GraphNode, say: Callable[[str], None]) -> None:
         if not self._needs_initialisation(node):

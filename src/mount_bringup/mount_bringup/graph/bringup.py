@@ -30,8 +30,7 @@ from mount_bringup.graph.transitions import TRANSITION_LIMIT, Transitions
 from mount_bringup.graph.verdicts import Verdicts
 from mount_bringup.mounts import settings_of_mount
 from mount_ros.environment import loopback_refusal
-from mount_ros.nodes.leaving import Deadline
-from mount_ros.nodes.shared_memory import remove_abandoned
+from mount_ros.nodes.shutdown import Deadline, remove_abandoned
 from mount_sim.diagnosis import FINISHED
 
 _START_LIMIT = 60.0  # s, chosen: a first start may compile the laws

@@ -20,8 +20,8 @@ from mount_bringup.graph.player import Player
 from mount_bringup.graph.restarts import Loss, NodesLostError, restartable
 from mount_bringup.graph.siblings import Sibling, sibling_of
 from mount_ros.environment import prepare_environment
-from mount_ros.nodes.leaving import end_process
-from mount_ros.nodes.starter import Starter
+from mount_ros.nodes.process import Starter
+from mount_ros.nodes.shutdown import end_process
 from mount_ros.qos import recording_qos
 from mount_ros.topics import CURRENT_FORCE_TABLE
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from rclpy.node import Node
 
 from mount_bringup.graph.nodes import RECORDER, GraphNode
-from mount_ros.nodes.present import present_nodes
+from mount_ros.publishers import present_nodes
 from mount_ros.topics import SESSION
 
 

@@ -20,7 +20,7 @@ from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import RECORDER, GraphSettings
 from mount_bringup.graph.verdicts import Verdicts
 from mount_ros.messages.event import read_mark
-from mount_ros.nodes.leaving import leave_middleware
+from mount_ros.nodes.shutdown import leave_middleware
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 
 from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups
-from mount_ros.nodes.starter import environment_of_children
+from mount_ros.nodes.process import environment_of_children
 
 NODES_OF_PROCESS = 'ENGINE_MOUNT_NODES'
 """The environment variable by which who did not start a process knows its nodes."""

@@ -21,8 +21,8 @@ from mount_bags.recorder.snapshot import snapshot_folder
 from mount_bags.run.screen import Screen
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
-from mount_ros.nodes.aside import wake
-from mount_ros.nodes.hosting import ros_context, transition
+from mount_ros.nodes.lifecycle import wake
+from mount_ros.nodes.process import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic
 
 # Several may run beside a graph; by the order of names the graph's own recorder sets the automatic marks.

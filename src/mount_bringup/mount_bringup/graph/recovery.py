@@ -26,6 +26,7 @@ from mount_bringup.graph.restarts import (
     table_holds,
 )
 from mount_bringup.graph.verdicts import Verdicts
+from mount_ros.messages.verdicts import flags_of
 
 _BIRTH_LIMIT = 60.0  # s, chosen
 _ASK_PERIOD = 0.5  # s, chosen: the middleware may still believe in the dead predecessor, and ask that one
@@ -81,7 +82,7 @@ class Recovery:
         self._count.note(loss, time.monotonic())
         for node in loss.nodes:
             figures = self._graph.figures(node)
-            if node.is_a(DRIVER) and figures.get('coil_model_known') == 'True':
+            if node.is_a(DRIVER) and flags_of(figures).coil_model_known:
                 self._celsius[node.full_name] = float(figures['coil_model_celsius'])
         self._graph.tell_loss(f'{loss.reason}; {remedy(whole, self._table_holds(whole)).value}')
 

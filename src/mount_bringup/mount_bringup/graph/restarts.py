@@ -12,6 +12,7 @@ from enum import Enum
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, GraphNode
 from mount_models.sampling import sample_time_ns
+from mount_ros.messages.verdicts import flags_of
 
 _WINDOW = 60.0  # s, chosen: within which the losses of a node are counted
 
@@ -138,4 +139,4 @@ def table_holds(driver: Mapping[str, str], init: Mapping[str, str]) -> bool:
     except (KeyError, ValueError):
         return False
     both_active = driver.get('state') == init.get('state') == 'active'
-    return both_active and whole and taken > since and driver.get('needs_initialisation') != 'True'
+    return both_active and whole and taken > since and not flags_of(driver).needs_initialisation

@@ -9,8 +9,7 @@ from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.liveliness import Liveliness
 from mount_bringup.graph.nodes import CONTROL, DRIVER, GraphNode
 from mount_ros.messages.event import Mark
-from mount_ros.messages.verdicts import verdicts_in
-from mount_ros.nodes.diagnostics import Level
+from mount_ros.messages.verdicts import Level, flags_of, verdicts_in
 
 _NANOSECONDS = 1_000_000_000
 
@@ -82,14 +81,14 @@ class Verdicts:
         """Raise `GraphError` if a node tells that the graph must end."""
         for node in self._nodes:
             figures = self.figures(node)
-            if figures.get('fatal') == 'True':
+            if flags_of(figures).fatal:
                 raise GraphError(f'{node.full_name}: {figures["sentence"]}{self._who_is_silent(figures)}')
 
     def needing_initialisation(self) -> str:
         """Return why the mount must be initialised anew, by the node that says so; else empty."""
         for node in self._nodes:
             figures = self.figures(node)
-            if figures.get('needs_initialisation') == 'True':
+            if flags_of(figures).needs_initialisation:
                 return f'{node.full_name}: {figures["sentence"]}'
         return ''
 
