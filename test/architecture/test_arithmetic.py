@@ -48,7 +48,7 @@ ALLOWED = {
     ('mount_models.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
-    ('mount_init.estimation', 'np.sum'): 'whole numbers',
+    ('mount_init.estimate', 'np.sum'): 'whole numbers',
     ('mount_bags.bag.file_blocks', 'np.cumsum'): 'whole numbers',
     ('mount_bags.container.filled_chunk', 'np.cumsum'): 'whole numbers',
     ('mount_bags.container.stored', 'np.cumsum'): 'whole numbers',

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mount_init.estimation import contact_gap, rest_gap
+from mount_init.estimate import contact_gap, rest_gap
 from mount_models.actuator.closing import ClosingMechanics, closed_state
 from mount_models.actuator.closing import contact_force as true_contact_force
 from mount_models.actuator.reluctance import ReluctanceActuator

@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from mount_ros.messages.cdr import serialised
-from mount_ros.topics import Topic
+from mount_ros.topics import Topic, control_trace
 
 _STAMP = struct.Struct('<iI')
 _NUMBER = struct.Struct('<d')
@@ -103,6 +103,10 @@ class ScalarsLayout(_Layout):
         message[self._begin : self._begin + len(numbers)] = numbers
         return bytes(message)
 
+    def fits(self, raw: bytes) -> bool:
+        """Return whether a message has this layout."""
+        return len(raw) == len(self._template) and raw[_STAMP_END : self._begin] == self._head
+
     def unpack(self, raw: bytes) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         """Return (stamp ns, positions, velocities) in the order of the topic's names; velocities may be ().
 
@@ -138,32 +142,20 @@ class ScalarsReader:
     """
 
     def __init__(self, names: Sequence[str]):
-        self._names = names
-        self._head, self._begin, self._size = b'', 0, 0
-        self._places: list[int | None] = []
+        self._wanted = names
+        self._learn(names)
 
     def read(self, raw: bytes) -> tuple[int, list[float]]:
         """Return (stamp ns, positions) in the order of the names."""
-        if len(raw) != self._size or raw[_STAMP_END : self._begin] != self._head:
-            self._learn(raw)
-        return stamp_of(raw), [
-            math.nan if place is None else _NUMBER.unpack_from(raw, place)[0] for place in self._places
-        ]
+        if not self._layout.fits(raw):
+            self._learn(_decoded(raw).name)
+        stamp, positions, _ = self._layout.unpack(raw)
+        return stamp, [math.nan if place is None else positions[place] for place in self._places]
 
-    def _learn(self, raw: bytes) -> None:
-        message = _decoded(raw)
-        names = list(message.name)
-        if len(message.position) != len(names):
-            raise ScalarsError(f'a message with {len(names)} names has {len(message.position)} positions')
-        message.position = _marks(len(names), 0)
-        layout = _Layout(message, message.position.tolist())
-        if len(layout._template) > len(raw):
-            raise ScalarsError(f'a message of {len(raw)} bytes is cut, which names {len(names)} scalars')
-        self._begin = layout._offsets[0] if names else _STAMP_END
-        self._head, self._size = raw[_STAMP_END : self._begin], len(raw)
-        self._places = [
-            self._begin + _NUMBER.size * names.index(name) if name in names else None for name in self._names
-        ]
+    def _learn(self, names: Sequence[str]) -> None:
+        self._layout = ScalarsLayout(control_trace(names))
+        places = {name: place for place, name in enumerate(names)}
+        self._places = [places.get(name) for name in self._wanted]
 
 
 class OneNumberLayout(_Layout):

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -312,22 +312,11 @@ def run_in_thread(executor: Executor, work: Callable[[], T], name: str) -> T:
 
     It is called in a callback of the executor. Nothing of the same callback group is served meanwhile.
     """
-    result: Future[T] = Future()
-
-    def attempt() -> None:
-        try:
-            result.set_result(work())
-        except BaseException as error:
-            result.set_exception(error)
-        wake(executor)
-
-    thread = threading.Thread(target=attempt, name=name)
-    thread.start()
-    try:
+    with ThreadPoolExecutor(1, thread_name_prefix=name) as pool:
+        result = pool.submit(work)
+        result.add_done_callback(lambda _: wake(executor))
         while not result.done():
             executor.spin_once(SPIN_PERIOD)
-    finally:
-        thread.join()
     return result.result()
 
 
