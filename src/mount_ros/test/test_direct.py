@@ -156,10 +156,11 @@ def test_one_function_hands_a_message_over_and_a_lone_sender_publishes_without_a
     def take(raw):
         sys.setprofile(None)
 
+    message = sample(1)
     receiver.subscribe(DISPLACEMENT, take, directly=True)
     sys.setprofile(lambda frame, event, _: event == 'call' and calls.append(frame.f_code.co_name))
     try:
-        send(sample(1))
+        send(message)
     finally:
         sys.setprofile(None)
     assert calls == ['send', 'receive', 'take']

@@ -71,11 +71,8 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     for node in nodes:
         node.ending.set()
     if ending.starter.ended:
-        number = os.environ[_STARTER]
-        logger.error(
-            f'the process that started this one ({number}) has ended, so this one ends too, at 0 A: '
-            'start the graph again'
-        )
+        name = ending.starter.name
+        logger.error(f'{name} has ended, so this one ends too, at 0 A: start the graph again')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()
@@ -171,9 +168,11 @@ class Starter:
         self.descriptors: list[int] = []
         """What can be read once it has ended; none where it is not known, or had ended before."""
         self._had_ended = False
-        if _STARTER in os.environ:
+        number = os.environ.get(_STARTER)
+        self.name = f'the process that started this one ({number})'
+        if number is not None:
             try:
-                self.descriptors = [os.pidfd_open(int(os.environ[_STARTER]))]
+                self.descriptors = [os.pidfd_open(int(number))]
             except ProcessLookupError:
                 self._had_ended = True
 
