@@ -11,8 +11,8 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from mount_ros.nodes.aside import wake
-from mount_ros.nodes.starter import environment_of_children, tied
+from mount_ros.nodes.lifecycle import wake
+from mount_ros.nodes.process import environment_of_children, tied
 from mount_ros.testing import LIMIT, free_domain
 
 PROGRAM = """
@@ -219,7 +219,7 @@ import signal, threading
 from mount_ros.nodes.process import _Ending
 from mount_ros.nodes.real_time import RealTime
 over = _Ending()
-over.listen(signal.SIGTERM)
+over.add_signals(signal.SIGTERM)
 
 def take_the_signal():  # the main thread is asleep and is not interrupted
     signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
