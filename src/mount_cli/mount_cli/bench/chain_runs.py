@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from mount_bags.run.session import session_text
 from mount_bringup.graph.domain import can_port, domain_lock
+from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, SIMULATED, GraphSettings, Grouping
 from mount_bringup.graph.supervisor import Supervisor
@@ -75,7 +76,7 @@ def run_graph(
         )
         supervisor = Supervisor(SIMULATED, settings, Path(folder))
         begin = time.monotonic()
-        try:
+        with ending_signals(supervisor.interrupt), _stopped(supervisor):
             supervisor.start(lambda told: session_text({'parameters': told}), lambda words: None)
             start = time.monotonic() - begin
             _serve(supervisor, _SETTLING)
@@ -86,8 +87,6 @@ def run_graph(
             after, bus = supervisor.figures(DRIVER), supervisor.figures(SIM)
             samples, answered = (int(after[name]) - before[name] for name in ('samples', 'setpoints'))
             lost = int(supervisor.figures(RECORDER)['lost'])
-        finally:
-            supervisor.stop()
     return ChainRun(
         float(bus['latency_median_s']),
         float(bus['latency_p99_s']),
@@ -97,6 +96,15 @@ def run_graph(
         1.0 - answered / max(1, samples),
         lost,
     )
+
+
+@contextlib.contextmanager
+def _stopped(supervisor: Supervisor) -> Iterator[None]:
+    """Stop the graph at the end, whatever it is."""
+    try:
+        yield
+    finally:
+        supervisor.stop()
 
 
 def run_relay(
@@ -162,7 +170,7 @@ def _line(peer: subprocess.Popen[str]) -> str:
 
 
 def _command(parts: Sequence[str], port: int, *options: str) -> list[str]:
-    return [sys.executable, '-m', 'mount_cli.bench.relay', *parts, '--port', str(port), *options]
+    return [sys.executable, '-P', '-m', 'mount_cli.bench.relay', *parts, '--port', str(port), *options]
 
 
 @contextlib.contextmanager
