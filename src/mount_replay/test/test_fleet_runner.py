@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -76,8 +75,10 @@ def test_short_tasks_are_handed_over_several_together_and_each_is_told_once(monk
             raise OddError('odd')
         return -place
 
-    handed, submit = [], ProcessPoolExecutor.submit
-    monkeypatch.setattr(ProcessPoolExecutor, 'submit', lambda *given: (handed.append(1), submit(*given))[1])
+    handed, submit = [], processes.LocalWorkers.submit
+    monkeypatch.setattr(
+        processes.LocalWorkers, 'submit', lambda *given: (handed.append(1), submit(*given))[1]
+    )
     done = sorted(run_tasks(work, range(200), workers=1), key=lambda one: one.place)
     assert [one.place for one in done] == list(range(200))
     assert {one.place: one.reason for one in done if one.reason} == {
@@ -146,10 +147,21 @@ def test_nobody_else_can_hand_work_to_the_processes_of_this_machine():
 
 
 def test_processes_that_cannot_start_end_the_run_with_a_sentence(monkeypatch):
-    monkeypatch.setattr(processes, 'prepare_worker', divmod)  # of a process number and 0 bytes: it raises
-    monkeypatch.setattr(processes, '_memory_of_machine', lambda: 0)
+    monkeypatch.setattr(processes, 'serve', divmod)  # it raises
     with pytest.raises(ChildProcessError, match='no worker process could start in 3 attempts'):
         list(run_tasks(abs, range(4), workers=1))
+
+
+def test_workers_that_are_killed_while_they_send_their_results_hold_up_nothing():
+    def work(place):
+        return b'x' * 1_000_000
+
+    for _ in range(5):
+        tasks = run_tasks(work, range(50), workers=2)
+        next(tasks)
+        begin = time.monotonic()
+        tasks.close()
+        assert time.monotonic() - begin < _PATIENCE / 10
 
 
 def test_items_are_not_all_handed_over_at_once():

@@ -1,16 +1,18 @@
 """Tasks on processes of this machine, over pipes: no port is opened, so nobody else can hand them work."""
 
 import contextlib
+import itertools
 import multiprocessing
 import os
 import signal
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import resource_tracker
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
-from mount_replay.fleet.worker import Batch, WorkerLostError, prepare_worker, run_pickled
+from mount_replay.fleet.worker import Batch, WorkerLostError, serve
 
 LOCAL = 'local'
 
@@ -24,83 +26,109 @@ def processes_for(workers: int, tasks: int) -> int:
     return min(workers or len(os.sched_getaffinity(0)), tasks)
 
 
-class LocalWorkers:
-    """`threads` processes, each replaced beyond `memory` bytes (0: its share of the machine's).
+class _Worker:
+    """A process with a pipe of its own: when it is lost, no other one is."""
 
-    A lost worker takes all tasks that are under way along; a new pool follows. Of one thread: the kernel ends
-    workers with the thread that started them.
+    def __init__(self, memory: int):
+        context = multiprocessing.get_context('spawn')  # this process may hold threads of middleware
+        self.pipe, theirs = context.Pipe()
+        self.task: int | None = None
+        """The number of the task that it does."""
+        self.is_ready = False
+        """Whether it has begun to work."""
+        self._process = context.Process(target=serve, args=(theirs, os.getpid(), memory), daemon=True)
+        with _inherited_by_workers():
+            self._process.start()
+        theirs.close()
+
+    def begin(self, number: int, task: bytes) -> None:
+        """Hand over a task; a worker that is lost by then is noticed by its pipe."""
+        self.task = number
+        with contextlib.suppress(OSError):
+            self.pipe.send_bytes(task)
+
+    def result(self) -> Batch[Any] | BaseException | None:
+        """Return what came of its task, None where it has but begun to work."""
+        try:
+            found: Batch[Any] | BaseException | None = self.pipe.recv()
+        except (EOFError, OSError):
+            return WorkerLostError()
+        self.is_ready = True
+        if found is not None:
+            self.task = None
+        return found
+
+    def end(self) -> None:
+        """Kill the process."""
+        self._process.kill()
+        self._process.join()
+        self.pipe.close()
+
+
+class LocalWorkers:
+    """At most `threads` processes, each replaced beyond `memory` bytes (0: its share of the machine's).
+
+    Of one thread: the kernel ends workers with the thread that started them.
     """
 
     def __init__(self, threads: int, memory: int):
         self.threads = threads
         self._memory = memory or _memory_of_machine() // (os.cpu_count() or 1)
-        self._pool: ProcessPoolExecutor | None = None
-        self._first: Future[int] | None = None
-        self._processes: set[Any] = set()
+        self._workers: list[_Worker] = []
+        self._waiting: deque[tuple[int, bytes]] = deque()
+        self._numbers = itertools.count()
         self._failed_starts = 0
-        self._under_way: set[Future[Batch[Any]]] = set()
 
-    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> Future[Batch[Any]]:
+    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> int:
         """Hand over some tasks that one worker does in turn."""
         import cloudpickle  # only where tasks leave this process
 
-        task = cloudpickle.dumps((work, items))
-        future: Future[Batch[Any]]
-        try:
-            future = self._handed_over(run_pickled, task)
-        except BrokenProcessPool as error:  # since the last look
-            future = Future()
-            future.set_exception(error)
-        self._under_way.add(future)
-        return future
+        number = next(self._numbers)
+        self._waiting.append((number, cloudpickle.dumps((work, items))))
+        self._begin_waiting()
+        return number
 
     def arrived(self, limit: float) -> list[tuple[Any, Batch[Any] | BaseException]]:
         """Return what is done within `limit` s: a batch, why there is none, or `WorkerLostError`."""
-        done, self._under_way = wait(self._under_way, limit, FIRST_COMPLETED)
-        found = [(future, future.exception() or future.result()) for future in done]
-        if any(isinstance(result, BrokenProcessPool) for _, result in found):
-            self.close()
-            self._count_start()
-            rest, self._under_way = self._under_way, set()  # done with the pool
-            found += [(future, future.exception() or future.result()) for future in rest]
-        return [
-            (future, WorkerLostError() if isinstance(result, BrokenProcessPool) else result)
-            for future, result in found
-        ]
+        busy: dict[Any, _Worker] = {
+            worker.pipe: worker for worker in self._workers if worker.task is not None
+        }
+        found: list[tuple[Any, Batch[Any] | BaseException]] = []
+        for pipe in wait(list(busy), limit):
+            worker = busy[pipe]
+            number, result = worker.task, worker.result()
+            if isinstance(result, WorkerLostError):
+                self._workers.remove(worker)
+                worker.end()
+                self._count_start(worker)
+            else:
+                self._failed_starts = 0
+            if result is not None:
+                found.append((number, result))
+        self._begin_waiting()
+        return found
 
     def close(self) -> None:
-        """End all workers without waiting for their tasks.
+        """End all workers without waiting for their tasks."""
+        while self._workers:
+            self._workers.pop().end()
 
-        All of them: a killed one may hold the lock that the others need to end by themselves.
-        """
-        pool, self._pool = self._pool, None
-        if pool is not None:
-            for process in self._processes:
-                process.kill()
-            pool.shutdown(wait=True, cancel_futures=True)
+    def _begin_waiting(self) -> None:
+        """Give waiting tasks to idle workers; start another one as long as there are too few."""
+        while self._waiting:
+            worker = next((each for each in self._workers if each.task is None), None)
+            if worker is None:
+                if len(self._workers) == self.threads:
+                    return
+                worker = _Worker(self._memory)
+                self._workers.append(worker)
+            worker.begin(*self._waiting.popleft())
 
-    def _handed_over(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Submit to the pool, which starts another process as long as it has too few."""
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(
-                self.threads,
-                multiprocessing.get_context('spawn'),  # this process may hold threads of middleware
-                prepare_worker,
-                (os.getpid(), self._memory),
-            )
-            self._processes, self._first = set(), None
-            self._first = self._handed_over(os.getpid)
-        others = set(multiprocessing.active_children()) - self._processes
-        with _inherited_by_workers():
-            future = self._pool.submit(function, *arguments)
-        self._processes = set(multiprocessing.active_children()) - others
-        return future
-
-    def _count_start(self) -> None:
+    def _count_start(self, lost: _Worker) -> None:
         """Raise `ChildProcessError` where no worker could begin to work, several times in a row."""
-        first = self._first
-        is_failed = first is None or not first.done() or first.exception() is not None
-        self._failed_starts = self._failed_starts + 1 if is_failed else 0
+        if lost.is_ready:
+            return
+        self._failed_starts += 1
         if self._failed_starts == _STARTS:
             raise ChildProcessError(
                 f'no worker process could start in {_STARTS} attempts: a script that starts workers needs '
@@ -116,8 +144,9 @@ def _inherited_by_workers() -> Iterator[None]:
     """
     values = dict.fromkeys((*_THREADS, 'PYTHONSAFEPATH'), '1')
     before = {name: os.environ.get(name) for name in values}
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     os.environ.update(values)
+    resource_tracker.ensure_running()  # its start, with the first process, would unblock the signal
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:

@@ -1,5 +1,6 @@
 """The worker's side of many tasks: some of them in turn, in a process that yields, ends and stays small."""
 
+import contextlib
 import ctypes
 import os
 import pickle
@@ -8,7 +9,8 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from multiprocessing.connection import Connection
+from typing import Generic, TypeVar
 
 Item = TypeVar('Item')
 Result = TypeVar('Result')
@@ -20,7 +22,7 @@ _PAGE = os.sysconf('SC_PAGE_SIZE')  # bytes
 
 
 class WorkerLostError(Exception):
-    """The worker of a task was lost, or one that shared a pool with it."""
+    """The worker of a task was lost."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,18 @@ def run_in_turn(work: Callable[[Item], Result], items: Sequence[Item]) -> Batch[
     return Batch(results, None, time.monotonic() - begin)
 
 
-def run_pickled(task: bytes) -> Batch[Any]:
-    """Do what `run_in_turn` does; `task` is its pickled arguments."""
-    return run_in_turn(*pickle.loads(task))
+def serve(pipe: Connection, starter: int, memory: int) -> None:
+    """Do pickled tasks from a pipe, one after the other, until it is closed."""
+    prepare_worker(starter, memory)
+    pipe.send(None)  # it has begun to work
+    with contextlib.suppress(EOFError):
+        while True:
+            task = pipe.recv_bytes()
+            try:
+                answer = pickle.dumps(run_in_turn(*pickle.loads(task)))
+            except Exception as error:  # a task that cannot be loaded, a result that cannot be sent
+                answer = pickle.dumps(_portable(error))
+            pipe.send_bytes(answer)
 
 
 def prepare_worker(starter: int, memory: int) -> None:
