@@ -24,11 +24,10 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import DEFAULT_SPECIMEN, default_specimen, load_specimen
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import message_class, serialised
 from mount_ros.messages.event import Mark, ParametersChanged, read_change, read_mark
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.messages.types import message_class
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import wait_until

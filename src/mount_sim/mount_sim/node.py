@@ -18,8 +18,8 @@ from mount_models.arithmetic.compiled import compilation_told
 from mount_models.quantity import ParameterError, flattened
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.messages.level_imu import level_imu
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
+from mount_ros.messages.sensors import level_imu
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from engine_mount.settings.mounts import settings_of_mounts
 from mount_bringup.chosen import Parameters
-from mount_bringup.mounts import settings_of_mounts
 from mount_init.initialisation import OFF
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import Samples

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from mount_bringup.chosen import Parameters
-from mount_bringup.sample_rate import check_sample_rate
+from mount_bringup.settings import check_sample_rate
 from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
