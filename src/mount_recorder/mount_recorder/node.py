@@ -17,7 +17,7 @@ from mount_recorder.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
 from mount_recorder.bag_writer import BagWriter, RecordingError
 from mount_recorder.collector import Collector
 from mount_recorder.diagnosis import Counted, OnFull, RecorderState, judge, unobserved_sentence
-from mount_recorder.offered_qos import OfferedQos
+from mount_recorder.metadata import OfferedQos
 from mount_recorder.parameters import RecorderParameters, split_of
 from mount_recorder.recorder import Recorder
 from mount_recorder.snapshot import Snapshot, SnapshotRule

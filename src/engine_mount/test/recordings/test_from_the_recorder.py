@@ -15,9 +15,8 @@ from engine_mount.recordings.bag.metadata import read_metadata
 from engine_mount.recordings.bag.offered_qos import QosError, read_qos
 from engine_mount.recordings.bag.statement import read_statement
 from engine_mount.recordings.events.switching_changes import switching_times
-from mount_recorder.bag_writer import BagWriter
-from mount_recorder.offered_qos import OfferedQos, qos_text
-from mount_recorder.split import SplitRule
+from mount_recorder.bag_writer import BagWriter, SplitRule
+from mount_recorder.metadata import OfferedQos, qos_text
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'

@@ -18,11 +18,6 @@ Figures = Mapping[str, str]
 """The figures of a report on `/diagnostics`, its `level` and `sentence`; empty where there is no report."""
 
 
-def is_set(figures: Figures, name: str) -> bool:
-    """Return whether a flag among the figures is true, such as `fatal` or `needs_initialisation`."""
-    return figures.get(name) == 'True'
-
-
 @dataclass(frozen=True)
 class GraphNode:
     """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without.

@@ -22,7 +22,7 @@ from mount_bringup.graph.supervisor import Parameters, Supervisor
 from mount_bringup.settings import SettingError
 from mount_recorder.session import new_session, session_text
 from mount_ros.environment import prepare_environment
-from mount_ros.nodes.leaving import end_process
+from mount_ros.nodes.shutdown import end_process
 
 SUPERVISOR = 'mount_supervisor'
 

@@ -37,6 +37,7 @@ from mount_replay.drive.preflight import preflight
 from mount_replay.drive.progress import DriveProgress
 from mount_replay.keyboard import MARK_KEYS, Keyboard
 from mount_replay.loop.recording import record_car, record_core
+from mount_ros.messages.verdicts import flags_of
 from mount_sim.diagnosis import beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
 
@@ -122,7 +123,8 @@ def _drive_graph(
         finally:
             supervisor.reports.observer = GraphObserver()  # of the end the supervisor tells
             recorder = supervisor.figures(RECORDER)
-            if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
+            flags = flags_of(recorder)
+            if flags.failed and not flags.fatal:
                 supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
             complaints += [restart.sentence for restart in supervisor.recovery.restarts]

@@ -1,14 +1,56 @@
 """The description of a recording, read from `metadata.yaml` or from the MCAP file; all versions are read."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from engine_mount.recordings.bag.offered_qos import QosError, read_qos
 from mount_models.plain_yaml import plain_yaml
-from mount_recorder.metadata import ROOT, BagInformation, FileInformation, TopicInformation
+from mount_recorder.metadata import NO_TIME, ROOT, VERSION, OfferedQos
 
 
 class MetadataError(ValueError):
     """A description of a recording is not understood."""
+
+
+@dataclass(frozen=True)
+class TopicInformation:
+    """One topic of a recording."""
+
+    name: str
+    type: str
+    message_count: int
+    serialization_format: str = 'cdr'
+    offered_qos: tuple[OfferedQos, ...] = ()
+    type_hash: str = ''
+    units: Mapping[str, str] = field(default_factory=dict)  # by field, where the channel tells them
+
+
+@dataclass(frozen=True)
+class FileInformation:
+    """One file of a recording; times in ns."""
+
+    path: str
+    starting_time: int = NO_TIME
+    duration: int = 0
+    message_count: int = 0
+
+
+@dataclass(frozen=True)
+class BagInformation:
+    """A whole recording; times in ns."""
+
+    topics: tuple[TopicInformation, ...]
+    files: tuple[FileInformation, ...]
+    starting_time: int
+    duration: int
+    message_count: int
+    ros_distro: str = ''
+    custom_data: Mapping[str, str] = field(default_factory=dict)
+    version: int = VERSION
+    storage: str = 'mcap'
+    compression_format: str = ''
+    compression_mode: str = ''
 
 
 def read_metadata(text: str) -> BagInformation:

@@ -7,7 +7,7 @@ import functools
 from typing import Any
 
 from mount_models.plain_yaml import plain_yaml
-from mount_recorder.offered_qos import NANOSECONDS, OfferedQos
+from mount_recorder.metadata import NANOSECONDS, OfferedQos
 
 # The position of a word is its number in rmw/types.h.
 _HISTORY = ('system_default', 'keep_last', 'keep_all', 'unknown')

@@ -12,7 +12,7 @@ import yaml
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.bag.statement import read_statement
 from mount_models.plain_yaml import plain_yaml
-from mount_recorder.statement import RECORDER_RECORD, Reception, excerpt_statement
+from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
 
 SOURCES = 'sources'  # key in the record of the recorder
 
@@ -54,7 +54,7 @@ def inherited_statement(sources: Sources, kept: Mapping[str, int]) -> dict[str, 
         for identity, topics in sources.items()
     }
     told = {name: kept.get(name, 0) for name in total}
-    return {**excerpt_statement(total, told), SOURCES: yaml.safe_dump(rows, sort_keys=False)}
+    return {**loss_statement(total, told, excerpt=True), SOURCES: yaml.safe_dump(rows, sort_keys=False)}
 
 
 def _record(recording: Recording) -> Mapping[str, str]:

@@ -21,9 +21,9 @@ from engine_mount.recordings.container.stored import StoredMessages
 from engine_mount.recordings.edit.beside_messages import copy_beside_messages, lost_beside_messages
 from engine_mount.recordings.edit.inherited_statement import inherited_statement, sources_of
 from engine_mount.recordings.edit.verbatim import VerbatimBag
-from mount_recorder.chunk_groups import chunk_group
+from mount_recorder.losses import RECORDER_RECORD
 from mount_recorder.metadata import NO_TIME
-from mount_recorder.statement import RECORDER_RECORD
+from mount_recorder.topic_groups import topic_group
 
 _SECOND = 1e9  # ns
 _NEAR = 600 * _SECOND  # chosen: chunks are shorter by far
@@ -216,7 +216,7 @@ def _lost_inside(file: McapFile) -> int:
 
 def _by_group(file: McapFile, chunks: Sequence[Chunk]) -> list[Sequence[Chunk]]:
     """Return the chunks of each group of topics, all in one where a chunk holds topics of several."""
-    group_of = {number: chunk_group(topic.name, topic.type) for number, topic in file.topics.items()}
+    group_of = {number: topic_group(topic.name, topic.type) for number, topic in file.topics.items()}
     held = [{group_of.get(number) for number in chunk.channels or ()} for chunk in chunks]
     if any(chunk.channels is None for chunk in chunks) or any(len(groups) > 1 for groups in held):
         return [chunks]

@@ -9,7 +9,7 @@ from engine_mount.recordings.events.event_marks import Mark, read_marks
 from engine_mount.recordings.events.switching_trace import ArrivedSwitching
 from engine_mount.recordings.messages.series import SeriesError
 from engine_mount.recordings.messages.time_axis import TimeAxis
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
 SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'

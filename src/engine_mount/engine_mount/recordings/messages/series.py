@@ -13,7 +13,7 @@ from engine_mount.recordings.messages.compact_times import CompactTimes, Times, 
 from engine_mount.recordings.messages.decoding import decode
 from engine_mount.recordings.messages.definitions import Definition, installed_definition
 from engine_mount.recordings.messages.layout import HEAD, OPTIONS, Layout, LayoutError, layout_of
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
 
 Column = NDArray[np.float64]

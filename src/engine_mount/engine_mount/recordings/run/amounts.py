@@ -1,30 +1,13 @@
-"""When a recording goes on in its next file, and how people write sizes and durations."""
+"""Sizes and durations as people write them."""
 
 import re
 from collections.abc import Iterable
-from typing import NamedTuple
 
-LEAST_SIZE = 1_000_000  # bytes, chosen: below, a file is mostly head and end
-LEAST_DURATION = 1_000_000_000  # ns, chosen
+from mount_recorder.bag_writer import SplitError, SplitRule, checked_rule
 
 _SIZES = {'B': 1, 'kB': 10**3, 'MB': 10**6, 'GB': 10**9, 'KiB': 1 << 10, 'MiB': 1 << 20, 'GiB': 1 << 30}
 _DURATIONS = {'ms': 10**6, 's': 10**9, 'min': 60 * 10**9, 'h': 3600 * 10**9}
 _AMOUNT = re.compile(r'\s*(\d+(?:\.\d+)?)\s*([A-Za-z]+)\s*')
-
-
-class SplitError(ValueError):
-    """A size or a duration is not understood or out of range; the text says what is."""
-
-
-class SplitRule(NamedTuple):
-    """The limits of a file: bytes of `size`, ns of log time in `duration`; 0 is no limit."""
-
-    size: int = 0
-    duration: int = 0
-
-
-WHOLE = SplitRule()
-"""One file, however long it becomes."""
 
 
 def split_rule(texts: Iterable[str]) -> SplitRule:
@@ -41,15 +24,6 @@ def split_rule(texts: Iterable[str]) -> SplitRule:
         else:
             raise SplitError(f'{text!r} is no size and no duration; write 500MB, 1GiB, 60s or 10min')
     return checked_rule(SplitRule(size, duration))
-
-
-def checked_rule(rule: SplitRule) -> SplitRule:
-    """Return `rule` if its limits are large enough to make sense; raises `SplitError`."""
-    if rule.size and rule.size < LEAST_SIZE:
-        raise SplitError(f'split size ({rule.size} bytes) must be at least {LEAST_SIZE} bytes, or 0 for none')
-    if rule.duration and rule.duration < LEAST_DURATION:
-        raise SplitError(f'split duration ({rule.duration / 1e9:g} s) must be at least 1 s, or 0 for none')
-    return rule
 
 
 def size_in_bytes(text: str) -> int:

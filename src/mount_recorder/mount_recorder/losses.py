@@ -18,32 +18,26 @@ class Reception:
     missing: int = 0  # samples absent between the stamps: lost before the recorder, or never sent
 
 
-def statement(receptions: Mapping[str, Reception], kept: Mapping[str, int]) -> dict[str, str]:
-    """Return the record of a recording that ought to hold every message received; counts are per topic."""
-    lost = {name: entry.received - kept.get(name, 0) for name, entry in receptions.items()}
-    return _record(receptions, kept, lost)
-
-
-def excerpt_statement(receptions: Mapping[str, Reception], kept: Mapping[str, int]) -> dict[str, str]:
-    """Return the record of a recording that holds a part of what was received: a snapshot."""
-    return _record(receptions, kept, {name: entry.overflowed for name, entry in receptions.items()})
-
-
-def _record(
-    receptions: Mapping[str, Reception], kept: Mapping[str, int], lost: Mapping[str, int]
+def loss_statement(
+    receptions: Mapping[str, Reception], kept: Mapping[str, int], *, excerpt: bool = False
 ) -> dict[str, str]:
+    """Return the record of a recording that ought to hold every message received; counts are per topic.
+
+    A snapshot is an `excerpt`: it lost no more than did not fit into the queue.
+    """
     topics = {
         name: {
             'received': entry.received,
             'kept': kept.get(name, 0),
-            'lost': lost[name],
+            'lost': entry.overflowed if excerpt else entry.received - kept.get(name, 0),
             'missing': entry.missing,
         }
         for name, entry in receptions.items()
     }
+    totals = {key: sum(row[key] for row in topics.values()) for key in ('received', 'lost')}
     return {
-        'received': str(sum(entry.received for entry in receptions.values())),
+        'received': str(totals['received']),
         'kept': str(sum(kept.values())),
-        'lost': str(sum(lost.values())),
+        'lost': str(totals['lost']),
         'topics': yaml.safe_dump(topics, sort_keys=False),
     }
