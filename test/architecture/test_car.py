@@ -69,7 +69,7 @@ def test_a_launch_of_the_vehicle_loads_neither_simulator_nor_desk_nor_reader_of_
     loaded = subprocess.run(
         command, cwd=REPOSITORY, capture_output=True, text=True, check=True
     ).stdout.split()
-    desk = {package for package in PACKAGES if package not in {name for level in CAR for name in level}}
+    desk = set(PACKAGES) - CAR
     assert 'mount_bringup.graph.supervisor' in loaded
     assert not {name.split('.')[0] for name in loaded} & (desk | {'mount_sim', 'rosbags', 'pandas', 'typer'})
     assert not {'scipy.optimize', 'scipy.integrate', 'scipy.signal'} & {*loaded}
