@@ -12,7 +12,7 @@ from engine_mount.recordings.run.screen import Table
 from engine_mount.recordings.run.session import session_parameters
 from engine_mount.recordings.run.told import duration_of, started_of, told_session, versions_told
 from engine_mount.recordings.run.versions import version_differences
-from mount_bringup.changed_parameters import changed_parameters
+from engine_mount.settings.changes import changed_parameters
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
 

@@ -22,7 +22,7 @@ from mount_bringup.graph.supervisor import Parameters, Supervisor
 from mount_bringup.settings import SettingError
 from mount_recorder.session import new_session, session_text
 from mount_ros.environment import prepare_environment
-from mount_ros.nodes.leaving import end_process
+from mount_ros.nodes.shutdown import end_process
 
 SUPERVISOR = 'mount_supervisor'
 
@@ -104,11 +104,12 @@ def _supervise(order: LaunchOrder, folder: Path) -> int:
             graph.wait_until(lambda: graph.finished or time.monotonic() > end, float('inf'), 'the end')
             logger.info('the end of the drive')
         except Interrupted:
-            logger.info('told to end')
+            logger.info('interrupted')
         except GraphError as error:
             logger.error(str(error))
             failed = True
-        complaints = graph.stop()
+        finally:
+            complaints = graph.stop()
         for sentence in [*graph.notes, *complaints, *(each.sentence for each in graph.recovery.restarts)]:
             logger.warning(sentence)
     return 1 if failed or complaints or graph.recovery.restarts else 0

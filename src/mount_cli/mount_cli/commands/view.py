@@ -84,6 +84,7 @@ def status(
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.shutdown import ending_signals
     from mount_report.json_file import write_json
+    from mount_view.feed.feed import FeedError
     from mount_view.screen import status_screen
     from mount_view.view import ViewOrder, model_of, wait_for_state
     from mount_view.window.told import told_state
@@ -101,5 +102,7 @@ def status(
                 raise typer.Exit(1)
             return
         with Live(status_screen(model, feed.title), console=console, refresh_per_second=_REFRESHES) as live:
-            while not ending.wait(1.0 / _REFRESHES):
+            while not model.failure and not ending.wait(1.0 / _REFRESHES):
                 live.update(status_screen(model, feed.title))
+        if model.failure:
+            raise FeedError(model.failure)

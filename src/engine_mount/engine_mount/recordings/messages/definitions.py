@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
-from mount_ros.messages.types import message_class
+from mount_ros.messages.cdr import message_class
 
 Fields = Mapping[str, str]
 

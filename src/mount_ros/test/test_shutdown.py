@@ -3,11 +3,11 @@ import sys
 
 import pytest
 
-from mount_ros.nodes.leaving import leave_middleware
+from mount_ros.nodes.shutdown import leave_middleware
 
 _STUCK = """
 import sys, threading
-from mount_ros.nodes.leaving import end_process, leave_middleware
+from mount_ros.nodes.shutdown import end_process, leave_middleware
 never = threading.Event()
 threading.Thread(target=never.wait).start()  # as a thread of the middleware, which the interpreter waits for
 print(leave_middleware(never.wait, 0.05), end='')
@@ -17,14 +17,14 @@ end_process(3)
 
 _STUCK_WITH_THE_INTERPRETER = """
 import ctypes, functools
-from mount_ros.nodes.leaving import leave_middleware
+from mount_ros.nodes.shutdown import leave_middleware
 keeping = ctypes.PyDLL(None)  # its functions keep the interpreter
 print('last words', end='')
 leave_middleware(functools.partial(keeping.sleep, 600), code={code}, last=0.3)
 """
 _LEFT = """
 import time
-from mount_ros.nodes.leaving import leave_middleware
+from mount_ros.nodes.shutdown import leave_middleware
 leave_middleware(lambda: None, last=2.0)
 time.sleep(2.5)
 print('goes on', end='')
@@ -64,7 +64,7 @@ def test_a_process_that_has_left_goes_on():
 
 _SET = """
 import ctypes, time
-from mount_ros.nodes.leaving import Deadline
+from mount_ros.nodes.shutdown import Deadline
 deadline = Deadline(7)
 deadline.set(2.0)
 deadline.set(0.0)

@@ -5,6 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from mount_experiments.harness.fixed_gaps import (
+    RIG_CURRENTS,
+    RIG_GAPS,
+    RigNoise,
+    measure_actuator,
+)
 from mount_models.actuator.law import checked_force
 from mount_models.coil.gap import (
     crossing_current_from_gap,
@@ -14,12 +20,6 @@ from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics
 from mount_sim.plant.reluctance import ReluctanceActuator, force
 from mount_sim.plant.ripple import RippleCoil, incremental_inductance
-from mount_sim.rack.fixed_gaps import (
-    RIG_CURRENTS,
-    RIG_GAPS,
-    RigNoise,
-    measure_actuator,
-)
 
 MAGNET, COIL = ReluctanceActuator(), RippleCoil()
 

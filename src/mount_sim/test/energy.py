@@ -24,7 +24,11 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
-from mount_sim.plant.hydromount import decoupler_overrun, upper_energy
+from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.hydromount import decoupler_overrun, upper_pressure
+from mount_sim.plant.plant import PLANT, STATE, PlantSimulation, advance
+
+_VEHICLE = int(Seat.VEHICLE)
 
 LOSSES = (
     'suspension_loss',
@@ -67,6 +71,39 @@ def imbalance(account: Any) -> float:
     lost = sum(float(account[name]) for name in LOSSES)
     put_in = float(account['road_work'] + account['engine_work'])
     return put_in - lost - float(account['stored'] - account['first_stored'])
+
+
+class Books:
+    """The account of a simulated vehicle, which `advance` moves on as `PlantSimulation.advance` does."""
+
+    def __init__(self, plant: PlantSimulation):
+        assert (
+            plant.memory.seat == Seat.VEHICLE
+        )  # a rack or a given acceleration has no limit to what it gives
+        self._plant = plant
+        self._account = new_account()
+        self.account = self._account[0]
+
+    def advance(self, values, engine_forces, wanted_current: float) -> None:
+        """Advance the plant and book each step."""
+        memory = self._plant.memory
+        advance_with_books(
+            memory.plant, memory.state, self._account, values, engine_forces, wanted_current, memory.step_time
+        )
+
+
+@compiled
+def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
+    """Advance as `advance` does in a vehicle and book each step in `account`, (1,)."""
+    law = plant.view(PLANT)[0]
+    before = state.copy()
+    for k in range(len(values)):
+        before[:] = state
+        advance(plant, state, _VEHICLE, values[k : k + 1], engine_forces[k : k + 1], wanted_current, dt)
+        was, now = before.view(STATE)[0], state.view(STATE)[0]
+        book_step(
+            account[0], law.vehicle, law.hydromount, law.contact, was, now, values[k], engine_forces[k], dt
+        )
 
 
 @compiled
@@ -125,6 +162,18 @@ def fluid_energy(hydromount, before, after):
     motion = hydromount.track_inertance * before.track_flow * after.track_flow
     motion += hydromount.decoupler_inertance * before.decoupler_flow * after.decoupler_flow
     return chambers + stops + 0.5 * motion
+
+
+@compiled
+def upper_energy(hydromount, volume):
+    """Return the energy (J) of the bulge, the integral of P_1 over V_1 from 0 to `volume` (m^3)."""
+    pressure = upper_pressure(hydromount, volume)
+    rest, asymmetry = hydromount.upper_compliance, hydromount.compliance_asymmetry
+    limit = hydromount.asymmetry_pressure
+    inside = min(max(pressure, -limit), limit)
+    energy = rest * inside * inside * (0.5 - asymmetry * inside / (3.0 * limit))
+    outside = rest * (1.0 - asymmetry * inside / limit)
+    return energy + 0.5 * outside * (pressure * pressure - inside * inside)
 
 
 @compiled

@@ -1,20 +1,26 @@
 """From ripple inductances to air gaps (section 3.2), with standard deviations from the measured scatter.
 
+The coil temperature is that which was measured, else that of the parameter, else unknown. The stamps alone
+decide which reading counts, so that a recording of the same readings gives the same result.
+
 Robustness: in a dwell, readings farther from the median than 4 scaled median deviations are left out and the
 rest averaged; the crossing is a parabola fitted with Tukey's bisquare weights (`mount_models.coil.crossing`).
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from mount_init.errors import AmbiguousCurveError, OutsideCalibrationError, UnusableReadingsError
+from mount_init.errors import OutsideCalibrationError, UnusableReadingsError
 from mount_init.parameters import InitParameters
+from mount_init.ramp import FloatArray
+from mount_init.supply import crossing_at_curves, inductance_at_curves
 from mount_models.actuator.law import OutsideLawError, checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
-from mount_models.coil.crossing import Crossing, CrossingError, find_crossing
 from mount_models.coil.gap import (
     OutsideCurveError,
     gap_from_crossing_current,
@@ -22,11 +28,65 @@ from mount_models.coil.gap import (
     gap_per_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.coil.temperature import crossing_at_calibration, inductance_at_calibration
 from mount_models.force_table import zero_current_rest_gap
 from mount_models.specimen import Specimen
 
-FloatArray = npt.NDArray[np.float64]
+_LONGEST_AGE = 5_000_000_000  # ns, chosen: at 3 A the coil warms by a few kelvin in it, worth some um
+_KEPT = 256  # readings, chosen: at 10 Hz those of the longest ramp
+_MAD_TO_STD = 1.4826  # of a normal distribution
+_FARTHEST = 4.0  # chosen: of 500 good readings one in 30 runs is left out
+_ROUNDING = 1e-6  # chosen: quantisation of readings without noise is no outlier
+_BIN = 0.05  # A, chosen: some ten samples each
+_FEWEST_IN_BIN = 3
+_GAP_STEP = 1e-8  # m
+_CURRENT_STEP = 1e-5  # A
+
+
+class TemperatureSource(Enum):
+    """Where the temperature of an initialisation comes from."""
+
+    MEASURED = 'measured'
+    PARAMETER = 'parameter'
+    UNKNOWN = 'unknown'
+
+
+class CoilTemperature(NamedTuple):
+    """A coil temperature in degC, NaN where it is unknown, and its source."""
+
+    celsius: float = math.nan
+    source: TemperatureSource = TemperatureSource.UNKNOWN
+
+
+class TemperatureReadings:
+    """The newest readings of the present measurement stream; one thread may take while another reads."""
+
+    def __init__(self) -> None:
+        self._readings: deque[tuple[int, float]] = deque(maxlen=_KEPT)
+
+    def take(self, stamp: int, celsius: float) -> None:
+        """Take a reading (degC) of time `stamp` (ns); NaN is none. Those of a time that started anew go."""
+        if math.isnan(celsius):
+            return
+        if self._readings and stamp < self._readings[-1][0]:
+            self._readings.clear()
+        self._readings.append((stamp, celsius))
+
+    def at(self, stamp: int) -> float:
+        """Return the newest reading (degC) not after `stamp` (ns) and not 5 s before it; NaN without one."""
+        for taken, celsius in reversed(tuple(self._readings)):
+            if taken <= stamp:
+                return celsius if stamp - taken <= _LONGEST_AGE else math.nan
+        return math.nan
+
+
+def coil_temperature(readings: TemperatureReadings, stamp: int | None, given: float) -> CoilTemperature:
+    """Return the reading at `stamp` (ns), else the `given` temperature (degC, NaN: none)."""
+    measured = readings.at(stamp) if stamp is not None else math.nan
+    if not math.isnan(measured):
+        return CoilTemperature(measured, TemperatureSource.MEASURED)
+    if not math.isnan(given):
+        return CoilTemperature(given, TemperatureSource.PARAMETER)
+    return CoilTemperature()
 
 
 @dataclass(frozen=True)
@@ -36,7 +96,6 @@ class Dwell:
     inductance: float
     inductance_std: float
     current: float
-    samples: int
     rejected: int
 
 
@@ -89,19 +148,8 @@ def dwell_inductance(current: FloatArray, inductance: FloatArray, parameters: In
         inductance=mean(good),
         inductance_std=standard_deviation(good) / math.sqrt(good.size),
         current=float(np.median(current[finite])),
-        samples=int(good.size),
         rejected=rejected,
     )
-
-
-def inductance_crossing(
-    current: FloatArray, inductance: FloatArray, level: float, parameters: InitParameters
-) -> Crossing:
-    """Return where one ramp's inductance (H) falls through `level` (H); raises `AmbiguousCurveError`."""
-    try:
-        return find_crossing(current, inductance, level, parameters.crossing_half_width)
-    except CrossingError as error:
-        raise AmbiguousCurveError(str(error)) from error
 
 
 def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsius: float) -> RestGap:
@@ -112,10 +160,7 @@ def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsi
     d_rest = d + F(i, d) / k_s.
     """
     try:
-        if specimen.temperature is not None and not math.isnan(celsius):
-            inductance = inductance_at_calibration(
-                specimen.temperature, specimen.gap_curves, inductance, celsius
-            )
+        inductance = inductance_at_curves(specimen, inductance, celsius)
         at_rest = float(rest_gap_from_inductance(specimen.gap_curves, inductance))
         gap_slope = float(gap_per_inductance(specimen.gap_curves, inductance))
         gap = zero_current_rest_gap(
@@ -137,13 +182,11 @@ def contact_gap(
     A temperature that is unknown (NaN) is taken for that of the curves.
 
     At the crossing the pads are compressed by F_N = F(i, d) - k_s (d_rest - d), so d_c = d + F_N / k_p.
-    Raises `OutsideCalibrationError`. A negative F_N is returned as it is, for `plausibility` to judge.
+    Raises `OutsideCalibrationError`. A negative F_N is returned as it is, for `checks` to judge.
     """
     spring, pads = specimen.spring_stiffness, specimen.pad_stiffness
     try:
-        at_curves = current
-        if specimen.temperature is not None and not math.isnan(celsius):
-            at_curves = crossing_at_calibration(specimen.temperature, specimen.gap_curves, current, celsius)
+        at_curves = crossing_at_curves(specimen, current, celsius)
         gap = float(gap_from_crossing_current(specimen.gap_curves, at_curves))
         gap_slope = float(gap_per_crossing_current(specimen.gap_curves, at_curves))
         force = float(checked_force(specimen.force_law, current, gap))
@@ -169,15 +212,6 @@ def inductance_curve(
         up=_binned_medians(edges, current[up], inductance[up]),
         down=_binned_medians(edges, current[down], inductance[down]),
     )
-
-
-_MAD_TO_STD = 1.4826  # of a normal distribution
-_FARTHEST = 4.0  # chosen: of 500 good readings one in 30 runs is left out
-_ROUNDING = 1e-6  # chosen: quantisation of readings without noise is no outlier
-_BIN = 0.05  # A, chosen: some ten samples each
-_FEWEST_IN_BIN = 3
-_GAP_STEP = 1e-8  # m
-_CURRENT_STEP = 1e-5  # A
 
 
 def _binned_medians(edges: FloatArray, current: FloatArray, inductance: FloatArray) -> FloatArray:

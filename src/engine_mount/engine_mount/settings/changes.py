@@ -1,4 +1,4 @@
-"""What a run was told that is not the default."""
+"""The parameters of a run that differ from their defaults."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,7 @@ _OF_THE_RUN = {'uri', 'lockstep', 'interface', 'channel', 'port'}
 
 
 def changed_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, tuple[Any, Any]]]:
-    """Return {node: {parameter: (value, default)}} of what a session tells that is not the default.
+    """Return {node: {parameter: (value, default)}} of a session that differ from the default.
 
     Of friction and contact the default is what the shipped specimen says of this actuator.
     """

@@ -1,4 +1,7 @@
-"""Whether the estimates fit the specimen, the laws and each other; every doubt is a refusal."""
+"""Are the readings those of a working coil, and do the estimates fit the specimen, the laws and each other?
+
+Every doubt is a refusal.
+"""
 
 import math
 from collections.abc import Iterator
@@ -12,26 +15,38 @@ from mount_init.errors import (
     ImpreciseError,
     NoContactError,
     SupplyError,
+    TooFewRipplesError,
+    UnusableReadingsError,
     WrongCoilError,
 )
-from mount_init.estimation import ContactGap, Dwell, FloatArray, InductanceCurve, RestGap
+from mount_init.estimate import ContactGap, Dwell, InductanceCurve, RestGap
 from mount_init.parameters import InitParameters
+from mount_init.ramp import FloatArray, Ramp, Readings
 from mount_init.supply import RampSupply
 from mount_models.actuator.law import checked_force
 from mount_models.coil.resistance import resistance_at
 from mount_models.specimen import Specimen
 
+_RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses in a ramp
 _WORKING_CELSIUS = -40.0, 180.0  # degC, chosen: ISO 16750-4, insulation class H
 
 
 def check_rest_current(specimen: Specimen, dwell: Dwell, parameters: InitParameters) -> None:
     """Raise `CurrentNotFollowingError` unless the mean current of a dwell is the rest current."""
-    offset = dwell.current - specimen.rest_current
-    if abs(offset) > parameters.rest_current_tolerance:
+    if abs(dwell.current - specimen.rest_current) > parameters.rest_current_tolerance:
         raise CurrentNotFollowingError(
             f'coil current at rest ({dwell.current:.4f} A) must lie within '
             f'{parameters.rest_current_tolerance * 1e3:.1f} mA of {specimen.rest_current:.3f} A, for which '
             'the gap curve is calibrated; check the current control of the electronics'
+        )
+
+
+def check_agreement(what: str, first: float, second: float, limit: float, remedy: str) -> None:
+    """Raise `ContradictionError` unless two gaps (m) agree within `limit` (m)."""
+    if abs(first - second) > limit:
+        raise ContradictionError(
+            f'{what} ({first * 1e6:.1f} and {second * 1e6:.1f} um) must agree within {limit * 1e6:.1f} um; '
+            f'{remedy}'
         )
 
 
@@ -70,12 +85,13 @@ def check_resistance(
     )
 
 
-def check_single_crossing(curve: InductanceCurve, level: float, rest_current: float) -> None:
-    """Raise `AmbiguousCurveError` unless L_i falls through `level` (H) exactly once above `rest_current` (A).
+def check_single_crossing(curve: InductanceCurve, specimen: Specimen) -> None:
+    """Raise `AmbiguousCurveError` unless L_i falls through its level exactly once above the rest current.
 
     Below the crossing L_i may rise and fall again while the halves close; it must only stay above the level.
     """
-    for name, current, inductance in _known_parts(curve, rest_current):
+    level = specimen.crossing_inductance
+    for name, current, inductance in _known_parts(curve, specimen.rest_current):
         changes = _level_changes(inductance, level)
         if len(changes) != 1 or not inductance[0] > level:
             places = ', '.join(f'{0.5 * (current[k] + current[k + 1]):.2f} A' for k in changes) or 'nowhere'
@@ -86,12 +102,10 @@ def check_single_crossing(curve: InductanceCurve, level: float, rest_current: fl
             )
 
 
-def check_steady_fall(
-    curve: InductanceCurve, level: float, rest_current: float, parameters: InitParameters
-) -> None:
-    """Raise `AmbiguousCurveError` unless L_i falls from bin to bin around its crossing of `level` (H)."""
-    for name, current, inductance in _known_parts(curve, rest_current):
-        (place,) = _level_changes(inductance, level)
+def check_steady_fall(curve: InductanceCurve, specimen: Specimen, parameters: InitParameters) -> None:
+    """Raise `AmbiguousCurveError` unless L_i falls from bin to bin around its only crossing."""
+    for name, current, inductance in _known_parts(curve, specimen.rest_current):
+        (place,) = _level_changes(inductance, specimen.crossing_inductance)
         centre = 0.5 * (current[place] + current[place + 1])
         near = np.flatnonzero(np.abs(current - centre) <= parameters.monotone_half_width)
         for k in near[:-1]:
@@ -104,26 +118,6 @@ def check_steady_fall(
                 )
 
 
-def check_same_rest_gap(before: RestGap, after: RestGap, parameters: InitParameters) -> None:
-    """Raise `ContradictionError` unless both dwells show the same rest gap."""
-    if abs(before.gap - after.gap) > parameters.rest_gap_tolerance:
-        raise ContradictionError(
-            f'rest gap before and after the ramp ({before.gap * 1e6:.1f} and {after.gap * 1e6:.1f} um) '
-            f'must agree within {parameters.rest_gap_tolerance * 1e6:.1f} um; do the pads stick to the '
-            'rod, or does the coil heat up? Activate again at rest'
-        )
-
-
-def check_same_crossing(gap_up: float, gap_down: float, parameters: InitParameters) -> None:
-    """Raise `ContradictionError` unless both ramps show the same gap (m) at the crossing."""
-    if abs(gap_up - gap_down) > parameters.crossing_gap_tolerance:
-        raise ContradictionError(
-            f'gap at the crossing on the way up and down ({gap_up * 1e6:.1f} and {gap_down * 1e6:.1f} um) '
-            f'must agree within {parameters.crossing_gap_tolerance * 1e6:.1f} um; check the current sensor '
-            'and the pads, and activate again'
-        )
-
-
 def check_contact(
     specimen: Specimen,
     rest: RestGap,
@@ -131,7 +125,10 @@ def check_contact(
     crossing_current: float,
     parameters: InitParameters,
 ) -> None:
-    """Raise `NoContactError` or `ContradictionError` unless the pads were free and then pressed."""
+    """Raise `NoContactError` or `ContradictionError` unless the pads were free and then pressed.
+
+    Raises `ImpreciseError` unless the scatter leaves both gaps precise enough.
+    """
     travel = rest.at_rest_current - contact.gap
     if travel < parameters.smallest_travel:
         raise NoContactError(
@@ -148,10 +145,6 @@ def check_contact(
             f'({pull:.1f} N), else the pads are not in contact; check the springs and spring_stiffness of '
             'the specimen'
         )
-
-
-def check_precision(rest: RestGap, contact: ContactGap, parameters: InitParameters) -> None:
-    """Raise `ImpreciseError` unless the scatter leaves both gaps precise enough."""
     for name, std, largest in (
         ('rest gap', rest.std, parameters.largest_rest_gap_std),
         ('contact gap', contact.std, parameters.largest_contact_gap_std),
@@ -190,3 +183,75 @@ def _level_changes(inductance: FloatArray, level: float) -> list[int]:
     """Return the places before which and behind which the inductance lies on different sides of the level."""
     above = inductance > level
     return np.flatnonzero(above[1:] != above[:-1]).tolist()
+
+
+def check_rate(duration: int, count: int, parameters: InitParameters) -> None:
+    """Raise `UnusableReadingsError` unless the `count` samples of a ramp took the right time (ns)."""
+    rate = 1e9 * (count - 1) / max(1, duration)
+    if abs(rate - parameters.sample_rate) > _RATE_TOLERANCE * parameters.sample_rate:
+        raise UnusableReadingsError(
+            f'coil_ripple came at {rate:.0f} Hz, but sample_rate of mount_init is {parameters.sample_rate:g} '
+            f'Hz (limit {100.0 * _RATE_TOLERANCE:g} %); start the whole graph with one sample_rate'
+        )
+
+
+def check_readings(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
+    """Raise `TooFewRipplesError` or `UnusableReadingsError` unless the whole ramp has good readings."""
+    _check_count(readings, ramp, parameters)
+    _check_signs(readings, parameters)
+    _check_alive(readings, ramp, parameters)
+
+
+def _check_count(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
+    finite = np.isfinite(readings.current)
+    for part in ('dwell_before', 'up', 'down', 'dwell_after'):
+        inside = finite[getattr(ramp, part)]
+        needed = math.ceil(parameters.valid_share * inside.size)
+        found = int(inside.sum())
+        if found < needed:
+            raise TooFewRipplesError(
+                f'air gap not estimated: {found} of {inside.size} ripple samples valid in the part '
+                f'"{part.replace("_", " ")}", needed are {needed}; check the coil ripple measurement'
+            )
+
+
+def _check_signs(readings: Readings, parameters: InitParameters) -> None:
+    for name, unit, rate in _kinds(readings)[1:]:
+        rate = rate[np.isfinite(rate)]
+        wrong = rate[rate <= 0.0]
+        if wrong.size > parameters.rejected_share * rate.size:
+            raise UnusableReadingsError(
+                f'{name} after switching to plus must be positive; {wrong.size} of {rate.size} samples are '
+                f'not, such as {wrong[0]:g} {unit}: check the polarity of the coil and of its sensors'
+            )
+
+
+def _check_alive(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
+    longest = max(2, round(parameters.stuck_duration * parameters.sample_rate))
+    for name, unit, values in _kinds(readings):
+        for part in (ramp.up, ramp.down):
+            length, value = _longest_constant_run(values[part])
+            if length > longest:
+                raise UnusableReadingsError(
+                    f'{name} stayed at {value:g} {unit} for {length} samples while the current was ramped, '
+                    f'more than {longest}; the sensor is stuck: check it and its connection'
+                )
+
+
+def _longest_constant_run(values: FloatArray) -> tuple[int, float]:
+    """Return length and value of the longest run of identical values; NaN is left out."""
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return 0, math.nan
+    starts = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
+    lengths = np.diff(np.append(starts, values.size))
+    longest = int(np.argmax(lengths))
+    return int(lengths[longest]), float(values[starts[longest]])
+
+
+def _kinds(readings: Readings) -> tuple[tuple[str, str, FloatArray], ...]:
+    return (
+        ('coil current', 'A', readings.current),
+        ('slope of the coil current', 'A/s', readings.current_rate),
+        ('slope of the flux density', 'T/s', readings.flux_rate),
+    )

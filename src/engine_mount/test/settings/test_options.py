@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from mount_bringup.settings import (
-    SettingError,
-    checked_settings,
-    defaults_of_nodes,
-    owned,
-    settings_of_options,
-)
+from engine_mount.settings.options import owned, settings_of_options
+from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
 from mount_control.policy import continuous_viscous
 from mount_control.policy.registry import POLICIES
 from mount_models.damper import DamperError, damper_curve
