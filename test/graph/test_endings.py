@@ -27,7 +27,7 @@ def _node_pids(parent: int) -> dict[str, int]:
     """Return {node: pid} of the children of the command."""
     found = {}
     listing = subprocess.run(
-        ['ps', '-o', 'pid=,args=', '--ppid', str(parent)], capture_output=True, text=True, check=False
+        ['ps', '-ww', '-o', 'pid=,args=', '--ppid', str(parent)], capture_output=True, text=True, check=False
     ).stdout
     for line in listing.splitlines():
         pid, _, arguments = line.strip().partition(' ')
