@@ -2,8 +2,8 @@
 
 import openpyxl
 import pytest
-from mount_bags.signals.signal import SignalError
 
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats import excel
 from mount_signals.formats.content import Stated
 

@@ -23,7 +23,7 @@ from mount_replay.faults.processes import (
     process_of,
     shared_memory_of_others,
 )
-from mount_ros.nodes.starter import tied
+from mount_ros.nodes.process import tied
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
 START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws

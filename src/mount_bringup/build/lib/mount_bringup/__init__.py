@@ -1,1 +1,0 @@
-"""Launch files, configuration and the supervisor of the graph."""

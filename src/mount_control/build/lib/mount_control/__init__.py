@@ -1,1 +1,0 @@
-"""Switched, viscous-like friction damping at 1 kHz."""

@@ -1,1 +1,0 @@
-"""CAN FD link to the electronics of the engine mount."""

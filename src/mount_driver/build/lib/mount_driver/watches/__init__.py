@@ -1,1 +1,0 @@
-"""What is watched: the coil, the status, who sends, the heat of the coil; no bus and no clock here."""

@@ -1,1 +1,0 @@
-"""Air gap and current-force table of the engine mount, estimated at each activation."""

@@ -1,1 +1,0 @@
-"""Records the topics of the graph in rosbag2 MCAP bags."""

@@ -1,1 +1,0 @@
-"""Messages as numbers and back, without an executor."""

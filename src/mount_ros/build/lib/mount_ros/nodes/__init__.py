@@ -1,1 +1,0 @@
-"""Lifecycle nodes that fail closed: parameters, diagnostics, processes."""

@@ -1,1 +1,0 @@
-"""The far end of the CAN bus: electronics, actuator, friction contact and vehicle, simulated."""

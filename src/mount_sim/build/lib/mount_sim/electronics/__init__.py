@@ -1,1 +1,0 @@
-"""The electronics' end of the CAN bus: sensors, current loop, faults."""

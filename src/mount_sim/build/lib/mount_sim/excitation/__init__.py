@@ -1,1 +1,0 @@
-"""What shakes the plant: scenarios, roads, recorded accelerations."""

@@ -1,1 +1,0 @@
-"""The plant behind the electronics and its laws: coil, actuator, mount, vehicle."""
