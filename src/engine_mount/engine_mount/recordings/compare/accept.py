@@ -13,7 +13,6 @@ import yaml
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.compare.compare import compare
 from engine_mount.recordings.compare.reference import ANSWERS
-from engine_mount.recordings.compare.words import sentences
 from engine_mount.recordings.edit.messages import Messages, in_log_order, read_messages
 from engine_mount.recordings.messages.series import Payloads
 from engine_mount.recordings.run.session import recorded_session, session_content
@@ -160,7 +159,7 @@ def _changes(before: Recording, run: Recording) -> list[str]:
     comparison = compare(before, run, topics=(*_INPUTS, *ANSWERS), common_only=True)
     if comparison.equal and not comparison.sessions:
         raise AcceptError(f'{run.path} is equal to {before.path} to the bit; there is nothing to accept')
-    return sentences(comparison)
+    return comparison.sentences()
 
 
 def _entry(run: Recording, reason: str, versions: Mapping[str, str], changes: list[str]) -> dict[str, Any]:

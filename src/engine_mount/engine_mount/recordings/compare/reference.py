@@ -7,8 +7,7 @@ import numpy as np
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.compare.compare import Comparison, compare
 from engine_mount.recordings.compare.quantity_text import time_text
-from engine_mount.recordings.compare.words import differences
-from engine_mount.recordings.messages.series import Times
+from engine_mount.recordings.messages.times import Times, distinct
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
 
 ANSWERS = (CURRENT_SETPOINT, CONTROL_TRACE)
@@ -28,7 +27,7 @@ def differences_from_reference(
     comparison = compare(a, b, topics=ANSWERS)
     if not comparison.alignment.same_stamps:
         return ['the replay has other stamps than the reference: it answers other samples']
-    told = differences(comparison)
+    told = comparison.difference_sentences()
     for topic in ANSWERS:
         told += _unmatched(a, b, topic, comparison)
     return told
@@ -56,5 +55,5 @@ def _unmatched(a: Recording, b: Recording, topic: Topic, comparison: Comparison)
 def _since(recording: Recording, topic: Topic, first: int) -> Times:
     if topic.name not in recording:
         return np.empty(0, np.int64)
-    stamps = np.unique(recording[topic.name].stamps)
+    stamps = distinct(recording[topic.name].stamps)
     return stamps[stamps >= first]

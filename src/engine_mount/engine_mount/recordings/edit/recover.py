@@ -18,7 +18,6 @@ from engine_mount.recordings.bag.statement import read_statement
 from engine_mount.recordings.container.mcap_reading.chunks import Chunk
 from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
 from engine_mount.recordings.container.stored import StoredMessages
-from engine_mount.recordings.edit.beside_messages import copy_beside_messages, lost_beside_messages
 from engine_mount.recordings.edit.inherited_statement import inherited_statement, sources_of
 from engine_mount.recordings.edit.verbatim import VerbatimBag
 from mount_recorder.chunk_groups import chunk_group
@@ -98,7 +97,7 @@ def recover(
             raise RecoveryError(f'{path} holds no message that can be recovered: {_reasons(recording)}')
         custom = dict(recording.information.custom_data) if recording.information else {}
         custom['recovered_from'] = f'{recording.path.name}: {stored} messages'
-        copy_beside_messages([recording], bag)
+        bag.copy_beside_messages([recording])
         sources = sources_of(recording, bag.kept_by_topic)
         if sources:
             bag.add_record(RECORDER_RECORD, inherited_statement(sources, bag.kept_by_topic))
@@ -161,7 +160,7 @@ def _balance(recording: Recording, bag: VerbatimBag, stored: int) -> Recovery:
         kept_bytes=size - lost_bytes,
         lost_bytes=lost_bytes,
         all_messages=complete,
-        lost_beside=tuple(lost_beside_messages([recording])),
+        lost_beside=tuple(recording.lost_beside),
         lost_before=_lost_before(recording),
         notes=tuple(recording.warnings),
     )

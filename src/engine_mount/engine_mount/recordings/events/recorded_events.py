@@ -3,16 +3,18 @@
 import re
 from dataclasses import dataclass
 
-from engine_mount.recordings.bag.column_parts import column_parts
+import numpy as np
+
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.event_marks import Mark, read_marks
-from engine_mount.recordings.events.switching_trace import ArrivedSwitching
+from engine_mount.recordings.events.switching_changes import switching_places
 from engine_mount.recordings.messages.series import SeriesError
 from engine_mount.recordings.messages.time_axis import TimeAxis
 from mount_recorder.chunk_groups import registered_topic
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
 SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
+_ACTIVE = 'damping_active'
 _NUMBERED = re.compile(r'(.+?):(\d+)')
 
 
@@ -85,16 +87,21 @@ def _plain(kind: str) -> str:
 def _switching(recording: Recording) -> list[RecordedEvent]:
     if CONTROL_TRACE.name not in recording:
         return []
-    trace = ArrivedSwitching()
     try:
-        for part in column_parts(recording, {CONTROL_TRACE.name: (trace.COLUMN,)}):
-            trace.add(part)
+        recording.load_columns({CONTROL_TRACE.name: (_ACTIVE,)})
+        trace = recording[CONTROL_TRACE.name]
+        stamps, received, active = trace.stamps, trace.receive_times, trace[_ACTIVE]
     except SeriesError:
         return []  # no control trace of ours
+    if not len(stamps):
+        return []
+    order = np.argsort(received, kind='stable')
+    seconds = (stamps[order] - stamps[order[0]]) / 1e9
+    switched = switching_places(seconds, active[order])
     return [
-        RecordedEvent(log_time, stamp, kind)
-        for kind, switched in zip((SWITCH_ON, SWITCH_OFF), trace.by_arrival(), strict=True)
-        for stamp, log_time in zip(switched.stamps.tolist(), switched.receive_times.tolist(), strict=True)
+        RecordedEvent(int(received[place]), int(stamps[place]), kind)
+        for kind, places in zip((SWITCH_ON, SWITCH_OFF), switched, strict=True)
+        for place in order[places].tolist()
     ]
 
 

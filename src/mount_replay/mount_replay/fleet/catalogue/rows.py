@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.container.free_memory import give_back
 from engine_mount.recordings.events.recorded_events import event_time, recorded_events
 from engine_mount.recordings.messages.series import SeriesError
 from engine_mount.recordings.run.session import session_parameters
@@ -45,7 +44,6 @@ def rows_of(recording: Recording, path: Path, place: Place) -> Rows:
     """Return the rows of a recording, which lies at `path`, one for each of its mounts."""
     rows = Rows()
     for part in recording.by_mount():
-        give_back()
         reasons: list[str] = []
         row = {**place_of(place), 'mount': part.mount, 'messages': recording.message_count}
         content = told_session(part)
@@ -129,7 +127,6 @@ def _guarded(part: Recording, reasons: list[str], events: list[Row], row: Row) -
     try:
         figures, audits = lost_figures(part)
         yield figures
-        give_back()
         yield state_figures(part, audits)
         events += _events_of(part, row)
     except (ReadingError, SeriesError, ValueError, KeyError, IndexError) as error:
