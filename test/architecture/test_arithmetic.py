@@ -40,12 +40,12 @@ OF_LIBRARIES = {
 """Functions of `math` and numpy that choose instructions by the processor, contract, or sum in any order."""
 METHODS = {'mean', 'std', 'var', 'dot'}
 ALLOWED = {
-    ('mount_models.arithmetic.random_numbers', 'np.random'): 'whole numbers of PCG64',
+    ('mount_sim.random_numbers', 'np.random'): 'whole numbers of PCG64',
     ('mount_models.arithmetic.elementary', '**'): 'powers of whole numbers and fractions',
     ('mount_sim.plant.check', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_sim.plant.car_check', 'np.linalg'): 'whether parameters are refused, no number of a run',
-    ('mount_models.engine_body', 'np.linalg'): 'natural frequencies, by which parameters are refused',
-    ('mount_models.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
+    ('mount_sim.plant.engine_body', 'np.linalg'): 'natural frequencies, by which parameters are refused',
+    ('mount_sim.plant.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimation', 'np.sum'): 'whole numbers',

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from command import done, refused
 
-from mount_models.actuator.reluctance import ReluctanceActuator, force
 from mount_signals.testing import MAKERS, make_csv
+from mount_sim.plant.reluctance import ReluctanceActuator, force
 from mount_sim.rack.friction import RackNoise, sawtooth
 
 pytestmark = pytest.mark.slow

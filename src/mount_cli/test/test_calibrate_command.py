@@ -9,9 +9,9 @@ import yaml
 
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
-from mount_models.actuator.reluctance import force
 from mount_models.coil.gap import evaluate
 from mount_models.specimen import load_specimen
+from mount_sim.plant.reluctance import force
 from mount_sim.rack.coil import drawn_rack, measure_force, record_ripple, write_columns
 
 RACK = drawn_rack(5)

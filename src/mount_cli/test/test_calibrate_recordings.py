@@ -16,7 +16,6 @@ from mount_identification.rack.force_points import read_force
 from mount_identification.rack.given import GivenValues
 from mount_identification.rack.ripple_recordings import read_ripple
 from mount_models.actuator.law import checked_force
-from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
@@ -27,6 +26,7 @@ from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
 from mount_signals.units.mapping import ColumnChoice
 from mount_sim.electronics.electronics import status_every
+from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.rack.coil import drawn_rack, record_ripple
 
 RACK = drawn_rack(5)

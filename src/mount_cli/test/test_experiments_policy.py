@@ -9,11 +9,11 @@ from mount_experiments.harness.contract import Order
 from mount_experiments.policy import experiment as policy
 from mount_experiments.policy import learnable, limits, runs
 from mount_experiments.policy.cases import CONTINUOUS, POLICIES
-from mount_models.road import RandomRoad, random_road
 from mount_models.sampling import SAMPLE_TIME
-from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
 from mount_signals.roads.inversion import road_of
+from mount_sim.excitation.road import RandomRoad, random_road
 from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 SHORT = {
     'road_levels': '0.06,',

@@ -13,7 +13,7 @@ from engine_mount.recordings.run.place import recording_hash
 from engine_mount.recordings.run.session import recorded_session
 from mount_cli.command import main
 from mount_control.policy.registry import POLICIES
-from mount_models.road import RandomRoad, random_road
+from mount_sim.excitation.road import RandomRoad, random_road
 
 STONE = 0.16  # m
 SPEEDS = ('30', '60', '120')

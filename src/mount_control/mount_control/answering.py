@@ -102,9 +102,9 @@ class Answering:
         """Answer nothing from now on; the watch goes on."""
         self.controller = None
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
-        """Answer with 0 A: until the next activation for a `foreign` writer, and while there is a `doubt`."""
-        self.watch.heed_writers(foreign, doubt)
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
+        """Answer with 0 A: until the next activation for a `confirmed` one, and while one is `suspected`."""
+        self.watch.on_publisher_conflict(confirmed, suspected)
 
     def change(self, settings: ControlSettings, told: str = '') -> None:
         """Go on with other settings from the next usable sample on; may come from another thread."""

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from mount_control.plausibility import HOLD
 from mount_control.sample_watch import SampleCounts
-from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 
 
 class Unread(NamedTuple):

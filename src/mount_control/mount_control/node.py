@@ -35,14 +35,12 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import change_text, dated
 from mount_ros.messages.force_table import ForceTableMessageError, from_bytes
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
-from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
-from mount_ros.nodes.parameter_gate import Change
-from mount_ros.nodes.parameters import SpecimenValues, declare
+from mount_ros.nodes.parameters import Change, SpecimenValues, declare
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.sliding_window import SlidingWindow
+from mount_ros.publishers import UnnamedPublisher
 from mount_ros.timing import LatencyHistogram
-from mount_ros.writers import NamelessWriter
 
 _MEASURED_BEFORE = (
     'measured_before',
@@ -70,7 +68,7 @@ class MountControl(SafeLifecycleNode):
         self._activation = Activation()
         self._damping_log = DampingLog()
         self._foreign = False  # whether another node publishes what this one hears
-        self._nameless = NamelessWriter()
+        self._nameless = UnnamedPublisher()
         self._unread = Unread()
         self._last_sample: tuple[int, float] | None = None  # stamp ns, m
         self._last_setpoint = (0, OFF)  # stamp ns, A
@@ -105,7 +103,7 @@ class MountControl(SafeLifecycleNode):
         path.start()
 
     def activate(self) -> None:
-        self.wait_for_own_writers()
+        self.wait_for_sole_publishers()
         table, air_gap = self._activation.wait(self.answering.watch, self.ending)
         self.answering.watch.check_rate(self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
@@ -114,7 +112,7 @@ class MountControl(SafeLifecycleNode):
         self._heard = time.monotonic()
         self._damping_log = DampingLog()
         self.answering.begin(self._settings, currents, air_gap.stamp)
-        self.tell_writers()
+        self.report_publisher_conflict()
         self.get_logger().info(
             f'takes the table of {air_gap.stamp * 1e-9:.3f} s: up to {max(table.normal_force):.0f} N, offset '
             f'current {air_gap.offset_current:.3f} A; policy {self._settings.parameters.policy}'
@@ -131,17 +129,17 @@ class MountControl(SafeLifecycleNode):
     def cleanup(self) -> None:
         self.answering, self._activation, self._last_sample = Answering(), Activation(), None
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
-        self._foreign = bool(foreign)
-        if foreign:
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
+        self._foreign = bool(confirmed)
+        if confirmed:
             self._activation = Activation()  # the table may be another node's
-        self.answering.heed_writers(foreign, doubt)
+        self.answering.on_publisher_conflict(confirmed, suspected)
 
     def check_parameters(self, values: Mapping[str, Any]) -> None:
         control_settings(values, self._specimen)
         check_policies(values)  # what has no effect now stands in event and session all the same
 
-    def take_changes(self, changes: Mapping[str, Change]) -> None:
+    def apply_changes(self, changes: Mapping[str, Change]) -> None:
         self._settings = control_settings(self._values(), self._specimen)
         self._parameter_changes += len(changes)
         self._warn_without_effect(changes)

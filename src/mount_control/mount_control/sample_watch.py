@@ -155,11 +155,11 @@ class SampleWatch:
         self.foreign, self.nameless = '', False
         self._intruded.clear()
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
         """Take which other sender discovery has found, and which there may be; the first name stays."""
-        if foreign and (self.nameless or not self.foreign):
-            self.foreign, self.nameless = foreign, False
-        self.writer_doubt = doubt
+        if confirmed and (self.nameless or not self.foreign):
+            self.foreign, self.nameless = confirmed, False
+        self.writer_doubt = suspected
 
     def judge(self, stamp: int, displacement: float) -> tuple[Judgement, int]:
         """Return the judgement on a noted sample (ns, m), and how many are missing before it."""

@@ -6,8 +6,7 @@ import pytest
 
 from mount_control.diagnosis import ControlFigures, Counted, Unread, counted, verdict
 from mount_control.sample_watch import SampleCounts
-from mount_ros.nodes.diagnostics import Level, Standing
-from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
 
 GOOD = ControlFigures(
     counts=SampleCounts(samples=10_000),
@@ -143,7 +142,7 @@ def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
 
 @pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged', 'unread'])
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
-    window, standing, told = SlidingWindow(Counted()), Standing(), []
+    window, standing, told = SlidingWindow(Counted()), ActiveFindings(), []
     for tenth in range(300):
         found = 100 * min(max(tenth - 49, 0), 5)
         unread = Unread(found, 'cut') if count == 'unread' else Unread()

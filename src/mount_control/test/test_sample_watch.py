@@ -229,10 +229,10 @@ def test_a_second_sender_is_noticed_by_its_stamps_and_answered_with_0_ampere(wat
 def test_a_sender_noticed_by_its_stamps_is_told_by_its_name_as_soon_as_discovery_has_it(watch):
     _judge(watch, 1, 1, 2, 2, 3, 3)
     assert watch.nameless
-    watch.heed_writers('', '')
+    watch.on_publisher_conflict('', '')
     assert watch.foreign.startswith('3 displacement samples within 1 s were repeated')
     for name in ('/evil', '/worse'):
-        watch.heed_writers(f'{name} must not publish', '')
+        watch.on_publisher_conflict(f'{name} must not publish', '')
         assert (watch.foreign, watch.nameless) == ('/evil must not publish', False)
     watch.begin(600 * MS, ControlParameters())
     assert (watch.foreign, watch.nameless) == ('', False)

@@ -88,7 +88,7 @@ class Collector:
         """Return the names of the topics that no publisher has been found for yet."""
         return sorted(s.topic_name for s, *_ in self._receivers if s.get_publisher_count() == 0)
 
-    def attend(self, work: Work) -> None:
+    def add_poll(self, work: Work) -> None:
         """Let the thread that serves the publishers do `work` too while it serves; `work` must not raise."""
         if self._shared_thread is None:
             raise ValueError('a collector with a thread of its own attends to nothing but its messages')
@@ -98,7 +98,7 @@ class Collector:
         """Begin to take messages."""
         if self._shared_thread is not None:
             for work in self._works:
-                self._shared_thread.attend(work)
+                self._shared_thread.add_poll(work)
                 self._attended.append(work)
             return
         self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
@@ -113,7 +113,7 @@ class Collector:
             with contextlib.suppress(DataThreadEndedError):
                 self._shared_thread.change(self._take_batch)
             for work in self._attended:
-                self._shared_thread.leave(work)
+                self._shared_thread.remove_poll(work)
         if self._thread is not None:
             self._thread.join()
         self.node.destroy_node()

@@ -8,8 +8,7 @@ from typing import NamedTuple
 from mount_recorder.recorder import RecorderFigures, Unobserved
 from mount_recorder.snapshot import SnapshotFigures
 from mount_recorder.stamp_watch import FARTHEST, StampWatch
-from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 
 LEAST_FREE = 1 << 30  # bytes, chosen
 LEAST_TIME = 60.0  # s, chosen: how long the disk must last at the present rate

@@ -25,12 +25,11 @@ from mount_recorder.space import SpaceGuard
 from mount_recorder.watching import present_time, watch_topic
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import BY_HAND, Mark, mark_text
-from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.real_time import Urgent
-from mount_ros.nodes.sliding_window import SlidingWindow
+from mount_ros.nodes.real_time import RealTimeThreads
 from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
 
 NAME = 'mount_recorder'
@@ -47,7 +46,8 @@ class MountRecorder(SafeLifecycleNode):
     """Receives from `configure` on, records from `activate` to `deactivate`."""
 
     run_time_parameters = frozenset({'mark_text'})
-    urgent = Urgent(frozenset({f'{NAME}_io'}), interpreter=False)  # the collector; its queues hold seconds
+    # The collector; its queues hold seconds.
+    real_time_threads = RealTimeThreads(frozenset({f'{NAME}_io'}), interpreter=False)
 
     def __init__(self, name: str = NAME, **arguments):
         super().__init__(name, **arguments)
@@ -106,7 +106,7 @@ class MountRecorder(SafeLifecycleNode):
         if mounts != [''] and EVENT in topics:
             self._record(data_path, EVENT, '')  # marks of the recorder itself, which concern all mounts
         if self.lockstep:
-            data_path.attend(self._recorder.poll)
+            data_path.add_poll(self._recorder.poll)
         data_path.start()
 
     def activate(self) -> None:
@@ -182,7 +182,7 @@ class MountRecorder(SafeLifecycleNode):
 
     def _open_collector(self) -> Collector:
         thread = self.data_thread if self.lockstep else None
-        self.data_path = collector = Collector(self, thread=thread, on_failure=self.tell_failure)
+        self.data_path = collector = Collector(self, thread=thread, on_failure=self.report_failure)
         return collector
 
     def _record(self, data_path: Collector, entry: Topic, mount: str) -> None:

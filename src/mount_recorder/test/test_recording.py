@@ -20,8 +20,7 @@ from mount_recorder.recorder import Recorder, RecorderFigures, Unobserved
 from mount_recorder.space import SpaceGuard
 from mount_recorder.stamp_watch import StampWatch
 from mount_ros.messages.scalars import stamp_of
-from mount_ros.nodes.diagnostics import Level, Standing
-from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
 from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
@@ -254,7 +253,7 @@ def test_little_space_is_a_warning_with_what_is_left(tmp_path):
 
 @pytest.mark.parametrize('kind', ['lost', 'missing', 'misdated', 'unobserved'])
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(kind):
-    window, standing, told = SlidingWindow(Counted()), Standing(), []
+    window, standing, told = SlidingWindow(Counted()), ActiveFindings(), []
     watch, figures = StampWatch(1000.0), RecorderFigures(0, 0, 0, 0, 0, 0, '')
     unobserved = {}
     for tenth in range(300):

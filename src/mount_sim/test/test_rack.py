@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from engine_mount.recordings.signals.csv_file import read_csv
-from mount_models.actuator.reluctance import force
+from mount_sim.plant.reluctance import force
 from mount_sim.rack.coil import (
     GAPS,
     Rack,

@@ -6,7 +6,6 @@ from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_bringup.sample_rate import check_sample_rate
 from mount_control.settings import check_effect
 from mount_driver.parameters import DriverParameters
-from mount_models.actuator.closing import checked_closing
 from mount_models.quantity import with_flattened
 from mount_recorder.parameters import RecorderParameters
 from mount_replay.drive.recorder_options import checked_recorder
@@ -17,6 +16,7 @@ from mount_sim.excitation.scenario import build_excitation
 from mount_sim.excitation.shaking import steps_of_sample
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant
+from mount_sim.plant.closing import checked_closing
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
 

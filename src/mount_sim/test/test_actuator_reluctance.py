@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_models.actuator.law import TABLE_1, checked_force
-from mount_models.actuator.reluctance import (
+from mount_models.quantity import ParameterError, checked, quantities, with_values
+from mount_sim.plant.reluctance import (
     MU_0,
     ReluctanceActuator,
     core_field,
@@ -20,7 +21,6 @@ from mount_models.actuator.reluctance import (
     gap_permeance,
     mean_incremental_inductance,
 )
-from mount_models.quantity import ParameterError, checked, quantities, with_values
 
 MAGNET = ReluctanceActuator()
 CURRENTS = (0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)

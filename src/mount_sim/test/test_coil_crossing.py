@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mount_models.actuator.closing import ClosingMechanics, closed_state
-from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.crossing import CrossingError, find_crossing
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
+from mount_sim.plant.closing import ClosingMechanics, closed_state
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
 MAGNET, COIL = ReluctanceActuator(), RippleCoil()
 RAMP = np.linspace(0.0, 2.0, 1001)

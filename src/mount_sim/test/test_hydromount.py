@@ -6,8 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.elastomer import Elastomer, dynamic_stiffness
-from mount_models.hydromount import (
+from mount_models.quantity import checked, quantities
+from mount_sim.plant.elastomer import Elastomer, dynamic_stiffness
+from mount_sim.plant.hydromount import (
     HYDROMOUNT_STATE,
     Hydromount,
     decoupler_overrun,
@@ -16,7 +17,6 @@ from mount_models.hydromount import (
     upper_energy,
     upper_pressure,
 )
-from mount_models.quantity import checked, quantities
 
 HYDROMOUNT = Hydromount()
 SYMMETRIC = HYDROMOUNT._replace(compliance_asymmetry=0.0)

@@ -6,13 +6,13 @@ import types
 import pytest
 from rclpy.node import Node
 
-import mount_ros.writers
+import mount_ros.publishers
 from mount_ros.data_path import DataPath
 from mount_ros.messages.types import message_class
+from mount_ros.publishers import NAMING_TIME, PublisherConflictError, PublisherWatch, UnnamedPublisher
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, TOPICS
-from mount_ros.writers import NAMING_TIME, ForeignWriterError, NamelessWriter, WriterWatch
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def heard(context):
     """A data path in a namespace that hears the displacement, and what it was told of writers."""
     owner = Node('listener', namespace='/car', context=context)
     changes = []
-    path = DataPath(owner, on_writers=lambda *_: changes.append(threading.current_thread().name))
+    path = DataPath(owner, on_conflict=lambda *_: changes.append(threading.current_thread().name))
     path.changes = changes
     path.subscribe(DISPLACEMENT, lambda raw: None)
     path.start()
@@ -47,8 +47,9 @@ def heard(context):
 
 def _settled(path):
     """Return what the watch finds; the names of nodes come a little after their publishers."""
-    wait_until(lambda: path.writers.look() or '_NAME_UNKNOWN' not in path.writers.doubt, 'the names')
-    return path.writers.foreign, path.writers.doubt
+    watch = path.publisher_watch
+    wait_until(lambda: watch.look() or '_NAME_UNKNOWN' not in watch.suspected, 'the names')
+    return watch.confirmed, watch.suspected
 
 
 def test_topics_that_decide_on_the_current_have_writers_and_others_have_none():
@@ -72,11 +73,11 @@ def test_a_second_publisher_is_told_in_the_data_thread_as_soon_as_it_is_found(he
         '/elsewhere/stranger must not publish displacement too (limit: one writer, mount_driver): end it'
     )
     wait_until(lambda: _settled(heard) == (sentence, ''), 'the name of the stranger')
-    with pytest.raises(ForeignWriterError, match='/elsewhere/stranger must not publish'):
-        heard.writers.wait_for_own(threading.Event())
+    with pytest.raises(PublisherConflictError, match='/elsewhere/stranger must not publish'):
+        heard.publisher_watch.wait_for_own(threading.Event())
     stranger.destroy_node()
     wait_until(lambda: _settled(heard) == ('', ''), 'the end of the stranger')
-    heard.writers.wait_for_own(threading.Event())
+    heard.publisher_watch.wait_for_own(threading.Event())
 
 
 def test_one_node_alone_may_stand_in_for_the_writer(heard, publish_from):
@@ -104,7 +105,7 @@ def test_two_of_one_name_are_a_doubt_until_no_killed_one_can_be_left(heard, publ
         'gone after 6 s, else end it'
     )
     wait_until(lambda: _settled(heard) == ('', sentence), 'the doubt')
-    monkeypatch.setattr(mount_ros.writers, 'LONGEST_DOUBT', 0.0)
+    monkeypatch.setattr(mount_ros.publishers, 'LONGEST_DOUBT', 0.0)
     wait_until(lambda: _settled(heard)[0].startswith(f'/car/{name} must not publish'), 'the certainty')
     twins[0].destroy_node()
     wait_until(lambda: _settled(heard) == ('', ''), 'the end of one of them')
@@ -114,15 +115,15 @@ def test_an_activation_waits_for_the_end_of_a_doubt_and_no_longer_than_the_proce
     twins = [publish_from('mount_driver_io') for _ in range(2)]
     wait_until(lambda: _settled(heard)[1], 'the doubt')
     ending = threading.Event()
-    waiting = threading.Thread(target=heard.writers.wait_for_own, args=(ending,))
+    waiting = threading.Thread(target=heard.publisher_watch.wait_for_own, args=(ending,))
     waiting.start()
     twins[0].destroy_node()
     waiting.join()
     twins.append(publish_from('mount_driver_io'))
     wait_until(lambda: _settled(heard)[1], 'the doubt')
     ending.set()
-    with pytest.raises(ForeignWriterError, match='a killed one is gone after 6 s'):
-        heard.writers.wait_for_own(ending)
+    with pytest.raises(PublisherConflictError, match='a killed one is gone after 6 s'):
+        heard.publisher_watch.wait_for_own(ending)
 
 
 def test_each_of_several_writers_may_be_there_once(heard, publish_from):
@@ -148,20 +149,22 @@ def _info(name, kind=DISPLACEMENT.type, namespace='/car'):
 def test_a_node_without_a_name_is_a_doubt_and_one_of_another_type_is_not_heard(heard, monkeypatch):
     infos = [_info('mount_driver_io'), _info('stranger', 'std_msgs/msg/String')]
     monkeypatch.setattr(heard.node, 'get_publishers_info_by_topic', lambda topic: infos)
-    heard.writers.notice(DISPLACEMENT)
-    assert (heard.writers.foreign, heard.writers.doubt) == ('', '')
+    heard.publisher_watch.notice(DISPLACEMENT)
+    assert (heard.publisher_watch.confirmed, heard.publisher_watch.suspected) == ('', '')
     infos.append(_info('_NODE_NAME_UNKNOWN_', namespace='_NODE_NAMESPACE_UNKNOWN_'))
-    heard.writers.notice(DISPLACEMENT)
-    assert heard.writers.foreign == ''
-    assert heard.writers.doubt.startswith('a node without a name must not publish displacement too')
+    heard.publisher_watch.notice(DISPLACEMENT)
+    assert heard.publisher_watch.confirmed == ''
+    assert heard.publisher_watch.suspected.startswith(
+        'a node without a name must not publish displacement too'
+    )
     infos[-1] = _info('evil')
-    heard.writers.look()
-    assert heard.writers.foreign.startswith('/car/evil must not publish displacement too')
+    heard.publisher_watch.look()
+    assert heard.publisher_watch.confirmed.startswith('/car/evil must not publish displacement too')
 
 
 def test_the_name_of_a_writer_is_awaited_for_a_moment_from_its_first_message(monkeypatch):
-    now, nameless = [100.0], NamelessWriter()
-    monkeypatch.setattr(mount_ros.writers.time, 'monotonic', lambda: now[0])
+    now, nameless = [100.0], UnnamedPublisher()
+    monkeypatch.setattr(mount_ros.publishers.time, 'monotonic', lambda: now[0])
     assert not nameless.is_awaited(False)
     for _ in range(2):
         begin = now[0]
@@ -198,14 +201,14 @@ def test_of_two_changes_found_by_two_threads_the_newer_one_is_delivered_last():
         threading.Event(),
     )
 
-    def on_change(foreign, doubt):
+    def on_change(confirmed, suspected):
         if not first.is_set():
             first.set()
             going_on.wait(LIMIT)  # the first thread is held up amid its delivery
-        delivered.append((bool(foreign), bool(doubt)))
+        delivered.append((bool(confirmed), bool(suspected)))
 
-    watch = WriterWatch(publishers, on_change)
-    watch.hear(DISPLACEMENT, publishers)
+    watch = PublisherWatch(publishers, on_change)
+    watch.watch(DISPLACEMENT, publishers)
     watch.look()
     publishers.names = ('mount_driver_io', 'mount_driver_io')  # a doubt
     threads = [threading.Thread(target=watch.look)]
@@ -214,7 +217,7 @@ def test_of_two_changes_found_by_two_threads_the_newer_one_is_delivered_last():
     publishers.names = ('mount_driver_io', 'stranger')
     threads.append(threading.Thread(target=watch.look))
     threads[1].start()
-    wait_until(lambda: watch.foreign, 'the second change')
+    wait_until(lambda: watch.confirmed, 'the second change')
     going_on.set()
     for thread in threads:
         thread.join(LIMIT)

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import cosines, exp, log, sine_and_cosine, sines
-from mount_models.arithmetic.random_numbers import RandomNumbers
 from mount_models.quantity import Quantity, checked
+from mount_sim.random_numbers import RandomNumbers
 
 FloatArray = npt.NDArray[np.float64]
 _Speed = Annotated[float, Quantity('m/s', 'speed of the vehicle', 0.1, 100.0)]

@@ -9,13 +9,13 @@
 Axes: x forward, y left, z up, origin in the centre of gravity; phi (roll) lifts the left side, theta (pitch)
 lowers the front; small angles. z: heave of the centre of gravity; F_z: force on the engine at (x_F, y_F).
 
-Below the mounts stand q quarters of a vehicle that move alike (`mount_models.vehicle`), with one piece of
+Below the mounts stand q quarters of a vehicle that move alike (`mount_sim.plant.vehicle`), with one piece of
 local chassis at each mount:
 
     m_u z_u'' = k_t (z_r - z_u) - F_s,  q m_b z_b'' = q F_s - sum F_ci,  m_ci z_ci'' = F_ci + F_i
 
 or a chassis whose acceleration is given; heave is relative to it then. The step is that of
-`mount_models.vehicle`: semi-implicit Euler.
+`mount_sim.plant.vehicle`: semi-implicit Euler.
 """
 
 from collections.abc import Sequence
@@ -26,8 +26,8 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
-from mount_models.elastomer import Elastomer, branch_step, elastomer_force
 from mount_models.quantity import Quantity
+from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
 
 FloatArray = npt.NDArray[np.float64]
 

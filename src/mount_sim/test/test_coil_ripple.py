@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from mount_models.actuator.reluctance import (
+from mount_models.quantity import checked, quantities, with_values
+from mount_sim.plant.reluctance import (
     ReluctanceActuator,
     core_field,
     differential_permeability,
     mean_incremental_inductance,
 )
-from mount_models.coil.ripple import (
+from mount_sim.plant.ripple import (
     RippleCoil,
     current_rate,
     diffusion_time,
@@ -26,7 +27,6 @@ from mount_models.coil.ripple import (
     skin_factor,
     skin_factor_series,
 )
-from mount_models.quantity import checked, quantities, with_values
 
 MAGNET = ReluctanceActuator()
 COIL = RippleCoil()

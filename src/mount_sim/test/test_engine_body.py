@@ -7,8 +7,9 @@ import pytest
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype
-from mount_models.elastomer import Elastomer
-from mount_models.engine_body import (
+from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road
+from mount_sim.plant.elastomer import Elastomer
+from mount_sim.plant.engine_body import (
     RigidEngine,
     Support,
     accelerated_engine_step,
@@ -19,8 +20,7 @@ from mount_models.engine_body import (
     resting_supports,
     support_records,
 )
-from mount_models.road import Gap, RandomRoad, gap_in_road, random_road
-from mount_models.vehicle import (
+from mount_sim.plant.vehicle import (
     ENGINE_STATE,
     Engine,
     Vehicle,
@@ -171,7 +171,7 @@ def test_a_motion_without_stiffness_has_no_frequency():
 
 
 def energy_and_losses(supports, road, forces):
-    """Return (work put in, energy stored, energy lost) at each step, J, as in `mount_models.energy`."""
+    """Return (work put in, energy stored, energy lost) at each step, J, as in `mount_sim.plant.energy`."""
     vehicle, engine, records = record(VEHICLE)[0], record(ENGINE)[0], support_records(supports)
     body, states = resting_body(), resting_supports(len(supports))
     works, stored, lost = [0.0], [], [0.0]

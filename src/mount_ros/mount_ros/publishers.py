@@ -24,75 +24,76 @@ _LOOK_PERIOD = 0.05  # s, chosen: while an activation waits
 _NAMELESS = '_NODE_NAME_UNKNOWN_'  # rmw_fastrtps, until the name has come
 
 
-class ForeignWriterError(ValueError):
+class PublisherConflictError(ValueError):
     """A topic that decides on the coil's current has a publisher that is not its own."""
 
 
 @dataclass
-class _Heard:
+class _WatchedTopic:
     """What is known of the publishers of one topic."""
 
     subscription: Subscription
     count: int = -1  # of publishers at the last look
-    foreign: str = ''
-    doubt: str = ''
+    confirmed: str = ''
+    suspected: str = ''
     since: float = 0.0  # of the doubt, s, steady clock
 
 
-class WriterWatch:
-    """Holds the publishers of the heard topics against those that the registry names; any thread may ask.
+class PublisherWatch:
+    """Holds the publishers of the watched topics against those that the registry names; any thread may ask.
 
     A topic's own writers are the nodes `<writer>_io` in the namespace of `node`, each once. Where none of
-    them is there, one other node may stand in for them: a replay or a test bench. `on_change(foreign, doubt)`
-    is called, in the thread that finds it, when they have changed: one call at a time, each with what holds
-    then, so that of changes found by two threads the newer one is delivered last.
+    them is there, one other node may stand in for them: a replay or a test bench.
+    `on_change(confirmed, suspected)` is called, in the thread that finds it, when they have changed: one call
+    at a time, each with what holds then, so that of changes found by two threads the newer one is last.
     """
 
     def __init__(self, node: Node, on_change: Callable[[str, str], None]):
-        self.foreign = ''
+        self.confirmed = ''
         """Which other node publishes on which topic, and the remedy; empty where none does."""
-        self.doubt = ''
+        self.suspected = ''
         """The same where it may be a killed writer, or one whose name has not come yet."""
         self._node = node
         self._on_change = on_change
-        self._heard: dict[Topic, _Heard] = {}
+        self._watched: dict[Topic, _WatchedTopic] = {}
         self._guard = threading.Lock()
         self._delivery = threading.RLock()
 
-    def hear(self, topic: Topic, subscription: Subscription) -> None:
+    def watch(self, topic: Topic, subscription: Subscription) -> None:
         """Watch the writers of `topic`."""
         with self._guard:
-            self._heard[topic] = _Heard(subscription)
+            self._watched[topic] = _WatchedTopic(subscription)
 
     def forget(self, topic: Topic) -> None:
         """Watch the writers of `topic` no more."""
         with self._guard:
-            self._heard.pop(topic, None)
+            self._watched.pop(topic, None)
 
     def end(self) -> None:
         """Watch nothing any more."""
         with self._guard:
-            self._heard.clear()
+            self._watched.clear()
 
     def notice(self, topic: Topic) -> None:
         """Look who has come to `topic`, or gone."""
         with self._guard:
-            if topic in self._heard:
-                self._heard[topic].count = -1
+            if topic in self._watched:
+                self._watched[topic].count = -1
         self.look()
 
     def look(self) -> None:
         """Look at each topic whose publishers have changed in number, or are in doubt."""
         with self._guard:
-            before = self.foreign, self.doubt
-            for topic, heard in self._heard.items():
-                count = heard.subscription.get_publisher_count()
-                if count != heard.count or heard.doubt:
-                    heard.count = count
-                    self._judge(topic, heard)
-            self.foreign = next((heard.foreign for heard in self._heard.values() if heard.foreign), '')
-            self.doubt = next((heard.doubt for heard in self._heard.values() if heard.doubt), '')
-            changed = before != (self.foreign, self.doubt)
+            before = self.confirmed, self.suspected
+            for topic, watched in self._watched.items():
+                count = watched.subscription.get_publisher_count()
+                if count != watched.count or watched.suspected:
+                    watched.count = count
+                    self._judge(topic, watched)
+            every = self._watched.values()
+            self.confirmed = next((each.confirmed for each in every if each.confirmed), '')
+            self.suspected = next((each.suspected for each in every if each.suspected), '')
+            changed = before != (self.confirmed, self.suspected)
         if changed:
             self.deliver()
 
@@ -100,27 +101,27 @@ class WriterWatch:
         """Call `on_change` with what holds now."""
         with self._delivery:
             with self._guard:
-                foreign, doubt = self.foreign, self.doubt
-            self._on_change(foreign, doubt)
+                confirmed, suspected = self.confirmed, self.suspected
+            self._on_change(confirmed, suspected)
 
     def wait_for_own(self, ending: threading.Event) -> None:
-        """Return when no other writer is there, or raise `ForeignWriterError`; a doubt is waited for."""
+        """Return when no other writer is there, or raise `PublisherConflictError`; a doubt is waited for."""
         while True:
             self.look()
-            if not (self.foreign or self.doubt):
+            if not (self.confirmed or self.suspected):
                 return
-            if self.foreign or ending.wait(_LOOK_PERIOD):
-                raise ForeignWriterError(self.foreign or self.doubt)
+            if self.confirmed or ending.wait(_LOOK_PERIOD):
+                raise PublisherConflictError(self.confirmed or self.suspected)
 
-    def _judge(self, topic: Topic, heard: _Heard) -> None:
+    def _judge(self, topic: Topic, watched: _WatchedTopic) -> None:
         now = time.monotonic()
-        since = heard.since if heard.doubt else now
-        foreign, doubtful = self._others(topic)
-        if doubtful and now - since > LONGEST_DOUBT:
-            foreign, doubtful = foreign or doubtful, []
-        heard.since = since
-        heard.foreign = _sentence(topic, foreign, 'end it') if foreign else ''
-        heard.doubt = _sentence(topic, doubtful, _IF_KILLED) if doubtful else ''
+        since = watched.since if watched.suspected else now
+        confirmed, suspected = self._others(topic)
+        if suspected and now - since > LONGEST_DOUBT:
+            confirmed, suspected = confirmed or suspected, []
+        watched.since = since
+        watched.confirmed = _sentence(topic, confirmed, 'end it') if confirmed else ''
+        watched.suspected = _sentence(topic, suspected, _IF_KILLED) if suspected else ''
 
     def _others(self, topic: Topic) -> tuple[list[str], list[str]]:
         """Return the publishers of `topic` that are certainly not its own, and those that may not be."""
@@ -142,7 +143,7 @@ class WriterWatch:
         return [], twice
 
 
-class NamelessWriter:
+class UnnamedPublisher:
     """A second writer that is known by what it sends alone, until discovery names it."""
 
     def __init__(self):

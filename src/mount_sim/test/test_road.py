@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from mount_models.quantity import ParameterError, checked, quantities
-from mount_models.road import (
+from mount_sim.excitation.road import (
     ROAD_CLASSES,
     Gap,
     RandomRoad,

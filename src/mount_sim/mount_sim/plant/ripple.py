@@ -8,10 +8,10 @@ It belongs to the plant, as `actuator.reluctance` does; the controller reads gap
 import math
 from typing import Annotated, NamedTuple
 
-from mount_models.actuator.reluctance import core_field, differential_permeability, gap_permeance
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import exp, expm1
 from mount_models.quantity import Quantity
+from mount_sim.plant.reluctance import core_field, differential_permeability, gap_permeance
 
 
 class RippleCoil(NamedTuple):

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.elastomer import dynamic_stiffness
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_step
 from mount_models.quantity import checked, quantities
-from mount_models.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
-from mount_models.vehicle import (
+from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
+from mount_sim.plant.elastomer import dynamic_stiffness
+from mount_sim.plant.friction import full_step
+from mount_sim.plant.vehicle import (
     ENGINE_STATE,
     VEHICLE_STATE,
     Engine,

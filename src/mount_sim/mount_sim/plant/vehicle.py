@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
-from mount_models.elastomer import Elastomer, branch_step, elastomer_force
 from mount_models.quantity import Quantity
+from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
 
 FloatArray = npt.NDArray[np.float64]
 

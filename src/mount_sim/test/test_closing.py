@@ -8,7 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from mount_models.actuator.closing import (
+from mount_models.quantity import ParameterError, quantities, with_values
+from mount_sim.plant.closing import (
     ClosingError,
     ClosingMechanics,
     checked_closing,
@@ -16,9 +17,8 @@ from mount_models.actuator.closing import (
     contact_current,
     contact_force,
 )
-from mount_models.actuator.reluctance import MU_0, ReluctanceActuator, differential_permeability, force
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
-from mount_models.quantity import ParameterError, quantities, with_values
+from mount_sim.plant.reluctance import MU_0, ReluctanceActuator, differential_permeability, force
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
 MAGNET, COIL, MOUNT = ReluctanceActuator(), RippleCoil(), ClosingMechanics()
 WIDE = with_values(MOUNT, contact_gap=250e-6)

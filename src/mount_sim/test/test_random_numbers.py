@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from mount_models.arithmetic.random_numbers import RandomNumbers
+from mount_sim.random_numbers import RandomNumbers
 
 UNIFORM = ['0x1.060d7be6f245cp-1', '0x1.e6a32d7782a55p-1']
 NORMAL = ['-0x1.faa9919694f12p-1', '0x1.d5fe43b6020c8p-2', '-0x1.6936c9867ccd4p-3']

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.elastomer import Elastomer, branch_step, dynamic_stiffness, elastomer_force
 from mount_models.quantity import checked, quantities
+from mount_sim.plant.elastomer import Elastomer, branch_step, dynamic_stiffness, elastomer_force
 
 ELASTOMER = Elastomer()
 

@@ -7,9 +7,9 @@ forces is `force_table`.
 import math
 from typing import Annotated, NamedTuple
 
-from mount_models.actuator.reluctance import ReluctanceActuator, force, force_and_gap_slope
 from mount_models.arithmetic.compiled import compiled
 from mount_models.quantity import Quantity, checked
+from mount_sim.plant.reluctance import ReluctanceActuator, force, force_and_gap_slope
 
 
 class ClosingError(ValueError):

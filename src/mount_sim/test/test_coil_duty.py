@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from mount_models.actuator.reluctance import ReluctanceActuator, gap_permeance
 from mount_models.coil.duty import Bridge, at_calibrated_duty, duty, gap_reluctance, skin_ratio, skin_shape
 from mount_models.coil.resistance import resistance_beside_drift
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.specimen import default_specimen
+from mount_sim.plant.reluctance import ReluctanceActuator, gap_permeance
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
 TRUTH = ReluctanceActuator()
 SPECIMEN = default_specimen()

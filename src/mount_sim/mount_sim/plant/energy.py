@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
-from mount_models.hydromount import decoupler_overrun, upper_energy
+from mount_sim.plant.hydromount import decoupler_overrun, upper_energy
 
 LOSSES = (
     'suspension_loss',
