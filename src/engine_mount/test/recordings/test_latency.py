@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine_mount.recordings.audit.latency import EDGES, on_one_clock, setpoint_latency
+from engine_mount.recordings.audit.answers import EDGES, on_one_clock, setpoint_latency
 
 SOON = st.lists(st.integers(-3_000, 30_000_000), min_size=2, max_size=60)
 ANY = st.lists(st.integers(-(10**13), 10**13) | st.integers(0, 3), min_size=2, max_size=60)

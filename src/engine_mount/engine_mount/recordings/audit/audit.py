@@ -10,11 +10,18 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from engine_mount.recordings.audit.answers import Answers, Control, Setpoints, judge_answers, spanned
-from engine_mount.recordings.audit.latency import Latency, setpoint_latency
+from engine_mount.recordings.audit.answers import (
+    Answers,
+    Control,
+    Latency,
+    Setpoints,
+    judge_answers,
+    setpoint_latency,
+    spanned,
+)
 from engine_mount.recordings.audit.node_reports import NodeReport, node_reports
+from engine_mount.recordings.bag.metadata import read_statement
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.bag.statement import read_statement
 from engine_mount.recordings.messages.columns import TopicTimes
 from engine_mount.recordings.messages.series import SeriesError
 from engine_mount.recordings.messages.stamps import (
@@ -87,12 +94,14 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     Lost is what the stamps show, or what the recorder, the file's proven summary or `metadata.yaml` counted
     and is not there, whichever is more.
     """
-    times, told = recording.times(), _told_by_recorder(recording)
+    times, recorded = recording.times(), _recorder_counts(recording)
     rates = {name: _rate(recording, found) for name, found in times.items()}
     plausible = {name: _redated(found, rates[name]) for name, found in times.items()}
     audits = {
-        name: _with_told(
-            _audit_topic(plausible, times[name], rates[name]), recording.missing.get(name, 0), told.get(name)
+        name: _with_counts(
+            _audit_topic(plausible, times[name], rates[name]),
+            recording.missing.get(name, 0),
+            recorded.get(name),
         )
         for name in recording
     }
@@ -105,24 +114,24 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
             sampled, traced = namespace + DISPLACEMENT.name, namespace + CONTROL_TRACE.name
             audits[sampled] = replace(audits[sampled], lost_samples=lost, answers=answers)
             if steps := _lost_steps(recording, plausible, namespace, answers):
-                audits[traced] = _with_told(audits[traced], steps, None)
+                audits[traced] = _with_counts(audits[traced], steps, None)
     return audits
 
 
-def _told_by_recorder(recording: Recording) -> dict[str, int]:
+def _recorder_counts(recording: Recording) -> dict[str, int]:
     """Return how many messages of each topic the recorder says there ought to be."""
-    told: dict[str, int] = {}
+    recorded: dict[str, int] = {}
     for file in recording.files:
         for name, row in read_statement(file.metadata.get(RECORDER_RECORD, {})).items():
-            told[name] = row.get('kept', 0) + max(0, row.get('lost', 0))
-    return told
+            recorded[name] = row.get('kept', 0) + max(0, row.get('lost', 0))
+    return recorded
 
 
-def _with_told(entry: TopicAudit, missing: int, told: int | None) -> TopicAudit:
+def _with_counts(entry: TopicAudit, missing: int, recorded: int | None) -> TopicAudit:
     """Return the audit with what others counted taken into account."""
-    absent = max(missing, (told or 0) - entry.present)
+    absent = max(missing, (recorded or 0) - entry.present)
     if absent <= 0:
-        counted = told is not None and entry.expected is None
+        counted = recorded is not None and entry.expected is None
         return replace(entry, expected=entry.present, lost=0) if counted else entry
     lost = max(absent, entry.lost or 0)
     return replace(entry, expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
@@ -142,8 +151,8 @@ def _redated(found: TopicTimes, rate: float) -> TopicTimes:
     return replace(found, stamps=redated(found.stamps, misdated(found.stamps), rate))
 
 
-def _audit_topic(times: AllTimes, as_told: TopicTimes, own_rate: float) -> TopicAudit:
-    name = as_told.topic
+def _audit_topic(times: AllTimes, as_recorded: TopicTimes, own_rate: float) -> TopicAudit:
+    name = as_recorded.topic
     found = times[name]
     present = len(found)
     if not present:
@@ -157,7 +166,7 @@ def _audit_topic(times: AllTimes, as_told: TopicTimes, own_rate: float) -> Topic
     rate = own_rate if topic is not None else regular_rate(found.stamps)
     if rate is None:
         return TopicAudit(None, present, None, remark='stamps without a regular rate: only counted')
-    entry = _with_misdated(_from_stamps(found.stamps, topic, rate), as_told.stamps)
+    entry = _with_misdated(_from_stamps(found.stamps, topic, rate), as_recorded.stamps)
     sampled = name.removesuffix(topic.name if topic else '') + DISPLACEMENT.name
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE) and len(_stamps_of(times, sampled)):
         entry = replace(entry, expected=entry.present - (entry.duplicated or 0), lost=0)

@@ -25,8 +25,7 @@ from engine_mount.recordings.events.switching_changes import (
     paired_switchings,
     switching_times,
 )
-from engine_mount.recordings.run.session import recorded_sessions
-from engine_mount.recordings.run.session_differences import session_differences
+from engine_mount.recordings.run.session import recorded_sessions, session_differences
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT, EVENT, SESSION, Topic
 
 _TOLD_OTHERWISE = (SESSION, EVENT)  # in words of their own

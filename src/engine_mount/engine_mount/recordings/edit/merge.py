@@ -13,7 +13,7 @@ from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.edit.inherited_statement import sources_of, united
 from engine_mount.recordings.edit.messages import Messages, joined, read_messages, write_messages
 from engine_mount.recordings.messages.series import Times
-from engine_mount.recordings.run.session_differences import session_differences
+from engine_mount.recordings.run.session import session_differences
 from mount_recorder.chunk_groups import registered_topic
 from mount_recorder.metadata import TopicInformation
 from mount_recorder.session import time_text

@@ -1,4 +1,4 @@
-"""What happened in a recording: its marked events, and the switching of damping where none tell of it."""
+"""What happened in a recording: its marks, and the switching of damping where no mark tells of it."""
 
 import re
 from dataclasses import dataclass
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.events.event_marks import Mark, read_marks
 from engine_mount.recordings.events.switching_changes import switching_places
-from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.messages.series import Series, SeriesError
 from engine_mount.recordings.messages.time_axis import TimeAxis
 from mount_recorder.chunk_groups import registered_topic
+from mount_ros.messages.event import Mark, read_mark
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
 SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
@@ -115,3 +115,9 @@ def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
     ]
     more = f' and {len(events) - 12} more' if len(events) > 12 else ''
     return f'it has {", ".join(shown)}{more}'
+
+
+def read_marks(events: Series) -> list[Mark]:
+    """Return the marks of a recording in the order in which they were set, from `recording['event']`."""
+    messages = zip(events.messages(), events.receive_times.tolist(), strict=True)
+    return [read_mark(message.data, received) for message, received in messages]

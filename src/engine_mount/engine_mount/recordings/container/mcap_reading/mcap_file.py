@@ -191,8 +191,8 @@ class McapFile(StoredFile):
                 self._times = united(self._times, (chunk.start_time, chunk.end_time))
         if self._walk.loose:
             self._times = united(self._times, self._walk.loose_messages().time_range())
-        told = statistics.message_start_time, statistics.message_end_time
-        if self._times is not None and told != self._times:
+        stated = statistics.message_start_time, statistics.message_end_time
+        if self._times is not None and stated != self._times:
             self._warn('its statistics tell of other times than its chunks; believed are the chunks')
 
     def _take_found(self) -> None:

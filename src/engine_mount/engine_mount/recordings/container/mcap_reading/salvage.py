@@ -47,13 +47,15 @@ class Salvage:
         self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
         self.undeclared = 0  # messages whose topic is not known
         self.tail: Chunk | None = None  # begun at the end of the file, cut off before its own
-        self._find_chunks()
+        unread = self._find_chunks()
         if self.closed:  # behind the end of the messages, what passes for one is a damaged declaration
             self.walk.loose = [place for place in self.walk.loose if place < self.walk.data_end]
         if damaged_summary:
             warn('the summary at its end is damaged; its chunks are searched for')
-        for chunk in self.chunks:
-            self._read(chunk)
+        for chunk in unread:
+            if not self._read(chunk):
+                self.damaged.add(chunk.position)
+                self._warn(left_out(chunk))
         self._read_loose(trusted=self._whole and not damaged_summary)
         self._drop_undeclared()
 
@@ -66,18 +68,21 @@ class Salvage:
     def _whole(self) -> bool:
         return self.closed and not self.damaged and not self.unexplained
 
-    def _find_chunks(self) -> None:
-        """Walk through all records; where that does not lead to the footer, search for chunks."""
+    def _find_chunks(self) -> list[Chunk]:
+        """Walk through all records; where that does not lead to the footer, search for chunks and read them.
+
+        Return the chunks that are not read yet.
+        """
         walked: list[Chunk] = []
         end = self.walk.through(len(MCAP0_MAGIC), len(self._data), walked)
         if self.walk.footer_found and self._data[end:] == MCAP0_MAGIC:
             self.chunks = walked
-            return
+            return walked
         self.tail = self._tail(end)
         found = {chunk.position: chunk for chunk in (*scattered_chunks(self._data), *walked)}
         for _, chunk in sorted(found.items()):
             inside = bool(self.chunks) and chunk.position < self.chunks[-1].end
-            if not inside and contents_of(self._data, chunk) is not None:
+            if not inside and self._read(chunk):
                 self.chunks.append(chunk)
         self.walk.loose = [
             place
@@ -88,6 +93,7 @@ class Salvage:
         kept = f'read up to byte {end}, {len(self.chunks)} whole chunks'
         messages = 'all messages are there' if self._whole else kept
         self._warn(f'ends without its footer, as after a crash: {messages}')
+        return []
 
     def _tail(self, position: int) -> Chunk | None:
         """Return the chunk that begins at `position` and ends, by its own account, behind the file's end."""
@@ -107,19 +113,18 @@ class Salvage:
             if stretch.end < len(self._data):
                 self._warn(f'bytes {stretch.begin} to {stretch.end} are damaged and left out')
 
-    def _read(self, chunk: Chunk) -> None:
-        """Take what the messages in a chunk tell of topics, counts and times."""
+    def _read(self, chunk: Chunk) -> bool:
+        """Take what the messages in a chunk tell of topics, counts and times; False if it is damaged."""
         contents = contents_of(self._data, chunk)
         if contents is None:
-            self.damaged.add(chunk.position)
-            self._warn(left_out(chunk))
-            return
+            return False
         for opcode, content in contents.declarations:
             self.declared.add(opcode, content)
         chunk.channels = frozenset(contents.messages.counts())
         if chunk.channels:
             chunk.start_time, chunk.end_time = contents.messages.time_range()
         self._count(contents.messages)
+        return True
 
     def _count(self, messages: StoredMessages) -> None:
         for channel, count in messages.counts().items():
