@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from mount_driver.can_library import can
-from mount_driver.codec import MountCodec, Setpoint
-from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
 from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
 from mount_sim.electronics.can_end import CanEnd

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from mount_driver.codec import Status
+from mount_driver.protocol import Status
 from mount_sim.electronics.faults.contract import Fault, Occasion
 from mount_sim.electronics.warm_coil import REFERENCE_CELSIUS, TemperatureCoefficients
 

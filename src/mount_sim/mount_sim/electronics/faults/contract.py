@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from mount_driver.can_library import can
-from mount_driver.codec import Status
+from mount_driver.protocol import Status
 from mount_models.sampling import SAMPLE_RATE
 from mount_sim.electronics.electronics import Reading
 

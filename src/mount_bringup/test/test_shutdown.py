@@ -3,15 +3,10 @@
 import contextlib
 import os
 import signal
-import sys
 
 import pytest
 
-from mount_bringup.graph.ending_signals import (
-    ending_signals,
-    interrupt_and_remember,
-    remembered_interrupts,
-)
+from mount_bringup.graph.shutdown import ending_signals, interrupt_and_remember
 
 
 @pytest.fixture
@@ -41,20 +36,3 @@ def test_an_interrupt_that_a_library_has_swallowed_ends_what_begins_after_it(rem
         assert ends == [True]
     with ending_signals(lambda: ends.append(True)):
         assert ends == [True]
-
-
-def test_an_interrupt_that_came_in_a_destructor_is_raised_by_who_waits(monkeypatch):
-    class Interrupted:
-        def __del__(self):
-            os.kill(os.getpid(), signal.SIGINT)
-
-    printed = []
-    monkeypatch.setattr(sys, 'unraisablehook', printed.append)
-    before = signal.getsignal(signal.SIGINT)
-    with remembered_interrupts() as raise_lost:
-        raise_lost()
-        Interrupted()
-        assert not printed  # Python prints and drops what a destructor raises
-        with pytest.raises(KeyboardInterrupt):
-            raise_lost()
-    assert signal.getsignal(signal.SIGINT) is before

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from mount_driver.codec import Status
-from mount_driver.watches.status_watch import StatusLimits, StatusWatch
+from mount_driver.protocol import Status
+from mount_driver.watches.message_watches import StatusLimits, StatusWatch
 
 MS = 1_000_000
 SOUND = Status(14.0, 60.0)

@@ -1,9 +1,11 @@
 """Electronics that measure at another rate than the graph was made for are refused."""
 
 import pytest
-from far_end import sample
+from far_end import CODEC, sample
 
-from mount_driver.watches.rate_watch import RateWatch
+from mount_driver.clock import CounterClock
+from mount_driver.link import Link
+from mount_models.sampling import sample_time_ns
 
 REFUSED = (
     'the electronics sample every {} us, but sample_rate ({} Hz) means {} us (limit {} us beside it): '
@@ -13,12 +15,13 @@ REFUSED = (
 
 def first_doubt(rate, period, counters, jitter=lambda k: 0, start=0):
     """Return (place, sentence) of the first doubt in samples of these counters, `period` us apart."""
-    watch = RateWatch(rate)
+    link = Link(CODEC, CounterClock(), 20_000_000, sample_time_ns(rate))
     for place, k in enumerate(counters):
         microseconds = (start + k * period + jitter(k)) % 2**32
         taken = sample(0)._replace(sample_counter=k % 65536, microseconds=microseconds)
-        if sentence := watch.judge(taken):
-            return place, sentence
+        assert link.take(CODEC.encode_measurement(taken, place & 0xFF), 0) is not None
+        if link.rate_objection:
+            return place, link.rate_objection
     return None
 
 
@@ -49,6 +52,4 @@ def test_the_right_rate_is_never_doubted(rate):
 
 
 def test_a_restart_of_the_electronics_is_no_other_rate():
-    watch = RateWatch(1000.0)
-    for k in [*range(50), *range(3, 20), *range(1, 9), *range(1000, 1030)]:
-        assert watch.judge(sample(k)) == ''
+    assert first_doubt(1000.0, 1000, [*range(300, 350), *range(103, 120), *range(1000, 1030)]) is None

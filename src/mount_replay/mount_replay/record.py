@@ -14,13 +14,14 @@ from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
 from engine_mount.recordings.run.screen import Screen
-from mount_bringup.graph.ending_signals import ending_signals
-from mount_bringup.keyboard import MARK_KEYS, Keyboard
+from mount_bringup.graph.shutdown import ending_signals
 from mount_recorder.bag_writer import RecordingError
 from mount_recorder.diagnosis import OnFull
 from mount_recorder.folders import snapshot_folder
 from mount_recorder.node import NAME, MountRecorder
 from mount_recorder.parameters import RecorderParameters
+from mount_replay.keyboard import MARK_KEYS, Keyboard
+from mount_ros.environment import loopback_refusal
 from mount_ros.nodes.aside import wake
 from mount_ros.nodes.hosting import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic
@@ -57,6 +58,8 @@ class RecordOutcome:
 def record(order: RecordOrder, screen: Screen) -> RecordOutcome:
     """Record until Ctrl-C, SIGTERM or the end of the duration; raises a `ValueError` with the reason."""
     names = chosen_topics(order.topics)
+    if refusal := loopback_refusal():
+        raise RecordingError(refusal)
     asked: list[bool] = []  # to end, by a signal; no lock: a second one may come amid the first
     with ending_signals(lambda: asked.append(True)), ros_context(order.domain) as context:
         recorder = _LoneRecorder(order, names, context)
