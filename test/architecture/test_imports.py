@@ -16,6 +16,7 @@ FLOORS = (
     ('engine_mount.recordings',),  # below the simulator as long as that reads recorded excitations itself
     ('mount_sim',),
     ('mount_bringup',),
+    ('engine_mount.settings',),
     ('mount_signals',),
     ('mount_replay', 'mount_identification', 'mount_report'),
     ('mount_experiments', 'mount_view'),
@@ -36,7 +37,7 @@ REGISTRY = 'mount_ros.topics'  # plain data, which any file may read
 # Beside node.py: verdicts are `mount_ros.nodes.diagnostics.Verdict`, plain data.
 MAY_TOUCH_ROS = {
     'mount_driver': {'node.py', 'health.py'},
-    'mount_init': {'node.py', 'diagnosis.py'},
+    'mount_init': {'node.py'},
     'mount_control': {'node.py', 'diagnosis.py'},
     'mount_sim': {'node.py', 'diagnosis.py', 'loop.py'},
 }

@@ -90,7 +90,9 @@ def settings_targets() -> dict[str, list[Check]]:
         'test_a_changed_value_at_run_time_is_refused_or_leaves_a_sound_controller',
     )
     return {
-        'parameters': [plain(property_of('mount_bringup', 'test_foreign_settings', name)) for name in names]
+        'parameters': [
+            plain(property_of('engine_mount', 'test_foreign_settings', name, 'settings')) for name in names
+        ]
     }
 
 

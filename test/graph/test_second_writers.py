@@ -27,7 +27,7 @@ import sys
 import rclpy
 from rclpy.node import Node
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.messages.types import message_class
+from mount_ros.messages.cdr import message_class
 from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import DISPLACEMENT, topic
 

@@ -9,7 +9,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from mount_ros.nodes.hosting import ros_context
+from mount_ros.nodes.process import ros_context
 from mount_ros.testing import wait_until
 
 LIMIT = 180.0  # s: other tests run at the same time, only a failure takes so long

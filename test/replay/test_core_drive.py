@@ -27,7 +27,7 @@ from mount_report.drive.evaluation import switching, tracking_error
 from mount_report.drive.signals import DriveSignals, load_drive
 from mount_ros import topics
 from mount_ros.topics import Topic
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.building import build_excitation
 from mount_sim.mount_choice import with_control_of_mount
 from mount_sim.plant.simulated_mount import DivergedError
 

@@ -3,34 +3,31 @@
 import contextlib
 import difflib
 import functools
-from collections.abc import Mapping, Sequence
-from itertools import chain
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
-from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, check_name, flattened
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
 from mount_recorder.parameters import RecorderParameters
 
 Known = Mapping[str, Mapping[str, Any]]
-_FIRST = 'mount_control'  # the node that is meant where none is named
-
 OF_EACH = ('mount_driver', 'mount_init', 'mount_control')
 """Nodes that each mount of a car has."""
-_NODES = ('mount_driver', 'mount_sim', 'mount_init', 'mount_control', 'mount_recorder')
+NODES = ('mount_driver', 'mount_sim', 'mount_init', 'mount_control', 'mount_recorder')
 
 
 class SettingError(ParameterError):
     """An option `--set` is not written as it must be; the text says how."""
 
 
-def defaults_of_nodes(nodes: Sequence[str] = _NODES) -> dict[str, dict[str, Any]]:
+def defaults_of_nodes(nodes: Sequence[str] = NODES) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
-    return {node: dict(_defaults(node)) for node in _NODES if node in nodes}
+    return {node: dict(_defaults(node)) for node in NODES if node in nodes}
 
 
 def _defaults(node: str) -> Mapping[str, Any]:
@@ -49,59 +46,6 @@ def _kept_defaults(node: str) -> Mapping[str, Any]:
         return flattened(RecorderParameters())
     own = DriverParameters() if node == 'mount_driver' else InitParameters()
     return flattened(own) | flattened(SpecimenChoice())
-
-
-def settings_of_options(options: Sequence[str], known: Known | None = None) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of options [NODE.]NAME=VALUE, which `owned` understands.
-
-    Raises `SettingError` for one that is not written like that.
-    """
-    parameters: dict[str, dict[str, Any]] = {}
-    for option in options:
-        name, equals, text = option.partition('=')
-        if not (equals and name):
-            raise SettingError(f'--set {option}: write NAME=VALUE or NODE.NAME=VALUE, as in mount_sim.seed=2')
-        node, parameter = owned(name, known)
-        parameters.setdefault(node, {})[parameter] = setting_value(option, text)
-    return parameters
-
-
-def owned(name: str, known: Known | None = None) -> tuple[str, str]:
-    """Return node and parameter that `name` means, with its node before it or without.
-
-    Without, it is a parameter of mount_control where that has it, else of the only node that does. Raises
-    `ParameterError` with the nearest names if there is none, or with the nodes if there are several. `known`
-    is {node: {parameter: default}} where others than nodes of the graph have parameters.
-    """
-    known = defaults_of_nodes() if known is None else known
-    node, _, parameter = name.partition('.')
-    if parameter and (node.rpartition('/')[2] in {*known, *_NODES} or '/' in node):
-        return node, parameter
-    owners = [node for node, names in known.items() if name in names]
-    if _FIRST in owners:
-        return _FIRST, name
-    if len(owners) > 1:
-        raise ParameterError(
-            f'{name!r} is a parameter of {", ".join(owners)}: write which, as in {owners[0]}.{name}'
-        )
-    if owners:
-        return owners[0], name
-    names = [*(f'{node}.{each}' for node, names in known.items() for each in names), *chain(*known.values())]
-    near = difflib.get_close_matches(name, names, n=3)
-    hint = f'did you mean {" or ".join(near)}?' if near else f'write NODE.NAME, of {", ".join(known)}'
-    raise ParameterError(f'{name!r} is no parameter of any node; {hint}')
-
-
-def setting_value(option: str, text: str) -> Any:
-    """Return the value that `text` (YAML) in `--set option` gives; raises `SettingError`."""
-    try:
-        return plain_yaml(text)
-    except YamlError as error:
-        reason = str(error).removesuffix('; put it in quotes')
-        raise SettingError(
-            f'--set {option}: the value {text!r:.60} {reason}; put it in quotes of its own, as in '
-            f'\'{option.removesuffix(text)}"{text}"\''
-        ) from None
 
 
 def checked_settings(
@@ -168,3 +112,32 @@ def _typed(name: str, value: Any, default: Any) -> Any:
             f'{name} must be a {type(default).__name__} such as {default!r}; instead received {value!r}'
         )
     return value
+
+
+def check_sample_rate(
+    settings: Known, nodes: Iterable[str] = (*OF_EACH, 'mount_sim', 'mount_recorder')
+) -> float:
+    """Return the rate (Hz) of the nodes of a graph; raises `ParameterError` unless they have the same."""
+    rates = {node: settings.get(node, {}).get('sample_rate', SAMPLE_RATE) for node in nodes if node in NODES}
+    (first, rate), *others = rates.items()
+    for node, other in others:
+        if other != rate:
+            raise ParameterError(
+                f'{node}.sample_rate ({other:g} Hz) must equal {first}.sample_rate ({rate:g} Hz); set one '
+                'for the whole graph: --sample-rate of a drive, sample_rate:= of a launch file'
+            )
+    sample_time_ns(rate)
+    return float(rate)
+
+
+def settings_of_mount(settings: Known, mount: str) -> dict[str, dict[str, Any]]:
+    """Return the settings as they hold for one mount, by the names that the nodes have where it is alone."""
+    found = {node: dict(values) for node, values in settings.items() if '/' not in node}
+    for node in OF_EACH:
+        if own := settings.get(f'{mount}/{node}'):
+            found[node] = {**found.get(node, {}), **own}
+    if 'mount_sim' in found:
+        from mount_sim.plant.places import values_of_mount
+
+        found['mount_sim'] = values_of_mount(found['mount_sim'], mount)
+    return found

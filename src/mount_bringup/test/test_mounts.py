@@ -19,38 +19,15 @@ from mount_bringup.graph.nodes import (
 )
 from mount_bringup.graph.order import vehicle_order
 from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
-from mount_bringup.mounts import mounts_of, settings_of_mount, settings_of_mounts
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError
 
 MOUNTS = ('left', 'right')
-SETTINGS = {
-    'mount_sim': {'mounts': 'left,right', 'friction.scale': 1.1, 'mount_left.friction.scale': 1.2},
-    'mount_control': {'highest_current': 2.0, 'longest_bridge': 3},
-    'left/mount_control': {'highest_current': 1.0},
-}
-
 EXAMPLE = Path(mount_bringup.__file__).parents[1] / 'config' / 'two_mounts.yaml'
 
 
 def names(nodes):
     return [node.full_name for node in nodes]
-
-
-def test_own_settings_of_a_mount_come_before_those_of_all():
-    assert mounts_of(SETTINGS) == MOUNTS
-    left, right = settings_of_mounts(SETTINGS).values()
-    assert left['mount_control'] == {'highest_current': 1.0, 'longest_bridge': 3}
-    assert right['mount_control'] == SETTINGS['mount_control']
-    assert (left['mount_sim']['friction.scale'], right['mount_sim']['friction.scale']) == (1.2, 1.1)
-
-
-def test_one_mount_alone_has_the_settings_as_they_are():
-    settings = {'mount_sim': {'seed': 2}, 'mount_control': {'policy': 'switched_viscous'}}
-    assert settings_of_mounts(settings) == {'': settings}
-    assert settings_of_mount(settings, '') == settings
-    with pytest.raises(ParameterError, match='its mounts are one alone'):
-        mounts_of({'left/mount_control': {}})
 
 
 def test_settings_of_one_mount_are_typed_and_checked_as_those_of_all():

@@ -7,7 +7,7 @@ _AFTER = """
 from mount_bringup.prepare import prepare
 from mount_control.node import MountControl
 from mount_init.node import MountInit
-from mount_ros.nodes.hosting import ros_context, transition
+from mount_ros.nodes.process import ros_context, transition
 from mount_ros.testing import compiled_so_far
 from mount_sim.node import MountSim
 

@@ -8,7 +8,7 @@ from mount_bringup.graph import processes
 from mount_bringup.graph.nodes import CONTROL, DRIVER, RECORDER, GraphSettings
 from mount_ros.testing import LIMIT, wait_until
 
-PRIORITY = 'from mount_ros.nodes.starter import given_priority; print(given_priority())'
+PRIORITY = 'import os; print(os.environ["ENGINE_MOUNT_PRIORITY"])'
 
 
 @pytest.mark.parametrize(

@@ -109,7 +109,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command; every refusal is one sentence and a non-zero exit code."""
     from mount_bringup.graph.nodes import GraphError
     from mount_bringup.graph.shutdown import INTERRUPTED, Interrupted
-    from mount_ros.nodes.leaving import end_process
+    from mount_ros.nodes.shutdown import end_process
 
     try:
         prepare_environment()

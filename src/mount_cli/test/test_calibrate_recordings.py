@@ -22,7 +22,7 @@ from mount_models.specimen import default_specimen, load_specimen
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
-from mount_ros.messages.temperature import temperature_layout
+from mount_ros.messages.sensors import temperature_layout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
 from mount_signals.units.mapping import ColumnChoice
 from mount_sim.electronics.electronics import status_every

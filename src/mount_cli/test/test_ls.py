@@ -6,7 +6,7 @@ import shutil
 import pytest
 from typer.testing import CliRunner
 
-from mount_bringup.changed_parameters import changed_parameters
+from engine_mount.settings.changes import changed_parameters
 from mount_cli.command import app
 from mount_models.specimen import default_specimen
 

@@ -14,7 +14,7 @@ from engine_mount.recordings.audit.report import sentences
 from mount_cli.command import app
 from mount_cli.commands.record import _told
 from mount_recorder.bag_writer import BagWriter
-from mount_recorder.statement import Reception
+from mount_recorder.losses import Reception
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT, TOPICS
 

@@ -31,7 +31,7 @@ class Health:
         self._unheard = SlidingWindow(False, _SECOND)
 
     def judge(self, now: int, *, name_awaited: bool = False) -> Verdict:
-        """Return the verdict at `now` (steady clock, ns): the sentence of the gravest finding, all figures.
+        """Return the verdict at `now` (steady clock, ns): the gravest finding and all figures.
 
         With `name_awaited`, discovery may soon name the other sender of a fault: nothing ends before.
         """

@@ -15,7 +15,7 @@ from mount_models.coil.heating import check_heating
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
-from mount_ros.messages.temperature import temperature_layout
+from mount_ros.messages.sensors import temperature_layout
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read

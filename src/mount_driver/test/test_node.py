@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import replace
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -24,11 +23,11 @@ from mount_driver.link import Refusal
 from mount_driver.node import MountDriver
 from mount_driver.protocol import Setpoint, Status
 from mount_models.coil.heating import CoilHeating
-from mount_models.specimen import default_specimen, save_specimen
+from mount_models.specimen import DEFAULT_SPECIMEN
 from mount_ros.data_path import DataPath
+from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.messages.temperature import temperature_of
-from mount_ros.messages.types import message_class
+from mount_ros.messages.sensors import temperature_of
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
@@ -498,7 +497,7 @@ def test_the_codec_of_the_far_end_is_that_of_the_driver(make_driver):
 
 def test_the_driver_takes_the_heating_of_a_specimen_file(make_driver, tmp_path):
     file = tmp_path / 'left.yaml'
-    save_specimen(replace(default_specimen(), heating=CoilHeating(time_constant=100.0)), file)
+    file.write_text(DEFAULT_SPECIMEN.read_text().replace('time_constant: 600.0', 'time_constant: 100.0'))
     driver = make_driver(**{'parameters_file': str(file), 'heating.ambient_celsius': 60.0})
     assert driver.trigger_configure() == SUCCESS
     assert driver._settings.heating == CoilHeating(time_constant=100.0, ambient_celsius=60.0)

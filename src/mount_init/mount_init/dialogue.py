@@ -3,22 +3,25 @@
 Samples and setpoints come in on the thread of the data path, the ramp is run by the thread of the
 lifecycle transition. Each sample is answered at most once, so that electronics which wait for the answer
 (lock-step) are served exactly. The wall clock only ends a ramp that went silent; it never alters a result.
+
+A ramp that gets no current looks like a broken cable; the driver knows the reason.
 """
 
 import math
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 from mount_init.errors import CoilBusyError, DriverRefusalError, InitialisationError
 from mount_init.initialisation import OFF, Initialisation
 
-_LOOK_PERIOD = 0.05  # s: how soon silence, a timeout or the end of the process is noticed
+_CHECK_PERIOD = 0.05  # s: how soon silence, a timeout or the end of the process is noticed
+_LONGEST_AGE = 2.0  # s, chosen: every node publishes its verdict once a second
+_VERDICT_PERIOD = 0.02  # s, chosen: how soon a verdict is noticed
 
 
-@dataclass
-class _Sample:
+class _Sample(NamedTuple):
     stamp: int
     current: float
     current_rate: float
@@ -36,12 +39,12 @@ class CoilDialogue:
         self._ramp_start: int | None = None  # stamp of the first sample of the ramp
         self._intruder: InitialisationError | None = None
         self._newest: _Sample | None = None
-        self._newest_heard = -math.inf  # s, steady clock
+        self._newest_arrival = -math.inf  # s, steady clock
         self._answered: int | None = None  # stamp of the newest sample that we answered
         self._last_setpoint = OFF
         self._own: set[tuple[int, float]] = set()  # setpoints that have not come back to us yet
         self._foreign_stamp: int | None = None
-        self._foreign_heard = -math.inf
+        self._foreign_arrival = -math.inf
 
     # What the data path brings.
 
@@ -54,9 +57,9 @@ class CoilDialogue:
                 if stamp < self._newest.stamp:
                     self._answered = self._foreign_stamp = None  # the electronics' time has started anew
             self._newest = _Sample(stamp, current, current_rate, flux_rate)
-            self._newest_heard = time.monotonic()
+            self._newest_arrival = time.monotonic()
             if self._ramp is not None:
-                self._answer(self._newest)
+                self._answer(self._ramp, self._newest)
 
     def take_setpoint(self, stamp: int, current: float) -> None:
         """Take a setpoint (A) seen on the topic, ours or another node's, in answer to sample `stamp`."""
@@ -64,14 +67,12 @@ class CoilDialogue:
             if (stamp, current) in self._own:
                 self._own.discard((stamp, current))
                 return
-            self._foreign_stamp = stamp
-            self._foreign_heard = time.monotonic()
-            if self._ramp is not None and self._ramp_start is not None and stamp >= self._ramp_start:
-                self._intruder = CoilBusyError(
+            self._foreign_stamp, self._foreign_arrival = stamp, time.monotonic()
+            if self._ramp_start is not None and stamp >= self._ramp_start:
+                self.give_way(
                     f'another node sent a current_setpoint of {current:.3f} A during the ramp; deactivate '
                     f'mount_control before mount_init is activated'
                 )
-                self._end()
 
     def give_way(self, sentence: str) -> None:
         """End the ramp, if one runs, because of what `sentence` says; `run` raises it."""
@@ -85,24 +86,24 @@ class CoilDialogue:
     def forget_streams(self) -> None:
         """Begin anew after a time without subscriptions: another node may have sent setpoints until now."""
         with self._lock:
-            self._newest = None
-            self._newest_heard = -math.inf
-            self._foreign_heard = time.monotonic()
+            self._newest, self._newest_arrival = None, -math.inf
+            self._foreign_arrival = time.monotonic()
 
     def await_quiet(self, duration: float, ending: threading.Event) -> None:
         """Return when no other node has sent a setpoint for `duration` (s), or raise `CoilBusyError` soon.
 
         A node that has just been deactivated is given the time to fall silent.
         """
-        remaining = self._unquiet_for(duration)
-        if remaining > 0.0:
+        for last in (False, True):
+            remaining = self._foreign_arrival + duration - time.monotonic()
+            if remaining <= 0.0:
+                return
+            if last:
+                raise CoilBusyError(
+                    f'another node sent a current_setpoint {(duration - remaining) * 1e3:.0f} ms ago, needed '
+                    f'are {duration * 1e3:.0f} ms without any; deactivate mount_control first'
+                )
             ending.wait(remaining)
-        remaining = self._unquiet_for(duration)
-        if remaining > 0.0:
-            raise CoilBusyError(
-                f'another node sent a current_setpoint {(duration - remaining) * 1e3:.0f} ms ago, needed are '
-                f'{duration * 1e3:.0f} ms without any; deactivate mount_control first'
-            )
 
     def run(
         self,
@@ -115,14 +116,25 @@ class CoilDialogue:
         """Answer samples until `ramp` is finished; an unanswered sample that is already here comes first.
 
         Raises `InitialisationError` after `silence_timeout` (s) without a sample, after `total_timeout` (s),
-        if another node answers too, if `objection` says something, and if the process is ending. Leaves 0 A
+        if another node answers too, if there is an `objection`, and if the process is ending. Leaves 0 A
         behind in every case.
         """
         try:
             self._begin(ramp)
             start = time.monotonic()
-            while not self._over.wait(_LOOK_PERIOD):
-                self._check_progress(ramp, start, silence_timeout, total_timeout, ending)
+            while not self._over.wait(_CHECK_PERIOD):
+                now = time.monotonic()
+                if ending.is_set():
+                    raise InitialisationError(
+                        'the ramp was given up because the process is ending; start it again'
+                    )
+                if now - max(start, self._newest_arrival) > silence_timeout:
+                    raise ramp.silence(silence_timeout)
+                if now - start > total_timeout:
+                    raise InitialisationError(
+                        f'air gap not estimated: {ramp.readings.received} of {ramp.length} ripple samples in '
+                        f'{total_timeout:.1f} s; is mount_driver overloaded, or the measurement rate too low?'
+                    )
                 if reason := objection():
                     raise DriverRefusalError(reason)
             if self._intruder is not None:
@@ -143,40 +155,15 @@ class CoilDialogue:
             self._intruder = None
             self._own.clear()  # those that never came back
             self._ramp, self._ramp_start = ramp, None
-            if self._newest is not None and self._is_unanswered(self._newest.stamp):
-                self._answer(self._newest)
+            answers = [answer for answer in (self._answered, self._foreign_stamp) if answer is not None]
+            if self._newest is not None and all(self._newest.stamp > answer for answer in answers):
+                self._answer(ramp, self._newest)
 
-    def _check_progress(
-        self,
-        ramp: Initialisation,
-        start: float,
-        silence_timeout: float,
-        total_timeout: float,
-        ending: threading.Event,
-    ) -> None:
-        now = time.monotonic()
-        if ending.is_set():
-            raise InitialisationError('the ramp was given up because the process is ending; start it again')
-        if now - max(start, self._newest_heard) > silence_timeout:
-            raise ramp.silence(silence_timeout)
-        if now - start > total_timeout:
-            raise InitialisationError(
-                f'air gap not estimated: {ramp.readings.received} of {ramp.length} ripple samples in '
-                f'{total_timeout:.1f} s; is mount_driver overloaded, or the measurement rate too low?'
-            )
-
-    def _is_unanswered(self, stamp: int) -> bool:
-        answers = [answer for answer in (self._answered, self._foreign_stamp) if answer is not None]
-        return all(stamp > answer for answer in answers)
-
-    def _answer(self, sample: _Sample) -> None:
-        ramp = self._ramp
-        assert ramp is not None
+    def _answer(self, ramp: Initialisation, sample: _Sample) -> None:
         if self._ramp_start is None:
             self._ramp_start = sample.stamp
-        setpoint = ramp.step(sample.stamp, sample.current, sample.current_rate, sample.flux_rate)
         self._answered = sample.stamp
-        self._send(sample.stamp, setpoint)
+        self._send(sample.stamp, ramp.step(*sample))
         if ramp.finished:
             self._end()
 
@@ -189,6 +176,46 @@ class CoilDialogue:
         self._ramp = None
         self._over.set()
 
-    def _unquiet_for(self, duration: float) -> float:
-        """Return how much longer (s) it must stay quiet, at most 0 if it has been quiet for long enough."""
-        return self._foreign_heard + duration - time.monotonic()
+
+class DriverReport:
+    """The newest verdict of the driver; for any thread. `peak_current` (A) is what the ramp needs."""
+
+    def __init__(self, peak_current: float):
+        self._peak = peak_current
+        self._refusal = ''
+        self.late_setpoints: int | None = None
+        """How many setpoints came too late since its activation; None where it has not reported any count."""
+        self._arrival = 0.0  # s, steady clock
+
+    def take(self, refuses: bool, sentence: str, figures: Mapping[str, str]) -> None:
+        """Take a verdict; `refuses`: it keeps the coil at 0 A."""
+        allowed = float(figures.get('current_limit', self._peak))
+        self._refusal = ''
+        if refuses:
+            self._refusal = f'mount_driver keeps the coil at 0 A: {sentence}'
+        elif allowed < self._peak:
+            needed = f'the ramp needs {self._peak:.3f} A'
+            self._refusal = f'mount_driver lets the coil carry {allowed:.3f} A, {needed}: {sentence}'
+        self.late_setpoints = int(figures['late_setpoints']) if 'late_setpoints' in figures else None
+        self._arrival = time.monotonic()
+
+    @property
+    def refusal(self) -> str:
+        """Why the driver lets no ramp through now; empty where it has not reported that within 2 s."""
+        return self._refusal if time.monotonic() - self._arrival < _LONGEST_AGE else ''
+
+    def wait_for_next(self, timeout: float, ending: threading.Event) -> None:
+        """Return when another verdict has come, or after `timeout` s."""
+        begin = time.monotonic()
+        _wait_until(lambda: self._arrival > begin, timeout, ending)
+
+    def settled(self, refusing: bool, timeout: float, ending: threading.Event) -> str:
+        """Return `refusal` as soon as there is one, or none, as `refusing` says, or after `timeout` s."""
+        _wait_until(lambda: bool(self.refusal) is refusing, timeout, ending)
+        return self.refusal
+
+
+def _wait_until(condition: Callable[[], bool], timeout: float, ending: threading.Event) -> None:
+    end = time.monotonic() + timeout
+    while not condition() and time.monotonic() < end and not ending.wait(_VERDICT_PERIOD):
+        """Wait on."""

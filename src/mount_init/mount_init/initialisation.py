@@ -8,7 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_init.coil_temperature import CoilTemperature, TemperatureReadings, coil_temperature
+from mount_init.checks import (
+    check_agreement,
+    check_contact,
+    check_peak_force,
+    check_rate,
+    check_readings,
+    check_resistance,
+    check_rest_current,
+    check_single_crossing,
+    check_steady_fall,
+)
 from mount_init.errors import (
     CurrentNotFollowingError,
     InitialisationError,
@@ -17,33 +27,27 @@ from mount_init.errors import (
     SpecimenMismatchError,
     TooFewRipplesError,
 )
-from mount_init.estimation import (
+from mount_init.estimate import (
+    CoilTemperature,
     ContactGap,
     Dwell,
-    FloatArray,
-    InductanceCurve,
     RestGap,
+    TemperatureReadings,
+    coil_temperature,
     contact_gap,
     dwell_inductance,
-    inductance_crossing,
     inductance_curve,
     rest_gap,
 )
 from mount_init.parameters import InitParameters
-from mount_init.plausibility import (
-    check_contact,
-    check_peak_force,
-    check_precision,
-    check_resistance,
-    check_rest_current,
-    check_same_crossing,
-    check_same_rest_gap,
-    check_single_crossing,
-    check_steady_fall,
+from mount_init.ramp import FloatArray, Ramp, Readings, approach, current_ramp
+from mount_init.supply import (
+    RampSupply,
+    check_reach,
+    inductance_at_supply_of_curves,
+    inductance_crossing,
+    saturated,
 )
-from mount_init.ramp import Ramp, approach, current_ramp
-from mount_init.readings import Readings, check_rate, check_readings
-from mount_init.supply import RampSupply, check_reach, inductance_at_supply_of_curves, saturated
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.crossing import Crossing, find_crossing
@@ -69,12 +73,9 @@ class Evidence:
     """What a result rests on."""
 
     dwell_before: Dwell
-    dwell_after: Dwell
     crossing_up: Crossing
-    crossing_down: Crossing
     rest: RestGap
     contact: ContactGap
-    curve: InductanceCurve
     temperature: CoilTemperature
     supply: RampSupply
     samples: int
@@ -168,7 +169,7 @@ class Initialisation:
         self._taken += 1
         if self._first_stamp is None:
             self._first_stamp = stamp
-        deviates = self._deviates(current)
+        deviates = not abs(current - self._last) <= self.parameters.following_error
         if self._approach is None:
             if number == self.length // 2:
                 self._middle_stamp = stamp
@@ -176,7 +177,12 @@ class Initialisation:
             self._watch(valid, deviates, current, flux_rate)
         else:
             self._carry(deviates, current)
-        self._last = OFF if self._failure is not None else self._next(number)
+        if self._failure is not None:
+            self._last = OFF
+        elif self._approach is None:
+            self._last = self._setpoints[number]
+        else:
+            self._last = self._approach.pop(0) if self._approach else self.specimen.rest_current
         return self._last
 
     def note_late(self, count: int) -> None:
@@ -221,16 +227,7 @@ class Initialisation:
         temperature = coil_temperature(
             self._temperatures, self._middle_stamp, self.parameters.coil_temperature_celsius
         )
-        evidence = _estimate(self.specimen, self.parameters, self.ramp, self.readings, temperature)
-        return _complete(self.specimen, self.parameters, evidence)
-
-    def _deviates(self, current: float) -> bool:
-        return not abs(current - self._last) <= self.parameters.following_error
-
-    def _next(self, number: int) -> float:
-        if self._approach is None:
-            return self._setpoints[number]
-        return self._approach.pop(0) if self._approach else self.specimen.rest_current
+        return _estimate(self.specimen, self.parameters, self.ramp, self.readings, temperature)
 
     def _carry(self, deviates: bool, current: float) -> None:
         """Go back to the ramp after an interruption: the coil must follow again, then it is led there."""
@@ -304,9 +301,8 @@ def _estimate(
     ramp: Ramp,
     readings: Readings,
     temperature: CoilTemperature,
-) -> Evidence:
-    level, celsius = specimen.crossing_inductance, temperature.celsius
-    current = readings.current
+) -> InitialisationResult:
+    current, celsius = readings.current, temperature.celsius
     inductance, supply = inductance_at_supply_of_curves(specimen, parameters, ramp, readings, celsius)
 
     dwells = [
@@ -315,46 +311,37 @@ def _estimate(
     ]
     for dwell in dwells:
         check_rest_current(specimen, dwell, parameters)
-    before, after = (rest_gap(specimen, dwell.inductance, dwell.inductance_std, celsius) for dwell in dwells)
-    check_same_rest_gap(before, after, parameters)
-    mean = _mean([(dwell.inductance, dwell.inductance_std) for dwell in dwells])
-    rest = rest_gap(specimen, *mean, celsius)
+    before, after = (rest_gap(specimen, each.inductance, each.inductance_std, celsius) for each in dwells)
+    check_agreement(
+        'rest gap before and after the ramp',
+        before.gap,
+        after.gap,
+        parameters.rest_gap_tolerance,
+        'do the pads stick to the rod, or does the coil heat up? Activate again at rest',
+    )
+    rest = rest_gap(specimen, *_mean([(each.inductance, each.inductance_std) for each in dwells]), celsius)
     check_resistance(specimen, supply, celsius, parameters)
 
     curve = inductance_curve(current, inductance, ramp.up, ramp.down, parameters.peak_current)
-    check_single_crossing(curve, level, specimen.rest_current)
+    check_single_crossing(curve, specimen)
     crossings = [
-        inductance_crossing(current[part], inductance[part], level, parameters)
+        inductance_crossing(specimen, parameters, current[part], inductance[part])
         for part in (ramp.up, ramp.down)
     ]
-    up, down = (
-        contact_gap(specimen, rest, crossing.current, crossing.current_std, celsius) for crossing in crossings
+    up, down = (contact_gap(specimen, rest, each.current, each.current_std, celsius) for each in crossings)
+    check_agreement(
+        'gap at the crossing on the way up and down',
+        up.at_crossing,
+        down.at_crossing,
+        parameters.crossing_gap_tolerance,
+        'check the current sensor and the pads, and activate again',
     )
-    check_same_crossing(up.at_crossing, down.at_crossing, parameters)
-    crossing_current, crossing_std = _mean([(c.current, c.current_std) for c in crossings])
-    contact = contact_gap(specimen, rest, crossing_current, crossing_std, celsius)
+    crossing, crossing_std = _mean([(each.current, each.current_std) for each in crossings])
+    contact = contact_gap(specimen, rest, crossing, crossing_std, celsius)
 
-    check_steady_fall(curve, level, specimen.rest_current, parameters)
-    check_contact(specimen, rest, contact, crossing_current, parameters)
-    check_precision(rest, contact, parameters)
-    return Evidence(
-        dwell_before=dwells[0],
-        dwell_after=dwells[1],
-        crossing_up=crossings[0],
-        crossing_down=crossings[1],
-        rest=rest,
-        contact=contact,
-        curve=curve,
-        temperature=temperature,
-        supply=supply,
-        samples=readings.valid,
-        skipped=readings.skipped,
-    )
-
-
-def _complete(specimen: Specimen, parameters: InitParameters, evidence: Evidence) -> InitialisationResult:
+    check_steady_fall(curve, specimen, parameters)
+    check_contact(specimen, rest, contact, crossing, parameters)
     law, spring = specimen.force_law, specimen.spring_stiffness
-    rest, contact = evidence.rest, evidence.contact
     try:
         table = current_force_table(
             law, spring, specimen.pad_stiffness, rest.gap, contact.gap, parameters.peak_current
@@ -363,15 +350,16 @@ def _complete(specimen: Specimen, parameters: InitParameters, evidence: Evidence
     except (ForceTableError, OutsideLawError) as error:
         raise OutsideCalibrationError(f'current-force table: {error}') from error
     check_peak_force(table, parameters)
+    found = (dwells[0], crossings[0], rest, contact, temperature, supply)
     return InitialisationResult(
-        rest_gap=rest.gap,
-        contact_gap=contact.gap,
-        rest_gap_std=rest.std,
-        contact_gap_std=contact.std,
-        contact_force=contact_force(spring, rest.gap, contact.gap),
-        offset_current=offset,
-        table=table,
-        evidence=evidence,
+        rest.gap,
+        contact.gap,
+        rest.std,
+        contact.std,
+        contact_force(spring, rest.gap, contact.gap),
+        offset,
+        table,
+        Evidence(*found, samples=readings.valid, skipped=readings.skipped),
     )
 
 

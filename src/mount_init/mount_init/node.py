@@ -3,30 +3,32 @@
 import math
 import time
 
-from mount_init.coil_temperature import TemperatureReadings
-from mount_init.diagnosis import InitFigures, verdict
-from mount_init.dialogue import CoilDialogue
-from mount_init.driver_report import DriverReport
+from mount_init.dialogue import CoilDialogue, DriverReport
 from mount_init.errors import DriverRefusalError, InitialisationError
+from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
 from mount_models.arithmetic.compiled import compilation_told
-from mount_models.specimen import chosen_specimen
+from mount_models.specimen import Specimen, chosen_specimen
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
-from mount_ros.messages.temperature import temperature_of
-from mount_ros.messages.verdicts import verdicts_of
-from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
+from mount_ros.messages.sensors import temperature_of
+from mount_ros.messages.verdicts import Level, flags_of, verdicts_of
+from mount_ros.nodes.diagnostics import WINDOW, Finding, SlidingWindow, Verdict, verdict_on
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 
-_DRIVER_PATIENCE = 0.3  # s, chosen: the driver looks at itself ten times a second
-_VERDICT_PERIOD = 1.2  # s, chosen: it tells its figures once a second
+_DRIVER_TIMEOUT = 0.3  # s, chosen: the driver judges itself ten times a second
+_VERDICT_TIMEOUT = 1.2  # s, chosen: it publishes its figures once a second
+_GAPS = ('rest_gap', 'contact_gap', 'rest_gap_std', 'contact_gap_std')
+_WEAR_RESERVE = 10e-6  # m, chosen: early enough to order pads
+_SKIPPED_SHARE = 0.02  # chosen
+_OF_LIMIT = 0.5  # chosen: a standard deviation this near to its limit is worth a look
 
 
 class MountInit(SafeLifecycleNode):
@@ -38,6 +40,7 @@ class MountInit(SafeLifecycleNode):
         declare(self, SpecimenChoice())
         self._dialogue: CoilDialogue | None = None
         self._result: tuple[int, InitialisationResult] | None = None
+        self._unsubscribed = False
 
     def configure(self) -> None:
         self._init_parameters = read(self, InitParameters())
@@ -50,11 +53,12 @@ class MountInit(SafeLifecycleNode):
         self._malformed, self._malformed_reason = 0, ''
         self._malformed_before = SlidingWindow(0)
         self._temperatures = TemperatureReadings()
-        self._driver = DriverReport(self.get_namespace(), self._init_parameters.peak_current)
+        self._driver = DriverReport(self._init_parameters.peak_current)
+        self._driver_name = f'{self.get_namespace().strip("/")}/mount_driver'.lstrip('/')
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
-        path = self.open_data_path()
+        self._path = path = self.open_data_path()
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
         self._send_air_gap = path.sender(topics.AIR_GAP)
         self._send_table = path.sender(topics.CURRENT_FORCE_TABLE)
@@ -66,22 +70,31 @@ class MountInit(SafeLifecycleNode):
     def activate(self) -> None:
         assert self._dialogue is not None
         self.real_time.begin(self)  # the ramp is part of the activation
-        self._resume_streams()
+        if self._unsubscribed:
+            self._dialogue.forget_streams()
+            self._subscribe_streams(self._path)
         self.wait_for_sole_publishers()
-        parameters = self._init_parameters
-        self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
-        if reason := self._driver.settled(False, _DRIVER_PATIENCE, self.ending):
+        self._dialogue.await_quiet(self._init_parameters.quiet_duration, self.ending)
+        if reason := self._driver.settled(False, _DRIVER_TIMEOUT, self.ending):
             raise DriverRefusalError(reason)
-        ramp = Initialisation(self._specimen, parameters, self._temperatures)
+        ramp = Initialisation(self._specimen, self._init_parameters, self._temperatures)
         try:
             result = self._ramp(self._dialogue, ramp)
         except InitialisationError as error:
-            if reason := self._driver.settled(True, _DRIVER_PATIENCE, self.ending):
+            if reason := self._driver.settled(True, _DRIVER_TIMEOUT, self.ending):
                 raise DriverRefusalError(reason) from error
             raise
         assert ramp.last_stamp is not None
-        self._publish_result(ramp.last_stamp, result)
-        self._end_streams()
+        table = to_message(ramp.last_stamp, result.table)
+        numbers = [getattr(result, name) for name in self._air_gap.names]
+        self._send_air_gap(self._air_gap.pack(ramp.last_stamp, numbers))
+        self._send_table(serialised(table))
+        self.get_logger().info(_summary(result))
+        if not self.lockstep:  # there the sample that waits for the next ramp must not be missed
+            # No sample is answered any more: without subscriptions there is less to do.
+            for topic in (topics.COIL_RIPPLE, topics.CURRENT_SETPOINT, topics.DIAGNOSTICS):
+                self._path.unsubscribe(topic)
+            self._unsubscribed = True
         self._result = (ramp.last_stamp, result)
 
     def deactivate(self) -> None:
@@ -98,11 +111,14 @@ class MountInit(SafeLifecycleNode):
 
     def judge(self) -> Verdict:
         assert self._result is not None
-        stamp, result = self._result
-        malformed = self._malformed
-        lately = malformed - self._malformed_before.earlier(time.monotonic(), malformed)
-        figures = InitFigures(result, stamp, malformed, self._malformed_reason, lately)
-        return verdict(figures, self._specimen, self._init_parameters)
+        lately = self._malformed - self._malformed_before.earlier(time.monotonic(), self._malformed)
+        found, stamp = [], self._result[0]
+        if lately:
+            sentence = f'{lately} messages could not be read (limit: none in {WINDOW:g} s)'
+            found = [Finding(Level.WARN, 'malformed', f'{sentence}; {self._malformed_reason}')]
+        told = verdict(self._result[1], self._specimen, self._init_parameters)
+        figures = {**told.figures, 'messages_malformed': self._malformed, 'last_stamp': stamp}
+        return verdict_on([*told.findings, *found], told.sentence, figures)
 
     def _ramp(self, dialogue: CoilDialogue, ramp: Initialisation) -> InitialisationResult:
         parameters = self._init_parameters
@@ -111,18 +127,15 @@ class MountInit(SafeLifecycleNode):
         before = self._driver.late_setpoints or 0
         dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
         if ramp.disturbed:
-            self._driver.hear(_VERDICT_PERIOD, self.ending)
+            self._driver.wait_for_next(_VERDICT_TIMEOUT, self.ending)
             late = self._driver.late_setpoints
             if late is not None:
                 ramp.note_late(late - before if late >= before else late)
         return ramp.result()
 
     def _objection(self) -> str:
-        assert isinstance(self.data_path, DataPath)
-        self.data_path.publisher_watch.look()  # a thread that polls the messages does not hear who comes
+        self._path.publisher_watch.check()  # a thread that polls the messages gets no event of discovery
         return self._driver.refusal
-
-    # With the result latched no sample is answered, so the streams are unsubscribed: that saves CPU time.
 
     def _subscribe_streams(self, path: DataPath) -> None:
         path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
@@ -130,34 +143,8 @@ class MountInit(SafeLifecycleNode):
         path.subscribe(topics.DIAGNOSTICS, self._on_verdicts)
         self._unsubscribed = False
 
-    def _resume_streams(self) -> None:
-        assert self._dialogue is not None
-        assert isinstance(self.data_path, DataPath)
-        if self._unsubscribed:
-            self._dialogue.forget_streams()
-            self._subscribe_streams(self.data_path)
-
-    def _end_streams(self) -> None:
-        assert isinstance(self.data_path, DataPath)
-        if self.lockstep:
-            return  # the sample that waits for the next ramp must not be missed
-        self.data_path.unsubscribe(topics.COIL_RIPPLE)
-        self.data_path.unsubscribe(topics.CURRENT_SETPOINT)
-        self.data_path.unsubscribe(topics.DIAGNOSTICS)
-        self._unsubscribed = True
-
     def _publish_setpoint(self, stamp: int, current: float) -> None:
         self._send_setpoint(self._setpoint.pack(stamp, (current,)))
-
-    def _publish_result(self, stamp: int, result: InitialisationResult) -> None:
-        numbers = [getattr(result, name) for name in self._air_gap.names]
-        table = to_message(stamp, result.table)
-        self._send_air_gap(self._air_gap.pack(stamp, numbers))
-        self._send_table(serialised(table))
-        self.get_logger().info(
-            f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
-            f'offset current {result.offset_current:.3f} A'
-        )
 
     def _on_ripple(self, raw: bytes) -> None:
         try:
@@ -172,8 +159,10 @@ class MountInit(SafeLifecycleNode):
         self._temperatures.take(*temperature_of(raw))
 
     def _on_verdicts(self, raw: bytes) -> None:
-        for told in verdicts_of(raw):
-            self._driver.take(told.node, told.sentence, told.figures)
+        for report in verdicts_of(raw):
+            if report.node == self._driver_name:
+                flags = flags_of(report.figures)
+                self._driver.take(flags.switched_off or flags.held, report.sentence, report.figures)
 
     def _on_setpoint(self, raw: bytes) -> None:
         try:
@@ -187,6 +176,75 @@ class MountInit(SafeLifecycleNode):
     def _note_malformed(self, error: ScalarsError) -> None:
         self._malformed += 1
         self._malformed_reason = str(error)
+
+
+def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> Verdict:
+    """Return the verdict on a latched result; a pure function."""
+    evidence, supply = result.evidence, result.evidence.supply
+    figures = {
+        **{f'{name}_um': f'{getattr(result, name) * 1e6:.2f}' for name in _GAPS},
+        'contact_force_N': f'{result.contact_force:.2f}',
+        'offset_current_A': f'{result.offset_current:.4f}',
+        'highest_normal_force_N': f'{result.table[1, -1]:.1f}',
+        'coil_temperature_celsius': f'{evidence.temperature.celsius:.1f}',
+        'coil_temperature_from': evidence.temperature.source.value,
+        'resistance_ohm': f'{supply.whole.ohm:.3f}',
+        'resistance_std_ohm': f'{supply.whole.std:.4f}',
+        'link_voltage_V': f'{supply.whole.link_voltage:.2f}',
+        'link_voltage_lowest_V': f'{supply.lowest:.2f}',
+        'link_voltage_highest_V': f'{supply.highest:.2f}',
+        'carried_to_voltage_of_curves': supply.carried,
+        'wear_reserve_um': f'{wear_reserve(result, specimen) * 1e6:.1f}',
+        'samples_used': evidence.samples,
+        'samples_invalid': evidence.skipped,
+    }
+    warning = _warning(result, specimen, parameters)
+    found = [Finding(Level.WARN, 'result', warning)] if warning else []
+    return verdict_on(found, _summary(result), figures)
+
+
+def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
+    """Return how much (m) the pads may wear before the pressed gap leaves the range of the force law."""
+    pressed_gap = result.contact_gap - result.table[1, -1] / specimen.pad_stiffness
+    return float(pressed_gap - specimen.force_law.gap_low)
+
+
+def _warning(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> str:
+    reserve = wear_reserve(result, specimen)
+    if reserve < _WEAR_RESERVE:
+        return (
+            f'pads are nearly worn: {reserve * 1e6:.1f} um until the gap leaves the calibrated range, less '
+            f'than {_WEAR_RESERVE * 1e6:.0f} um; replace the pads'
+        )
+    for name, std, largest in (
+        ('rest gap', result.rest_gap_std, parameters.largest_rest_gap_std),
+        ('contact gap', result.contact_gap_std, parameters.largest_contact_gap_std),
+    ):
+        if std > _OF_LIMIT * largest:
+            return (
+                f'standard deviation of the {name} ({std * 1e6:.2f} um) is more than half of its limit '
+                f'{largest * 1e6:.2f} um; check the ripple sensors'
+            )
+    skipped, total = result.evidence.skipped, result.evidence.samples + result.evidence.skipped
+    if skipped > _SKIPPED_SHARE * total:
+        return (
+            f'{skipped} of {total} ripple samples were invalid, more than {_SKIPPED_SHARE:.0%}; check the '
+            'coil ripple measurement'
+        )
+    if specimen.temperature is not None and math.isnan(result.evidence.temperature.celsius):
+        return (
+            f'{_summary(result)}; not compensated for the coil temperature, which is unknown: right at '
+            f'{specimen.temperature.calibration_celsius:.0f} degC only; do the electronics report it '
+            '(topic coil_temperature)? Else set coil_temperature_celsius'
+        )
+    return ''
+
+
+def _summary(result: InitialisationResult) -> str:
+    return (
+        f'rest gap {result.rest_gap * 1e6:.1f} um, contact gap {result.contact_gap * 1e6:.1f} um, '
+        f'offset current {result.offset_current:.3f} A'
+    )
 
 
 def main() -> None:

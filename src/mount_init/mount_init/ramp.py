@@ -1,5 +1,9 @@
-"""The current over the sample number: rest current, smooth ramp to the peak, and the same way back to 0 A."""
+"""The ramp by sample number: the current that is set, and the ripple that is read.
 
+Rest current, smooth ramp to the peak, and the same way back to 0 A.
+"""
+
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +11,7 @@ import numpy.typing as npt
 
 from mount_init.errors import SpecimenMismatchError
 from mount_init.parameters import InitParameters
+from mount_models.coil.gap import measured_inductance
 
 _APPROACH = 0.25  # chosen: share of `ramp_duration` for the way from 0 A to the peak
 FloatArray = npt.NDArray[np.float64]
@@ -41,27 +46,15 @@ def current_ramp(parameters: InitParameters, rest_current: float) -> Ramp:
             f'settle_duration ({parameters.settle_duration:g} s) must lie below dwell_duration '
             f'({parameters.dwell_duration:g} s); otherwise no sample of the dwell is used'
         )
-    rise, dwell, ramp = (
-        _count(parameters, duration)
-        for duration in (parameters.rise_duration, parameters.dwell_duration, parameters.ramp_duration)
-    )
-    peak = _count(parameters, parameters.peak_duration)
-    tail = max(1, _count(parameters, parameters.tail_duration))
     settle = _count(parameters, parameters.settle_duration)
-    to_rest = rest_current * _smooth_step(rise)
-    to_peak = rest_current + (parameters.peak_current - rest_current) * _smooth_step(ramp)
-    pieces = [
-        to_rest,
-        np.full(dwell, rest_current),
-        to_peak,
-        np.full(peak, parameters.peak_current),
-        to_peak[::-1],
-        np.full(dwell, rest_current),
-        to_rest[::-1],
-        np.zeros(tail),
-    ]
-    ends = np.cumsum([piece.size for piece in pieces])
-    start = [0, *(int(end) for end in ends)]
+    to_rest = rest_current * _smooth_step(_count(parameters, parameters.rise_duration))
+    step = _smooth_step(_count(parameters, parameters.ramp_duration))
+    to_peak = rest_current + (parameters.peak_current - rest_current) * step
+    dwell = np.full(_count(parameters, parameters.dwell_duration), rest_current)
+    peak = np.full(_count(parameters, parameters.peak_duration), parameters.peak_current)
+    tail = np.zeros(max(1, _count(parameters, parameters.tail_duration)))
+    pieces = [to_rest, dwell, to_peak, peak, to_peak[::-1], dwell, to_rest[::-1], tail]
+    start = [0, *np.cumsum([piece.size for piece in pieces]).tolist()]
     return Ramp(
         setpoints=np.concatenate(pieces),
         dwell_before=slice(start[1] + settle, start[2]),
@@ -86,6 +79,42 @@ def approach(parameters: InitParameters, ramp: Ramp, place: int) -> list[float]:
     if place < ramp.down.start:
         return [*way(0.0, target), *rest]
     return [*way(0.0, peak), *([peak] * len(rest)), *way(peak, target), *rest]
+
+
+class Readings:
+    """Current (A), slopes of current (A/s) and flux density (T/s), by sample number; NaN where invalid."""
+
+    def __init__(self, count: int):
+        self._rows = np.full((3, count), np.nan)
+        self.current, self.current_rate, self.flux_rate = self._rows
+        self.received = 0
+        self.skipped = 0
+
+    @property
+    def valid(self) -> int:
+        """Number of samples received with all three readings finite."""
+        return self.received - self.skipped
+
+    def forget(self, number: int) -> None:
+        """Take back the samples from `number` on."""
+        self.skipped -= int(np.isnan(self.current[number : self.received]).sum())
+        self._rows[:, number:] = np.nan
+        self.received = number
+
+    def add(self, *sample: float) -> bool:
+        """Store the next sample; return whether it is valid. What is not finite is skipped and counted."""
+        valid = all(math.isfinite(number) for number in sample)
+        if valid:
+            self._rows[:, self.received] = sample
+        self.received += 1
+        self.skipped += not valid
+        return valid
+
+    def inductance(self, turns_area: float) -> FloatArray:
+        """Return L_i = n A (dB/dt) / (di/dt) (H), Eq (5) upright; NaN where a slope is not positive."""
+        current_rate = np.where(self.current_rate > 0.0, self.current_rate, np.nan)
+        flux_rate = np.where(self.flux_rate > 0.0, self.flux_rate, np.nan)
+        return measured_inductance(turns_area, flux_rate, current_rate)
 
 
 def _count(parameters: InitParameters, duration: float) -> int:

@@ -12,11 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mount_init.errors import AmbiguousCurveError, SupplyError
-from mount_init.estimation import FloatArray
 from mount_init.parameters import InitParameters
-from mount_init.ramp import Ramp
-from mount_init.readings import Readings
-from mount_models.coil.crossing import CrossingError, find_crossing
+from mount_init.ramp import FloatArray, Ramp, Readings
+from mount_models.coil.crossing import Crossing, CrossingError, find_crossing
 from mount_models.coil.duty import at_calibrated_duty, duty, gap_reluctance, skin_ratio
 from mount_models.coil.gap import OutsideCurveError, ScaledPolynomial, evaluate
 from mount_models.coil.resistance import (
@@ -67,6 +65,7 @@ def inductance_at_supply_of_curves(
     moved = slice(ramp.up.start, ramp.down.stop)
     whole = measured_resistance(specimen.turns_area, current[moved], readings.flux_rate[moved])
     driven = slice(ramp.dwell_before.start, ramp.dwell_after.stop)
+    nominal = specimen.coil_resistance or specimen.heating.resistance
     expected = None
     if specimen.coil_resistance is not None and not math.isnan(celsius):
         expected = resistance_at(specimen.coil_resistance, celsius)
@@ -78,23 +77,82 @@ def inductance_at_supply_of_curves(
     if steady:
         voltage = np.full(current.size, whole.link_voltage)
     else:  # a straight line over the current tells no resistance then
-        resistance = expected or specimen.coil_resistance or specimen.heating.resistance
+        resistance = expected or nominal
         voltage = _smooth(volts + resistance * current, driven, parameters)
     lowest, highest = float(voltage[driven].min()), float(voltage[driven].max())
     parts = () if steady else _parts(specimen, ramp, readings, lowest)
-    supply = RampSupply(lowest, highest, steady, whole, parts, carried=True)
-    _check_range(specimen, supply)
-
-    at_curves = expected or resistance, specimen.bridge.link_voltage
-    if specimen.temperature is None:
-        _check_without_compensation(specimen, supply)
-        return inductance, supply._replace(carried=False)
-    relative = (resistance / whole.link_voltage) / (at_curves[0] / at_curves[1]) - 1.0
+    supply = RampSupply(lowest, highest, steady, whole, parts, carried=False)
+    bridge, name, compensation = specimen.bridge, specimen.name, specimen.temperature
+    _check_range(
+        supply,
+        bridge.lowest_voltage,
+        bridge.highest_voltage,
+        f'where the gap curves of {name} hold; check battery, generator and the ripple measurement, and '
+        'activate again',
+    )
+    if compensation is None:
+        _check_range(
+            supply,
+            (1.0 - _UNCOMPENSATED) * bridge.link_voltage,
+            (1.0 + _UNCOMPENSATED) * bridge.link_voltage,
+            f'as {name} has no temperature compensation, which also tells what the supply does; calibrate at '
+            'two temperatures',
+        )
+        return inductance, supply
+    of_curves = expected or resistance
+    relative = (resistance / whole.link_voltage) / (of_curves / bridge.link_voltage) - 1.0
     if steady and abs(relative) <= _AS_CALIBRATED:
-        return inductance, supply._replace(carried=False)
-    bridge = specimen.bridge
-    ratio = skin_ratio(bridge, duty(resistance, current, voltage), duty(at_curves[0], current, at_curves[1]))
-    return _carried(specimen, parameters, ramp, current, inductance, ratio, celsius), supply
+        return inductance, supply
+    ratio = skin_ratio(
+        bridge, duty(resistance, current, voltage), duty(of_curves, current, bridge.link_voltage)
+    )
+    curves, result = specimen.gap_curves, inductance.copy()
+
+    def carry(part: slice, gap: float) -> None:
+        reluctance = gap_reluctance(bridge, curves, compensation, nominal, specimen.rest_current, gap)
+        result[part] = at_calibrated_duty(inductance[part], reluctance, ratio[part])
+
+    for dwell in (ramp.dwell_before, ramp.dwell_after):
+        found = float(np.nanmedian(inductance[dwell]))
+        with contextlib.suppress(OutsideCurveError):  # `rest_gap` tells
+            found = inductance_at_curves(specimen, found, celsius)
+        carry(dwell, _within(curves.gap_of_inductance, found))
+    carry(moved, curves.crossing_current_of_gap.centre)
+    for _ in range(2):
+        found = inductance_crossing(specimen, parameters, current[ramp.up], result[ramp.up]).current
+        with contextlib.suppress(OutsideCurveError):
+            found = crossing_at_curves(specimen, found, celsius)
+        carry(moved, _within(curves.gap_of_crossing_current, found))
+    return result, supply._replace(carried=True)
+
+
+def inductance_crossing(
+    specimen: Specimen, parameters: InitParameters, current: FloatArray, inductance: FloatArray
+) -> Crossing:
+    """Return where one ramp's inductance (H) falls through its crossing; raises `AmbiguousCurveError`."""
+    try:
+        return find_crossing(
+            current, inductance, specimen.crossing_inductance, parameters.crossing_half_width
+        )
+    except CrossingError as error:
+        raise AmbiguousCurveError(str(error)) from error
+
+
+def inductance_at_curves(specimen: Specimen, inductance: float, celsius: float) -> float:
+    """Return an inductance (H) at rest, carried from the coil temperature (degC) to that of the gap curves.
+
+    It stays where the temperature is unknown (NaN). Raises `OutsideCurveError`.
+    """
+    if specimen.temperature is None or math.isnan(celsius):
+        return inductance
+    return inductance_at_calibration(specimen.temperature, specimen.gap_curves, inductance, celsius)
+
+
+def crossing_at_curves(specimen: Specimen, current: float, celsius: float) -> float:
+    """Return a crossing current (A), carried to the temperature of the gap curves in the same way."""
+    if specimen.temperature is None or math.isnan(celsius):
+        return current
+    return crossing_at_calibration(specimen.temperature, specimen.gap_curves, current, celsius)
 
 
 def check_reach(specimen: Specimen, readings: Readings, ramp: Ramp) -> None:
@@ -140,15 +198,12 @@ def _median(values: FloatArray) -> float:
     return float(np.median(finite)) if finite.size else math.nan
 
 
-def _check_range(specimen: Specimen, supply: RampSupply) -> None:
-    bridge = specimen.bridge
-    if supply.lowest >= bridge.lowest_voltage and supply.highest <= bridge.highest_voltage:
-        return
-    raise SupplyError(
-        f'voltage of the bridge by the coil ripple ({supply.lowest:.1f} .. {supply.highest:.1f} V) must lie '
-        f'within {bridge.lowest_voltage:g} .. {bridge.highest_voltage:g} V, where the gap curves of '
-        f'{specimen.name} hold; check battery, generator and the ripple measurement, and activate again'
-    )
+def _check_range(supply: RampSupply, low: float, high: float, reason: str) -> None:
+    if supply.lowest < low or supply.highest > high:
+        raise SupplyError(
+            f'voltage of the bridge by the coil ripple ({supply.lowest:.1f} .. {supply.highest:.1f} V) must '
+            f'lie within {low:.3g} .. {high:.3g} V, {reason}'
+        )
 
 
 def _parts(
@@ -159,78 +214,6 @@ def _parts(
         for part in (ramp.up, ramp.down)
     )
     return tuple(each for each in found if each.misfit <= _UNEVEN * lowest)
-
-
-def _check_without_compensation(specimen: Specimen, supply: RampSupply) -> None:
-    voltage = specimen.bridge.link_voltage
-    low, high = (1.0 - _UNCOMPENSATED) * voltage, (1.0 + _UNCOMPENSATED) * voltage
-    if supply.lowest < low or supply.highest > high:
-        raise SupplyError(
-            f'voltage of the bridge by the coil ripple ({supply.lowest:.1f} .. {supply.highest:.1f} V) must '
-            f'lie within {low:.1f} .. {high:.1f} V, as {specimen.name} has no temperature compensation, '
-            'which also tells what the supply does; calibrate at two temperatures'
-        )
-
-
-def _carried(
-    specimen: Specimen,
-    parameters: InitParameters,
-    ramp: Ramp,
-    current: FloatArray,
-    inductance: FloatArray,
-    ratio: FloatArray,
-    celsius: float,
-) -> FloatArray:
-    """Return the inductances (H) at the duty of the curves, in the dwells and in the ramp by their gaps."""
-    result = inductance.copy()
-    moved = slice(ramp.up.start, ramp.down.stop)
-    for dwell in (ramp.dwell_before, ramp.dwell_after):
-        gap = _likely_rest_gap(specimen, float(np.nanmedian(inductance[dwell])), celsius)
-        result[dwell] = at_calibrated_duty(inductance[dwell], _reluctance(specimen, gap), ratio[dwell])
-    gap = specimen.gap_curves.crossing_current_of_gap.centre
-    for _ in range(2):
-        result[moved] = at_calibrated_duty(inductance[moved], _reluctance(specimen, gap), ratio[moved])
-        gap = _likely_crossing_gap(specimen, parameters, current[ramp.up], result[ramp.up], celsius)
-    result[moved] = at_calibrated_duty(inductance[moved], _reluctance(specimen, gap), ratio[moved])
-    return result
-
-
-def _reluctance(specimen: Specimen, gap: float) -> float:
-    assert specimen.temperature is not None
-    resistance = specimen.coil_resistance or specimen.heating.resistance
-    return gap_reluctance(
-        specimen.bridge, specimen.gap_curves, specimen.temperature, resistance, specimen.rest_current, gap
-    )
-
-
-def _likely_rest_gap(specimen: Specimen, inductance: float, celsius: float) -> float:
-    assert specimen.temperature is not None
-    if not math.isnan(celsius):
-        with contextlib.suppress(OutsideCurveError):  # `rest_gap` tells
-            inductance = inductance_at_calibration(
-                specimen.temperature, specimen.gap_curves, inductance, celsius
-            )
-    return _within(specimen.gap_curves.gap_of_inductance, inductance)
-
-
-def _likely_crossing_gap(
-    specimen: Specimen,
-    parameters: InitParameters,
-    current: FloatArray,
-    inductance: FloatArray,
-    celsius: float,
-) -> float:
-    assert specimen.temperature is not None
-    try:
-        found = find_crossing(
-            current, inductance, specimen.crossing_inductance, parameters.crossing_half_width
-        ).current
-    except CrossingError as error:
-        raise AmbiguousCurveError(str(error)) from error
-    if not math.isnan(celsius):
-        with contextlib.suppress(OutsideCurveError):
-            found = crossing_at_calibration(specimen.temperature, specimen.gap_curves, found, celsius)
-    return _within(specimen.gap_curves.gap_of_crossing_current, found)
 
 
 def _within(curve: ScaledPolynomial, value: float) -> float:

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from mount_init.coil_temperature import TemperatureReadings
+from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.specimen import Specimen, default_specimen

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from mount_init.coil_temperature import TemperatureReadings, TemperatureSource, coil_temperature
-from mount_init.diagnosis import InitFigures, verdict
 from mount_init.errors import OutsideCalibrationError
+from mount_init.estimate import TemperatureReadings, TemperatureSource, coil_temperature
+from mount_init.node import verdict
 from mount_init.parameters import InitParameters
 from mount_models.specimen import Specimen
 from mount_ros.nodes.diagnostics import Level
@@ -75,7 +75,7 @@ def warm(simulated_actuator, celsius):
 
 
 def judged(result, specimen: Specimen):
-    return verdict(InitFigures(result, 1, 0, '', 0), specimen, PARAMETERS)
+    return verdict(result, specimen, PARAMETERS)
 
 
 def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mount_init.estimation import contact_gap, rest_gap
+from mount_init.estimate import contact_gap, rest_gap
 from mount_models.coil.crossing import find_crossing
 from mount_models.force_table import contact_force, current_force_table
 from mount_models.specimen import default_specimen

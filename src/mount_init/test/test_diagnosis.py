@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from mount_init.diagnosis import InitFigures, verdict, wear_reserve
+from mount_init.node import verdict, wear_reserve
 from mount_init.parameters import InitParameters
 from mount_ros.nodes.diagnostics import Level
 
@@ -16,8 +16,8 @@ def result(simulated_actuator, specimen, run_initialisation):
     )
 
 
-def judge(result, specimen, lately=0, reason=''):
-    return verdict(InitFigures(result, 123, 3, reason, lately), specimen, InitParameters())
+def judge(result, specimen):
+    return verdict(result, specimen, InitParameters())
 
 
 def test_a_good_result_is_told_with_its_figures(result, specimen):
@@ -25,7 +25,6 @@ def test_a_good_result_is_told_with_its_figures(result, specimen):
     assert said.level == Level.OK
     assert said.sentence.startswith('rest gap 50')
     assert 'contact gap 34' in said.sentence
-    assert said.figures['last_stamp'] == 123
     assert said.figures['samples_used'] == 2750
     assert float(said.figures['contact_gap_um']) == pytest.approx(result.contact_gap * 1e6, abs=0.01)
 
@@ -50,12 +49,3 @@ def test_many_invalid_samples_are_a_warning(result, specimen):
     said = judge(dataclasses.replace(result, evidence=evidence), specimen)
     assert said.level == Level.WARN
     assert '100 of 2750 ripple samples were invalid' in said.sentence
-
-
-def test_unreadable_messages_are_a_warning(result, specimen):
-    said = judge(result, specimen, 2, 'coil_ripple: the message names nothing')
-    assert said.level == Level.WARN
-    assert said.sentence == (
-        '2 messages could not be read (limit: none in 10 s); coil_ripple: the message names nothing'
-    )
-    assert said.figures['messages_malformed'] == 3

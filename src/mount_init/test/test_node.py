@@ -16,10 +16,11 @@ from mount_init.node import MountInit
 from mount_init.parameters import InitParameters
 from mount_ros import topics
 from mount_ros.data_path import DataPath
+from mount_ros.messages.cdr import message_class
 from mount_ros.messages.force_table import from_bytes
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.messages.temperature import temperature_layout
-from mount_ros.messages.types import message_class
+from mount_ros.messages.sensors import temperature_layout
+from mount_ros.messages.verdicts import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
 
@@ -525,4 +526,7 @@ def test_malformed_messages_are_counted_and_not_answered(graph):
     assert g.change(Transition.TRANSITION_ACTIVATE)
     verdict = g.init.judge()
     assert verdict.figures['messages_malformed'] == 1
+    assert verdict.level == Level.WARN
+    assert '1 messages could not be read (limit: none in 10 s); coil_ripple: ' in verdict.sentence
     assert 'needed are' in verdict.sentence
+    assert verdict.figures['last_stamp'] == g.electronics.results[-1][0]

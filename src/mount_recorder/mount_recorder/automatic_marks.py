@@ -7,7 +7,7 @@ from enum import Enum
 
 from mount_recorder.stamp_watch import StampWatch
 from mount_ros.messages.event import Mark
-from mount_ros.messages.verdicts import ToldVerdict
+from mount_ros.messages.verdicts import NodeVerdict
 
 BURST = 10  # marks, chosen: so many of a kind in a row ...
 REFILL = 2.0  # s, chosen: ... and then one in this time, so that a broken stream does not flood
@@ -94,7 +94,7 @@ class FaultWatch:
         self._prefix = f'{namespace.strip("/")}/'.lstrip('/')
         self._failing: set[str] = set()
 
-    def add(self, stamp: int, told: ToldVerdict) -> None:
+    def add(self, stamp: int, told: NodeVerdict) -> None:
         """Take the verdict of one node, seen at `stamp` (ns)."""
         if not told.node.startswith(self._prefix):
             return

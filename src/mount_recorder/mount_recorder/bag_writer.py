@@ -1,28 +1,72 @@
 """Writes a recording as rosbag2 0.26 (ROS 2 Jazzy) does: a folder with MCAP files and `metadata.yaml`."""
 
+import errno
 import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
-from mount_recorder.mcap_writer import CHUNK_SIZE
-from mount_recorder.offered_qos import OfferedQos
-from mount_recorder.piece import BagTopic, Offers, Repetition
-from mount_recorder.pieces import Pieces, Statement, reason_of
+from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
+from mount_recorder.mcap_writer import CHUNK_SIZE, McapWriter
+from mount_recorder.metadata import (
+    METADATA_NAME,
+    FileEntry,
+    OfferedQos,
+    TopicEntry,
+    bag_description,
+    embedded_record,
+    metadata_text,
+    qos_text,
+)
 from mount_recorder.record_file import RecordFile
-from mount_recorder.schemas import type_hash
-from mount_recorder.split import WHOLE, SplitRule
-from mount_recorder.statement import Reception, statement
+from mount_recorder.schemas import schema_text, type_hash
+from mount_recorder.topic_groups import topic_group
 
+LIBRARY = 'engine-mount mount_recorder 0.1.0'
+PIECE_RECORD = 'engine_mount_piece'
+"""Name of the writer's note in every file but the first: which latched topics it repeats there."""
+LEAST_SIZE = 1_000_000  # bytes, chosen: below, a file is mostly head and end
+LEAST_DURATION = 1_000_000_000  # ns, chosen
 _NEVER = 1 << 64  # ns, later than every log time
+_NO_SPACE = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG))
+
+Offers = Callable[[], Sequence[OfferedQos]]
 
 
 class RecordingError(ValueError):
     """A recording cannot be made or continued; the text says why and what stands on the disk."""
+
+
+class SplitError(ValueError):
+    """A size or a duration of files is not understood or out of range; the text says what is."""
+
+
+class SplitRule(NamedTuple):
+    """The limits of a file: bytes of `size`, ns in `duration`; 0 is no limit."""
+
+    size: int = 0
+    duration: int = 0
+
+
+WHOLE = SplitRule()
+"""One file, however long it becomes."""
+
+
+def checked_rule(rule: SplitRule) -> SplitRule:
+    """Return `rule` if its limits are large enough to make sense; raises `SplitError`."""
+    if rule.size and rule.size < LEAST_SIZE:
+        raise SplitError(f'split size ({rule.size} bytes) must be at least {LEAST_SIZE} bytes, or 0 for none')
+    if rule.duration and rule.duration < LEAST_DURATION:
+        raise SplitError(f'split duration ({rule.duration / 1e9:g} s) must be at least 1 s, or 0 for none')
+    return rule
 
 
 class BagWriter:
@@ -34,7 +78,7 @@ class BagWriter:
 
     With a `split` rule the recording goes on in a next file, which begins with the last message of each
     latched topic, so that it can be read alone. The file before is closed by a thread of its own. A duration
-    is one of log times, or of `clock` (ns), which is looked at after each chunk.
+    is one of log times, or of `clock` (ns), which is read after each chunk.
     """
 
     def __init__(
@@ -44,30 +88,30 @@ class BagWriter:
         split: SplitRule = WHOLE,
         chunk_size: int = CHUNK_SIZE,
         custom_data: Mapping[str, str] | None = None,
-        open_file: Callable[[Path], RecordFile] = RecordFile,
+        open_file: type[RecordFile] = RecordFile,
         clock: Callable[[], int] | None = None,
     ):
         self.folder = Path(folder)
         self.failure = ''
         self.closed = False
-        self.statement: Statement | None = None  # asked at the end
+        self.statement: Callable[[Mapping[str, int]], Mapping[str, str]] | None = None
+        """Returns the record of the recorder for the messages kept by topic, at the end."""
         self._split = split
+        self._custom_data = dict(custom_data or {})
+        self._create_file = partial(McapWriter, library=LIBRARY, chunk_size=chunk_size, open_file=open_file)
         self._clock = clock if split.duration else None
-        self._piece_begun: int | None = None  # by `clock`, ns
-        self._channels: dict[str, int] = {}  # of the topics that `write` need not look at
-        self._latched: dict[str, Repetition] = {}
-        self._pieces = Pieces(
-            self.folder,
-            chunk_size=chunk_size,
-            custom_data=custom_data or {},
-            open_file=open_file,
-            after_chunk=self._after_chunk,
-        )
+        self._file_began: int | None = None  # by `clock`, ns
+        self._topics: dict[str, _Topic] = {}
+        self._schemas: dict[str, int] = {}  # by type, the same in all files
+        self._channels: dict[str, int] = {}  # of the topics for which `write` has nothing else to do
+        self._files: list[_File] = []
+        self._unfinished: list[str] = []  # why full files have no summary
+        self._closing: threading.Thread | None = None
         self._duration = 0 if clock else split.duration  # of log times, ns; 0: no limit
-        self._due = 0 if self._duration else _NEVER  # log time from which a message may begin a piece
+        self._due = 0 if self._duration else _NEVER  # log time from which a message may begin a file
         create_folder(self.folder)
         try:
-            self._open_piece()
+            self._open_file()
         except OSError as error:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise RecordingError(f'recording {self.folder} cannot be started: {error.strerror}') from None
@@ -75,25 +119,25 @@ class BagWriter:
     @property
     def kept(self) -> int:
         """How many messages stand in complete chunks."""
-        return self._pieces.kept
+        return sum(file.kept for file in self._files)
 
     @property
     def pending(self) -> int:
-        """How many messages wait in the chunk that is being filled."""
-        return self._piece.container.pending
+        """How many messages wait in the chunks that are being filled."""
+        return self._files[-1].writer.pending
 
     @property
     def size(self) -> int:
         """How many bytes the files have."""
-        return self._pieces.size
+        return sum(file.writer.file.size for file in self._files)
 
     def unwritten(self, handed: int) -> int:
         """Return how many of the messages handed over do not stand on the disk, once writing has failed."""
         return handed - self.kept
 
     def attach(self, receptions: Mapping[str, Reception]) -> None:
-        """Take the recorder's counts, which the end of the recording shall tell of."""
-        self.statement = partial(statement, receptions)
+        """Take the recorder's counts, from which the end of the recording states the losses."""
+        self.statement = partial(loss_statement, receptions)
 
     def add_topic(
         self,
@@ -102,20 +146,21 @@ class BagWriter:
         offered_qos: Sequence[OfferedQos] | Offers = (),
         *,
         latched: bool = False,
-        units: Mapping[str, str] | None = None,
+        details: Mapping[str, str] | None = None,
     ) -> None:
         """Announce a topic by its full name; raises `SchemaError` if its type is not installed.
 
-        `offered_qos` may be a function: it is asked at the first message, when publishers are known.
-        The last message of a `latched` topic is repeated at the head of each file. `units` are those of the
-        fields, of a topic that no registry knows.
+        `offered_qos` may be a function: it is called at the first message, when publishers are known.
+        The last message of a `latched` topic is repeated at the head of each file. `details` are further
+        metadata of the channel.
         """
-        if name in self._pieces.topics:
+        if name in self._topics:
             raise RecordingError(f'topic {name} is already part of the recording {self.folder}')
-        number = self._pieces.type_number(type_name)
-        offers = offered_qos if callable(offered_qos) else _constantly(tuple(offered_qos))
-        topic = BagTopic(name, type_name, offers, number, type_hash(type_name), latched, units=units or {})
-        self._pieces.topics[name] = topic
+        if type_name not in self._schemas:
+            self._schemas[type_name] = _add_schema(self._files[-1].writer, type_name)
+        offers = offered_qos if callable(offered_qos) else partial(tuple, offered_qos)
+        hash_text = type_hash(type_name)
+        self._topics[name] = _Topic(name, type_name, offers, hash_text, latched, dict(details or {}))
 
     def write(self, topic: str, raw: bytes, receive_time: int, publish_time: int | None = None) -> None:
         """Add one serialised message; times in ns, the publish time is the receive time where unknown.
@@ -126,43 +171,31 @@ class BagWriter:
             publish_time = receive_time
         try:
             if receive_time >= self._due:
-                self._begin_piece(receive_time)
+                self._begin_file(receive_time)
             self._add_message(self._channels[topic], raw, receive_time, publish_time)
         except KeyError:
-            self._write_with_care(topic, raw, receive_time, publish_time)
+            self._write_first_or_latched(topic, raw, receive_time, publish_time)
         except OSError as error:
             self._end_early(error)
 
     def write_columns(
         self, topics: Sequence[str], columns: Sequence[NDArray[np.uint8]], times: NDArray[np.int64]
     ) -> None:
-        """Add a message of each topic for each of `times` (ns), receive and publish time in one.
+        """Write a message of each topic for each of `times` (ns), time by time.
 
-        `columns` are the serialised messages, (times, bytes) for each topic. The recording is the one that
-        `write` would make of them, time by time and in the order of the topics; raises what `write` raises.
+        `columns` are the serialised messages, (times, bytes) for each topic.
         """
-        place = 0
-        # One by one, where a next file may begin, and topics that are met for the first time or latched.
-        while place < len(times) and (self._split != WHOLE or not self._channels.keys() >= set(topics)):
+        for place, time in enumerate(times.tolist()):
             for topic, rows in zip(topics, columns, strict=True):
-                self.write(topic, rows[place].tobytes(), int(times[place]))
-            place += 1
-        if place == len(times):
-            return
-        numbers = [self._channels[topic] for topic in topics]
-        try:
-            self._piece.container.add_columns(numbers, [rows[place:] for rows in columns], times[place:])
-        except OSError as error:
-            self._end_early(error)
+                self.write(topic, rows[place].tobytes(), time)
 
     def flush(self) -> None:
-        """Complete the chunk that is being filled; raises `RecordingError` when the disk is full."""
-        if self.closed:
-            return
-        try:
-            self._piece.container.flush()
-        except OSError as error:
-            self._end_early(error)
+        """Complete the chunks that are being filled; raises `RecordingError` when the disk is full."""
+        if not self.closed:
+            try:
+                self._files[-1].writer.flush()
+            except OSError as error:
+                self._end_early(error)
 
     def close(self) -> None:
         """Complete the last chunk, write summary and `metadata.yaml`; safe to call twice."""
@@ -172,35 +205,35 @@ class BagWriter:
         try:
             self._finish()
         except OSError as error:
-            self._refuse(f'{reason_of(error)}; the file ends without its summary but with whole chunks')
-        if self._pieces.unfinished:
-            self._refuse('; '.join(self._pieces.unfinished))
+            self._fail(f'{_reason_of(error)}; the file ends without its summary but with whole chunks')
+        if self._unfinished:
+            self._fail('; '.join(self._unfinished))
 
     def stop(self, why: str) -> None:
         """Close the recording before its time and raise `RecordingError` with the sentence `why`."""
         if self.failure:
             raise RecordingError(self.failure)
         self.close()
-        self._refuse(f'{why}; the file is closed and readable')
+        self._fail(f'{why}; the file is closed and readable')
 
     def discard(self) -> None:
         """Remove the recording from the disk, for one that was never begun."""
-        self._shut()
-        self._pieces.abandon()
+        self._refuse_writes()
+        for file in self._files:
+            file.writer.file.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _write_with_care(self, topic: str, raw: bytes, receive_time: int, publish_time: int) -> None:
-        """Write the first message of a topic, or any of a latched one."""
+    def _write_first_or_latched(self, topic: str, raw: bytes, receive_time: int, publish_time: int) -> None:
         if self.failure:
             raise RecordingError(self.failure)
         if self.closed:
             raise RecordingError(f'recording {self.folder} is closed; nothing can be added')
-        if topic not in self._pieces.topics:
+        if topic not in self._topics:
             raise RecordingError(f'topic {topic} is not announced; call add_topic before write')
-        known = self._pieces.topics[topic]
-        self._pieces.open_channel(known)
+        known = self._topics[topic]
+        self._open_channel(known)
         if known.latched:
-            self._latched[topic] = Repetition(known, raw, publish_time)
+            known.last = raw, publish_time
         else:
             self._channels[topic] = known.channel
         try:
@@ -208,32 +241,91 @@ class BagWriter:
         except OSError as error:
             self._end_early(error)
 
-    # Pieces.
+    # Files.
 
-    def _open_piece(self) -> None:
-        self._piece = self._pieces.open_next()
-        self._add_message = self._piece.container.add_message
+    def _open_file(self) -> None:
+        name = f'{self.folder.name}_{len(self._files)}.mcap'
+        writer = self._create_file(self.folder / name)
+        # In the order in which they were declared first, so that all files give them the same numbers.
+        for type_name in self._schemas:
+            _add_schema(writer, type_name)
+        for topic in sorted(self._topics.values(), key=lambda topic: topic.channel):
+            if topic.channel:
+                self._declare(writer, topic)
+        writer.after_chunk = self._after_chunk
+        self._files.append(_File(name, writer))
+        self._add_message = writer.add_message
+
+    def _declare(self, writer: McapWriter, topic: '_Topic') -> int:
+        details = {
+            'offered_qos_profiles': qos_text(topic.offered_qos),
+            'topic_type_hash': topic.type_hash,
+            **topic.details,
+        }
+        group = topic_group(topic.name, topic.type)
+        return writer.add_channel(topic.name, 'cdr', self._schemas[topic.type], details, group)
+
+    def _open_channel(self, topic: '_Topic') -> None:
+        if not topic.channel:
+            topic.offered_qos = tuple(topic.offers())
+            topic.channel = self._declare(self._files[-1].writer, topic)
 
     def _after_chunk(self) -> None:
-        if self._split.size and self._piece.room_needed > self._split.size:
-            self._due = 0  # with the next message, so that no piece is empty
+        if self._split.size and self._files[-1].writer.size_at_end > self._split.size:
+            self._due = 0  # with the next message, so that no file is empty
         if self._clock is not None:
             now = self._clock()
-            self._piece_begun = now if self._piece_begun is None else self._piece_begun
-            if now - self._piece_begun >= self._split.duration:
+            self._file_began = now if self._file_began is None else self._file_began
+            if now - self._file_began >= self._split.duration:
                 self._due = 0
 
-    def _begin_piece(self, time: int) -> None:
-        """Begin a piece with the message of log time `time` (ns), unless the present one is still empty."""
-        if not self._piece.empty:
-            full = self._piece
-            full.container.flush()
-            self._open_piece()
-            self._pieces.close_beside(full)
+    def _begin_file(self, time: int) -> None:
+        """Begin a file with the message of log time `time` (ns), unless the present one is still empty."""
+        full = self._files[-1]
+        if full.writer.pending or full.kept:
+            full.writer.flush()
+            self._open_file()
+            self._close_in_thread(full)
             self._due = _NEVER
-            self._piece_begun = self._clock() if self._clock is not None else None
-            self._piece.repeat(self._latched.values(), time)
+            self._file_began = self._clock() if self._clock is not None else None
+            self._repeat_latched(time)
         self._due = time + self._duration if self._duration else _NEVER
+
+    def _repeat_latched(self, time: int) -> None:
+        """Write the latched messages with log time `time` (ns) and their own publish times.
+
+        A metadata record before them names their topics: a reader of all files counts each once.
+        """
+        repeated = [topic for topic in self._topics.values() if topic.last is not None]
+        names = yaml.safe_dump([topic.name for topic in repeated], default_flow_style=True)
+        file = self._files[-1]
+        file.writer.add_metadata(PIECE_RECORD, {'number': str(len(self._files) - 1), 'repeated': names})
+        try:
+            for topic in repeated:
+                raw, publish_time = topic.last or (b'', 0)
+                file.writer.add_message(topic.channel, raw, time, publish_time)
+            file.writer.flush()
+        finally:
+            file.repeated = dict(file.writer.message_counts)
+
+    def _close_in_thread(self, file: '_File') -> None:
+        """Close a full file while the next one is written: bringing it to the disk may take a second."""
+        records = embedded_record(self._description([file]))
+
+        def finish() -> None:
+            try:
+                file.writer.finish(records)
+            except OSError as error:
+                self._unfinished.append(f'{file.name} ends without its summary: {_reason_of(error)}')
+
+        self._wait_for_closing()
+        self._closing = threading.Thread(target=finish, name='bag file', daemon=True)
+        self._closing.start()
+
+    def _wait_for_closing(self) -> None:
+        if self._closing is not None:
+            self._closing.join()
+            self._closing = None
 
     # The end.
 
@@ -243,23 +335,66 @@ class BagWriter:
             state = 'is closed and readable'
         except OSError:
             state = 'ends without its summary but with whole chunks'
-        self._refuse(f'{reason_of(error)}; the file {state}')
+        self._fail(f'{_reason_of(error)}; the file {state}')
 
-    def _refuse(self, why: str) -> None:
-        self._shut()
+    def _fail(self, why: str) -> None:
+        self._refuse_writes()
         self.failure = f'recording {self.folder} stopped after {self.kept} messages: {why}'
         raise RecordingError(self.failure)
 
-    def _shut(self) -> None:
-        """Make `write` come to know, without a test for each message."""
+    def _refuse_writes(self) -> None:
+        """Lead `write` to its checks, which it does not make for each message."""
         self.closed = True
         self._channels.clear()
         self._due = _NEVER
 
     def _finish(self) -> None:
-        """Write the end of the last file; on the way every step leaves whole records."""
-        self._shut()
-        self._pieces.finish(self.statement)
+        """Write the end of the last file and `metadata.yaml`; whatever fails, whole records stand."""
+        self._refuse_writes()
+        for topic in self._topics.values():
+            self._open_channel(topic)
+        records: dict[str, Mapping[str, str]] = {**embedded_record(self._description(self._files[-1:]))}
+        if self.statement is not None:
+            kept = {topic.name: _count(self._files, topic, repeated=False) for topic in self._topics.values()}
+            records[RECORDER_RECORD] = self.statement(kept)
+        try:
+            self._files[-1].writer.finish(records)
+        finally:
+            self._wait_for_closing()
+            write_durably(self.folder / METADATA_NAME, metadata_text(self._description(self._files)))
+
+    def _description(self, files: Sequence['_File']) -> dict[str, object]:
+        topics = [
+            TopicEntry(topic.name, topic.type, _count(files, topic), topic.offered_qos, topic.type_hash)
+            for topic in self._topics.values()
+        ]
+        entries = [file_entry(file.name, file.writer) for file in files]
+        return bag_description(topics, entries, self._custom_data, os.environ.get('ROS_DISTRO', 'jazzy'))
+
+
+@dataclass
+class _Topic:
+    name: str
+    type: str
+    offers: Offers
+    type_hash: str
+    latched: bool
+    details: dict[str, str]
+    channel: int = 0  # the same in all files; 0 until the first message: only then is its publisher known
+    offered_qos: tuple[OfferedQos, ...] = ()
+    last: tuple[bytes, int] | None = None  # message and publish time, of a latched one
+
+
+@dataclass
+class _File:
+    name: str
+    writer: McapWriter
+    repeated: dict[int, int] = field(default_factory=dict)  # by channel: what an earlier file has too
+
+    @property
+    def kept(self) -> int:
+        """How many messages stand in complete chunks, repetitions not counted."""
+        return sum(self.writer.message_counts.values()) - sum(self.repeated.values())
 
 
 def create_folder(folder: Path) -> None:
@@ -277,5 +412,30 @@ def create_folder(folder: Path) -> None:
         raise RecordingError(f'folder {folder} cannot be created: {error.strerror}') from None
 
 
-def _constantly(offers: tuple[OfferedQos, ...]) -> Offers:
-    return lambda: offers
+def file_entry(name: str, writer: McapWriter) -> FileEntry:
+    """Return what `metadata.yaml` says of a file: what is physically there."""
+    return FileEntry(name, writer.start_time, writer.end_time, sum(writer.message_counts.values()))
+
+
+def write_durably(path: Path, text: str) -> None:
+    """Write a text and bring it to the disk."""
+    with path.open('w', encoding='utf-8') as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _add_schema(writer: McapWriter, type_name: str) -> int:
+    return writer.add_schema(type_name, 'ros2msg', schema_text(type_name).encode())
+
+
+def _count(files: Iterable[_File], topic: _Topic, *, repeated: bool = True) -> int:
+    """Return how many messages of a topic stand in complete chunks, with or without repetitions."""
+    counts = (file.writer.message_counts.get(topic.channel, 0) for file in files)
+    return sum(counts) - (0 if repeated else sum(file.repeated.get(topic.channel, 0) for file in files))
+
+
+def _reason_of(error: OSError) -> str:
+    if error.errno in _NO_SPACE:
+        return f'no space left on the disk ({error.strerror})'
+    return f'the disk refused to write ({error.strerror})'

@@ -17,8 +17,8 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from mount_ros.data_path import io_node
-from mount_ros.data_thread import DataThread, DataThreadEndedError, Work
-from mount_ros.messages.types import message_class
+from mount_ros.data_thread import DataThread, DataThreadEndedError, Poll
+from mount_ros.messages.cdr import message_class
 from mount_ros.private_rclpy import Taken, raw_taker
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import Topic
@@ -55,8 +55,8 @@ class Collector:
         self._on_failure = on_failure
         self._failure = ''
         self._taken_at = 0.0
-        self._works: list[Work] = [self._take_when_due]
-        self._attended: list[Work] = []
+        self._works: list[Poll] = [self._take_when_due]
+        self._attended: list[Poll] = []
         self._receivers: list[tuple[Subscription, Callable[[], Taken | None], Receive]] = []
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
@@ -88,7 +88,7 @@ class Collector:
         """Return the names of the topics that no publisher has been found for yet."""
         return sorted(s.topic_name for s, *_ in self._receivers if s.get_publisher_count() == 0)
 
-    def add_poll(self, work: Work) -> None:
+    def add_poll(self, work: Poll) -> None:
         """Let the thread that serves the publishers do `work` too while it serves; `work` must not raise."""
         if self._shared_thread is None:
             raise ValueError('a collector with a thread of its own attends to nothing but its messages')

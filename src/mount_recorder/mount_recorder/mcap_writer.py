@@ -13,10 +13,11 @@ every state of the file ends with a whole record.
 
 import struct
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 
-import numpy as np
 import zstandard
+from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -35,23 +36,16 @@ from mcap.records import (
     SummaryOffset,
 )
 from mcap.writer import MCAP0_MAGIC
-from numpy.typing import NDArray
 
-from mount_recorder.filled_chunk import (
-    MESSAGE,
-    MESSAGE_HEAD,
-    MESSAGE_OPCODE,
-    ColumnRecords,
-    Entries,
-    FilledChunk,
-    packed,
-    packed_index,
-)
 from mount_recorder.record_file import RecordFile
 
 CHUNK_SIZE = 64 * 1024  # bytes before compression, chosen: what a crash may cost of each group
 LONG_CHUNK_SIZE = 4 * CHUNK_SIZE
 """The same where what is written can be made again, chosen: it is read faster, and 4 % smaller (measured)."""
+MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
+_MESSAGE_OPCODE = int(Opcode.MESSAGE)  # packed faster than the member of the enumeration
+_MESSAGE_HEAD = MESSAGE.size - 9  # what the length counts besides the payload
+_INDEX = struct.Struct('<BQHI')  # opcode, length, channel, length of the entries
 _COMPRESSION_LEVEL = -1
 """Chosen: of noisy numbers little can be packed, and this level does not try (no entropy coding of literals).
 
@@ -61,12 +55,14 @@ _ROOM_PER_CHUNK = 96  # bytes of a chunk index without its channels, rounded up
 _ROOM_AT_LEAST = 64 * 1024  # bytes, chosen: metadata of the recording, statistics, footer
 
 
-class ChunkedMcap:
-    """One MCAP file, written from `start` to `finish`; every `OSError` leaves whole records behind."""
+class McapWriter:
+    """One MCAP file, from its creation to `finish`; every `OSError` leaves whole records behind."""
 
-    def __init__(self, file: RecordFile, chunk_size: int = CHUNK_SIZE):
-        self.file = file
-        self.message_counts: dict[int, int] = {}  # of the chunks that are in the file
+    def __init__(
+        self, path: Path, library: str, chunk_size: int = CHUNK_SIZE, open_file: type[RecordFile] = RecordFile
+    ):
+        """Write the head of the file and hold back room for its end."""
+        self.message_counts: dict[int, int] = {}  # by channel, of the chunks that are in the file
         self.start_time: int | None = None  # ns, earliest log time in the file
         self.end_time: int | None = None
         self.after_chunk: Callable[[], None] = _nothing  # called when chunks have reached the file
@@ -74,34 +70,37 @@ class ChunkedMcap:
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunk_count = 0
+        self._chunk_indexes: list[ChunkIndex] = []
         self._metadata_indexes: list[MetadataIndex] = []
         self._attachment_indexes: list[AttachmentIndex] = []
-        self._groups: dict[int, FilledChunk] = {}
-        self._chunk_of: dict[int, FilledChunk] = {}  # by channel
+        self._groups: dict[int, _FillingChunk] = {}
+        self._chunk_of: dict[int, _FillingChunk] = {}  # by channel
         self._data_crc = 0
         self._room = _ROOM_AT_LEAST
+        self.file = open_file(path)
+        try:
+            self._append(MCAP0_MAGIC + _packed(Header('ros2', library)))
+            self.file.keep_room(self._room)
+        except OSError:
+            self.file.close()
+            path.unlink(missing_ok=True)
+            raise
 
     @property
     def pending(self) -> int:
         """How many messages wait in the chunks that are being filled."""
-        return sum(chunk.count for chunk in self._groups.values())
+        return sum(len(numbers) for chunk in self._groups.values() for numbers in chunk.entries.values()) // 2
 
     @property
-    def room_needed(self) -> int:
-        """How many bytes one more chunk of each group and the end of the file need, from above."""
-        return self._chunk_size * len(self._groups) + self._room
-
-    def start(self, profile: str, library: str) -> None:
-        """Write the head of the file and hold back room for its end."""
-        self._append(MCAP0_MAGIC + packed(Header(profile, library)))
-        self.file.keep_room(self._room)
+    def size_at_end(self) -> int:
+        """How many bytes the file has after one more chunk of each group and its end, from above."""
+        return self.file.size + self._chunk_size * len(self._groups) + self._room
 
     def add_schema(self, name: str, encoding: str, text: bytes) -> int:
         """Declare a schema and return its id; it is written with the first message that needs it."""
         schema = Schema(id=len(self._schemas) + 1, data=text, encoding=encoding, name=name)
         self._schemas.append(schema)
-        self._room += 2 * len(packed(schema))
+        self._room += 2 * len(_packed(schema))
         return schema.id
 
     def add_channel(
@@ -113,8 +112,8 @@ class ChunkedMcap:
             id=number, topic=topic, message_encoding=encoding, metadata=dict(metadata), schema_id=schema_id
         )
         self._channels.append(channel)
-        self._chunk_of[number] = self._groups.setdefault(group, FilledChunk())
-        self._room += 4 * len(packed(channel))
+        self._chunk_of[number] = self._groups.setdefault(group, _FillingChunk())
+        self._room += 4 * len(_packed(channel))
         return number
 
     def add_message(
@@ -124,157 +123,156 @@ class ChunkedMcap:
         chunk = self._chunk_of[channel]
         entries = chunk.entries.get(channel)
         if entries is None:
-            entries = self._open_entries(channel)
+            entries = self._open_entries(chunk, channel)
         length = len(raw)
         entries += (log_time, chunk.size)
         chunk.parts += (
-            MESSAGE.pack(MESSAGE_OPCODE, length + MESSAGE_HEAD, channel, sequence, log_time, publish_time),
+            MESSAGE.pack(_MESSAGE_OPCODE, length + _MESSAGE_HEAD, channel, sequence, log_time, publish_time),
             raw,
         )
         chunk.size += length + MESSAGE.size
         if chunk.size >= self._chunk_size:
             self.flush()
 
-    def add_columns(
-        self, channels: Sequence[int], columns: Sequence[NDArray[np.uint8]], times: NDArray[np.int64]
-    ) -> None:
-        """Add a message of each channel for each of `times` (ns), log time and publish time in one.
-
-        `columns` are their payloads, (times, bytes) for each channel, of which each had a message before. The
-        file is the one that `add_message` would make of them, time by time and in the order of the channels.
-        """
-        parts = self._by_chunk(channels, columns, times)
-        first, last = 0, len(channels) * len(times)
-        while first < last:
-            end = min(last, *(part.filled_by(first, self._chunk_size) for part in parts))
-            for part in parts:
-                part.add(first, end)
-            if any(part.chunk.size >= self._chunk_size for part in parts):
-                self.flush()
-            first = end
-
     def flush(self) -> None:
         """Write the chunks that are being filled, of each group that has a message."""
-        filled = [chunk for _, chunk in sorted(self._groups.items()) if chunk.entries]
-        if filled:
-            chunks = [(chunk.record(self._compress), chunk.entries) for chunk in filled]
-            # Whatever becomes of the write, these messages are no longer pending.
-            for chunk in filled:
-                chunk.clear()
-            self._write_chunks(chunks)
+        records: list[bytes] = []
+        indexes: list[ChunkIndex] = []
+        counts: dict[int, int] = {}
+        for _, chunk in sorted(self._groups.items()):
+            if chunk.entries:
+                begin = self.file.size + sum(map(len, records))
+                record, *message_indexes = self._take_chunk(chunk, begin, indexes, counts)
+                records += [record, *message_indexes]
+        if not records:
+            return
+        self._room += sum(_ROOM_PER_CHUNK + 10 * len(index.message_index_offsets) for index in indexes)
+        self.file.keep_room(self._room)
+        self._append(b''.join(records))
+        self._chunk_indexes += indexes
+        for channel, count in counts.items():
+            self.message_counts[channel] = self.message_counts.get(channel, 0) + count
+        known = [time for time in (self.start_time, self.end_time) if time is not None]
+        self.start_time = min([*known, *(index.message_start_time for index in indexes)])
+        self.end_time = max([*known, *(index.message_end_time for index in indexes)])
+        self.after_chunk()
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record behind what is already in the file."""
-        record = packed(Metadata(name=name, metadata=dict(values)))
-        offset = self.file.size
+        record = _packed(Metadata(name=name, metadata=dict(values)))
+        index = MetadataIndex(offset=self.file.size, length=len(record), name=name)
         self._append(record)
-        self._metadata_indexes.append(MetadataIndex(offset=offset, length=len(record), name=name))
+        self._metadata_indexes.append(index)
 
     def add_attachment(self, attachment: Attachment) -> None:
         """Write an attachment behind what is already in the file."""
-        record = packed(attachment)
-        offset = self.file.size
-        self._append(record)
-        self._attachment_indexes.append(
-            AttachmentIndex(
-                offset=offset,
-                length=len(record),
-                log_time=attachment.log_time,
-                create_time=attachment.create_time,
-                data_size=len(attachment.data),
-                name=attachment.name,
-                media_type=attachment.media_type,
-            )
+        record = _packed(attachment)
+        index = AttachmentIndex(
+            offset=self.file.size,
+            length=len(record),
+            log_time=attachment.log_time,
+            create_time=attachment.create_time,
+            data_size=len(attachment.data),
+            name=attachment.name,
+            media_type=attachment.media_type,
         )
+        self._append(record)
+        self._attachment_indexes.append(index)
 
-    def finish(self) -> None:
-        """Write summary and footer; the room that was held back is used for it."""
-        self.file.release_room()
-        self._append(packed(DataEnd(self._data_crc)))
-        self.file.append(self._summary(self.file.size, self.file.kept()))
+    def finish(self, records: Mapping[str, Mapping[str, str]]) -> None:
+        """Write metadata records by name, summary and footer into the room held back, and close the file."""
+        try:
+            self.file.release_room()
+            for name, values in records.items():
+                self.add_metadata(name, values)
+            self._append(_packed(DataEnd(self._data_crc)))
+            self.file.append(self._summary(self.file.size))
+        finally:
+            self.file.close()
 
     def _append(self, data: bytes) -> None:
         self.file.append(data)
         self._data_crc = zlib.crc32(data, self._data_crc)
 
-    def _by_chunk(
-        self, channels: Sequence[int], columns: Sequence[NDArray[np.uint8]], times: NDArray[np.int64]
-    ) -> list[ColumnRecords]:
-        places: dict[FilledChunk, list[int]] = {}
-        for place, channel in enumerate(channels):
-            places.setdefault(self._chunk_of[channel], []).append(place)
-        return [
-            ColumnRecords(
-                chunk, [channels[i] for i in own], [columns[i] for i in own], own, len(channels), times
-            )
-            for chunk, own in places.items()
-        ]
-
-    def _open_entries(self, channel: int) -> list[int]:
-        chunk, record = self._chunk_of[channel], self._channels[channel - 1]
-        chunk.declare(self._schemas[record.schema_id - 1])
-        chunk.declare(record)
+    def _open_entries(self, chunk: '_FillingChunk', channel: int) -> list[int]:
+        record = self._channels[channel - 1]
+        for declaration in (self._schemas[record.schema_id - 1], record):
+            if (known := (type(declaration), declaration.id)) not in chunk.declared:
+                chunk.declared.add(known)
+                chunk.parts.append(_packed(declaration))
+                chunk.size += len(chunk.parts[-1])
         return chunk.entries.setdefault(channel, [])
 
-    def _write_chunks(self, chunks: Sequence[tuple[Chunk, Entries]]) -> None:
-        self._room += sum(_ROOM_PER_CHUNK + 10 * len(entries) for _, entries in chunks)
-        self.file.keep_room(self._room)
-        records: list[bytes] = []
-        indexes: list[ChunkIndex] = []
-        end = self.file.size
-        for chunk, entries in chunks:
-            record = packed(chunk)
-            index = _chunk_index(chunk, end, len(record))
-            records.append(record)
-            end += len(record)
-            for channel, numbers in entries.items():
-                index.message_index_offsets[channel] = end
-                records.append(packed_index(channel, numbers))
-                end += len(records[-1])
-            index.message_index_length = end - index.chunk_start_offset - index.chunk_length
-            indexes.append(index)
-        self._append(b''.join(records))
-        self.file.keep(_all_packed(indexes))  # a long recording has very many of them
-        self._chunk_count += len(chunks)
-        for chunk, entries in chunks:
-            self._count(chunk, entries)
-        self.after_chunk()
+    def _take_chunk(
+        self, chunk: '_FillingChunk', begin: int, indexes: list[ChunkIndex], counts: dict[int, int]
+    ) -> list[bytes]:
+        """Return a chunk that will stand at `begin`, and the indexes of its messages, and empty it.
 
-    def _count(self, chunk: Chunk, entries: Entries) -> None:
+        Whatever becomes of the write, its messages are no longer pending.
+        """
+        data, entries = b''.join(chunk.parts), chunk.entries
+        chunk.clear()
+        times = [time for numbers in entries.values() for time in numbers[::2]]
+        packed = Chunk(
+            compression='zstd',
+            data=self._compress(data),
+            message_start_time=min(times),
+            message_end_time=max(times),
+            uncompressed_crc=zlib.crc32(data),
+            uncompressed_size=len(data),
+        )
+        records = [_packed(packed)]
+        end, offsets = begin + len(records[0]), {}
         for channel, numbers in entries.items():
-            self.message_counts[channel] = self.message_counts.get(channel, 0) + len(numbers) // 2
-        first, last = chunk.message_start_time, chunk.message_end_time
-        self.start_time = first if self.start_time is None else min(self.start_time, first)
-        self.end_time = last if self.end_time is None else max(self.end_time, last)
+            offsets[channel] = end
+            size = 8 * len(numbers)
+            head = _INDEX.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size)
+            records.append(head + struct.pack(f'<{len(numbers)}Q', *numbers))
+            end += len(records[-1])
+            counts[channel] = len(numbers) // 2
+        indexes.append(
+            ChunkIndex(
+                message_start_time=packed.message_start_time,
+                message_end_time=packed.message_end_time,
+                chunk_start_offset=begin,
+                chunk_length=len(records[0]),
+                message_index_offsets=offsets,
+                message_index_length=end - begin - len(records[0]),
+                compression=packed.compression,
+                compressed_size=len(packed.data),
+                uncompressed_size=packed.uncompressed_size,
+            )
+        )
+        return records
 
-    def _summary(self, start: int, chunk_indexes: bytes) -> bytes:
-        groups: dict[Opcode, bytes] = {
-            Opcode.SCHEMA: _all_packed(self._schemas),
-            Opcode.CHANNEL: _all_packed(self._channels),
-            Opcode.STATISTICS: packed(self._statistics()),
-            Opcode.CHUNK_INDEX: chunk_indexes,
-            Opcode.ATTACHMENT_INDEX: _all_packed(self._attachment_indexes),
-            Opcode.METADATA_INDEX: _all_packed(self._metadata_indexes),
+    def _summary(self, start: int) -> bytes:
+        groups: dict[Opcode, Iterable[McapRecord]] = {
+            Opcode.SCHEMA: self._schemas,
+            Opcode.CHANNEL: self._channels,
+            Opcode.STATISTICS: [self._statistics()],
+            Opcode.CHUNK_INDEX: self._chunk_indexes,
+            Opcode.ATTACHMENT_INDEX: self._attachment_indexes,
+            Opcode.METADATA_INDEX: self._metadata_indexes,
         }
         data = bytearray()
         offsets = bytearray()
-        for opcode, group in groups.items():
-            if group:
-                offsets += packed(SummaryOffset(opcode, start + len(data), len(group)))
+        for opcode, records in groups.items():
+            if group := b''.join(map(_packed, records)):
+                offsets += _packed(SummaryOffset(opcode, start + len(data), len(group)))
                 data += group
         offset_start = start + len(data)
         data += offsets
         # The CRC covers the summary and the footer up to the CRC itself.
         footer = struct.pack('<BQQQ', Opcode.FOOTER, 8 + 8 + 4, start, offset_start)
         crc = zlib.crc32(footer, zlib.crc32(data))
-        return bytes(data) + packed(Footer(start, offset_start, crc)) + MCAP0_MAGIC
+        return bytes(data) + _packed(Footer(start, offset_start, crc)) + MCAP0_MAGIC
 
     def _statistics(self) -> Statistics:
         return Statistics(
             attachment_count=len(self._attachment_indexes),
             channel_count=len(self._channels),
             channel_message_counts=self.message_counts,
-            chunk_count=self._chunk_count,
+            chunk_count=len(self._chunk_indexes),
             message_count=sum(self.message_counts.values()),
             message_end_time=self.end_time or 0,
             message_start_time=self.start_time or 0,
@@ -283,24 +281,24 @@ class ChunkedMcap:
         )
 
 
+class _FillingChunk:
+    """Records in their order; `entries` say of which messages, `size` is their length in bytes."""
+
+    def __init__(self) -> None:
+        self.declared: set[tuple[type, int]] = set()  # here or in a chunk before
+        self.clear()
+
+    def clear(self) -> None:
+        self.parts: list[bytes] = []
+        self.entries: dict[int, list[int]] = {}  # by channel: log time (ns), offset, log time, offset, ...
+        self.size = 0
+
+
 def _nothing() -> None:
-    """Do nothing: nobody asked to be told."""
+    """Do nothing after a chunk."""
 
 
-def _chunk_index(chunk: Chunk, position: int, length: int) -> ChunkIndex:
-    """Return the index of a chunk whose record of `length` bytes stands at `position`."""
-    return ChunkIndex(
-        message_start_time=chunk.message_start_time,
-        message_end_time=chunk.message_end_time,
-        chunk_start_offset=position,
-        chunk_length=length,
-        message_index_offsets={},
-        message_index_length=0,
-        compression=chunk.compression,
-        compressed_size=len(chunk.data),
-        uncompressed_size=chunk.uncompressed_size,
-    )
-
-
-def _all_packed(records: Sequence[McapRecord]) -> bytes:
-    return b''.join(map(packed, records))
+def _packed(record: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    return builder.end()

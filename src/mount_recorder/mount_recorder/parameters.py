@@ -5,9 +5,9 @@ from typing import Annotated, NamedTuple
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_RATE, SampleRate
 from mount_recorder.automatic_marks import MarkKind
+from mount_recorder.bag_writer import SplitRule, checked_rule
 from mount_recorder.snapshot import AFTER, MEMORY
 from mount_recorder.space import RESERVE
-from mount_recorder.split import SplitRule, checked_rule
 
 _PETABYTE = 10**15
 _ALL_KINDS = ', '.join(kind.value for kind in MarkKind)

@@ -7,7 +7,7 @@ neither waits for the other.
 from collections import deque
 from collections.abc import Callable
 
-from mount_recorder.statement import Reception
+from mount_recorder.losses import Reception
 
 Item = tuple[str, bytes, int, int]
 """Topic, message, times of arrival and of sending in ns."""

@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mount_recorder.bag_writer import RecordingError
+from mount_recorder.bag_writer import BagWriter, RecordingError
 from mount_recorder.queue import Item, ReceivedQueue
-from mount_recorder.sink import Sink
+from mount_recorder.snapshot import Snapshot
 from mount_recorder.space import SpaceGuard
 from mount_recorder.stamp_watch import StampWatch
 
@@ -66,7 +66,7 @@ class Recorder:
 
     def __init__(
         self,
-        writer: Sink,
+        writer: BagWriter | Snapshot,
         *,
         memory_limit: int = MEMORY_LIMIT,
         threaded: bool = True,

@@ -8,9 +8,8 @@ import random
 import sys
 import time
 
-from mount_recorder.bag_writer import BagWriter
+from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_recorder.recorder import Recorder
-from mount_recorder.split import SplitRule
 
 TOPICS = ('/one', '/two', '/three', '/four')
 JOINT_STATE = 'sensor_msgs/msg/JointState'

@@ -10,8 +10,8 @@ from rclpy.node import Node
 
 from mount_recorder.collector import Collector
 from mount_ros.data_thread import DataThread
+from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.messages.types import message_class
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, CURRENT_SETPOINT, DISPLACEMENT

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from read_back import pieces_of, read_back, text_in
 
-from mount_recorder.bag_writer import BagWriter
-from mount_recorder.split import SplitRule
+from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_ros.testing import wait_until
 
 STRING = 'std_msgs/msg/String'
@@ -78,7 +77,7 @@ def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
             written.append(step)
             continue
         writer.flush()
-        writer._pieces.wait_for_closing()
+        writer._wait_for_closing()
         safe, safe_sizes = len(written), {path: path.stat().st_size for path in pieces_of(folder)}
     kill(writer)
     cut(folder, safe_sizes, share)
@@ -92,9 +91,9 @@ def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
 
 def kill(writer):
     """Leave the files of a writer as SIGKILL would."""
-    writer._pieces.wait_for_closing()
-    writer._piece.file.release_room()
-    writer._piece.file.close()
+    writer._wait_for_closing()
+    writer._files[-1].writer.file.release_room()
+    writer._files[-1].writer.file.close()
 
 
 def cut(folder, safe_sizes, share):

@@ -31,10 +31,10 @@ from mount_ros.data_thread import DataThread
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import from_bytes, to_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.messages.temperature import temperature_layout
+from mount_ros.messages.sensors import temperature_layout
 from mount_ros.nodes.diagnostics import Level
-from mount_ros.nodes.hosting import ros_context, transition
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.process import ros_context, transition
 
 PATIENCE = 10.0  # s, chosen: a node that answers later does not answer
 _LOOK_PERIOD = 0.1  # s

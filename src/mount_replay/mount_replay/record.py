@@ -22,8 +22,8 @@ from mount_recorder.node import NAME, MountRecorder
 from mount_recorder.parameters import RecorderParameters
 from mount_replay.keyboard import MARK_KEYS, Keyboard
 from mount_ros.environment import loopback_refusal
-from mount_ros.nodes.aside import wake
-from mount_ros.nodes.hosting import ros_context, transition
+from mount_ros.nodes.lifecycle import wake
+from mount_ros.nodes.process import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic
 
 # Several may run beside a graph; by the order of names the graph's own recorder sets the automatic marks.

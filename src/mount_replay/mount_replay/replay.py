@@ -15,6 +15,7 @@ from engine_mount.recordings.run.session import (
     session_content,
     session_parameters,
 )
+from engine_mount.settings.options import owned
 from mount_bringup.chosen import (
     Parameters,
     check_policy,
@@ -22,7 +23,7 @@ from mount_bringup.chosen import (
     chosen_specimen,
     control_parameters,
 )
-from mount_bringup.settings import checked_settings, defaults_of_nodes, owned
+from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
 from mount_control.policy.registry import DEFAULT
 from mount_control.settings import check_effect

@@ -89,3 +89,15 @@ def test_a_file_that_is_no_parquet_is_refused_in_a_sentence(tmp_path):
     (tmp_path / 'result.parquet').write_text('nothing')
     with pytest.raises(QueryError, match='cannot be read'):
         query(tmp_path, 'select * from result')
+
+
+def test_a_question_without_an_end_is_refused_after_a_time(catalogue):
+    sql = 'select sum(a.range * b.range) from range(1000000000000) a, range(1000000) b'
+    with pytest.raises(QueryError, match=r'^no answer within 0\.3 s \(limit\): .* --time-limit$'):
+        query(catalogue, sql, time_limit=0.3)
+
+
+def test_an_answer_of_too_many_rows_is_refused(catalogue):
+    assert len(query(catalogue, 'select * from range(1000000)')) == 1_000_000
+    with pytest.raises(QueryError, match=r'more than 1000000 rows \(limit\): aggregate, or add LIMIT$'):
+        query(catalogue, 'select * from range(1000000000000)')

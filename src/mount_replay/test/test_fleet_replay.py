@@ -13,7 +13,7 @@ import pytest
 
 from engine_mount.recordings.edit.cut import cut
 from engine_mount.recordings.run.place import open_run
-from mount_bringup.sample_rate import with_sample_rate
+from engine_mount.settings.options import with_sample_rate
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_text
 from mount_replay.fleet.runner import Done

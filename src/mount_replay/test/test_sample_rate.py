@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from mount_bringup.sample_rate import check_sample_rate, with_sample_rate
+from engine_mount.settings.options import with_sample_rate
+from mount_bringup.settings import check_sample_rate
 from mount_models.quantity import ParameterError
 from mount_models.sampling import sample_time_ns
 from mount_replay.loop.run import run_core_into

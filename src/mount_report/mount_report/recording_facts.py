@@ -17,7 +17,7 @@ from engine_mount.recordings.run.session import (
     version_differences,
     versions_told,
 )
-from mount_bringup.changed_parameters import changed_parameters
+from engine_mount.settings.changes import changed_parameters
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
 

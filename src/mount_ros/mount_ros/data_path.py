@@ -2,11 +2,14 @@
 
 While a lifecycle transition runs, the executor of its node serves nothing else. So the data path has
 its own node `<name>_io` and goes on receiving during a blocking activation.
+
+A topic between two nodes of a process costs two changes of thread by way of the middleware. Directly it costs
+a call, in the sender's thread and before the message is published for the recorder and all others.
 """
 
 import sys
+import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -14,9 +17,8 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from mount_ros.data_thread import DataThread, Work
-from mount_ros.direct import Receiver
-from mount_ros.messages.types import message_class
+from mount_ros.data_thread import DataThread, LocalTopic, Poll
+from mount_ros.messages.cdr import message_class
 from mount_ros.private_rclpy import raw_publisher
 from mount_ros.publishers import PublisherWatch
 from mount_ros.qos import control_qos, publisher_qos
@@ -33,14 +35,14 @@ def io_node(owner: Node, name: str = '') -> Node:
         f'{name or owner.get_name()}_io',
         namespace=owner.get_namespace(),
         context=owner.context,
-        cli_args=['--ros-args', *topic_remappings(sys.argv, owner.get_name())],
+        cli_args=['--ros-args', *_topic_remappings(sys.argv, owner.get_name())],
         use_global_arguments=False,
         start_parameter_services=False,
         enable_rosout=False,
     )
 
 
-def topic_remappings(arguments: Sequence[str], node: str) -> list[str]:
+def _topic_remappings(arguments: Sequence[str], node: str) -> list[str]:
     """Return those of the command line's `arguments` that remap topics of `node`, without its name."""
     kept: list[str] = []
     for option, rule in pairwise(arguments):
@@ -51,7 +53,11 @@ def topic_remappings(arguments: Sequence[str], node: str) -> list[str]:
 
 
 class DataPath:
-    """Publishers and raw subscriptions of a node, served from `start` to `stop`."""
+    """Publishers and raw subscriptions of a node, served from `start` to `stop`.
+
+    An exception costs the message or the poll in which it is raised: it is logged and counted in `refused`,
+    `refusal` is the last one, and later messages are served.
+    """
 
     def __init__(
         self,
@@ -60,22 +66,22 @@ class DataPath:
         lockstep: bool = False,
         thread: DataThread | None = None,
         on_conflict: Callable[[str, str], None] = lambda confirmed, suspected: None,
+        on_failure: Callable[[str], None] = lambda sentence: None,
         name: str = '',
     ):
+        """Take a `thread` that other nodes share, or none: then `on_failure` takes how its own one ended."""
         self.lockstep = lockstep
-        self._thread = thread or DataThread(owner.context)
+        self.refused, self.refusal = 0, ''
+        self._thread = thread or DataThread(owner.context, on_failure)
+        self._direct = thread is not None and thread.shared and not lockstep
         self.node = io_node(owner, name)
         self.publisher_watch = PublisherWatch(self.node, on_conflict)
-        """Who publishes what this path hears; `on_conflict` is called when others begin or cease to."""
-        self._serving = False
+        """Who publishes the subscribed topics; `on_conflict` is called when others begin or cease to."""
+        self._serving, self._stopped = False, False
         self._publishers: list[Publisher] = []
-        self._sent_directly: list[str] = []
-        self._receivers: list[Receiver] = []
-        self._works: list[Work] = []
-        self._stopped = False
-        self.refused = 0
-        """Messages and pieces of work that ended with an exception; `refusal` says what the last one was."""
-        self.refusal = ''
+        self._sent_directly: list[LocalTopic] = []
+        self._received_directly: list[tuple[LocalTopic, Callable[[bytes, bool], None], threading.RLock]] = []
+        self._polls: list[Poll] = []
 
     @property
     def name(self) -> str:
@@ -87,48 +93,60 @@ class DataPath:
         """Why the thread that serves this path has ended by itself; empty while it serves."""
         return self._thread.failure
 
-    def publisher(self, topic: Topic) -> Publisher:
-        """Create a publisher of `topic`."""
-        publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
+    def publisher(self, topic: Topic, mount: str = '') -> Publisher:
+        """Create a publisher of `topic`; `mount` is the namespace of one of several mounts."""
+        name = f'{mount}/{topic.name}' if mount else topic.name
+        publisher = self.node.create_publisher(message_class(topic.type), name, publisher_qos(topic))
         if topic.delivery is not Delivery.MARK:  # a mark without a subscriber is no loss
             self._publishers.append(publisher)
         return publisher
 
     def sender(self, topic: Topic, mount: str = '') -> Callable[[bytes], None]:
-        """Create a publisher of `topic` and return the function that publishes its bytes, no more.
-
-        `mount`: the namespace of one of several mounts, within that of the node.
-        """
-        placed = replace(topic, name=f'{mount}/{topic.name}') if mount else topic
-        publisher = self.publisher(placed)
+        """Create a publisher of `topic` and return the function that publishes its bytes, no more."""
+        publisher = self.publisher(topic, mount)
         publish = raw_publisher(publisher)
-        if self.lockstep:
+        if not self._direct:
             return publish
-        self._sent_directly.append(publisher.topic_name)
-        return self._thread.direct.sender(publisher.topic_name, publish)
+        local = self._thread.local_topics[publisher.topic_name]
+        local.senders += 1
+        self._sent_directly.append(local)
+
+        def send(raw: bytes) -> None:
+            for receive in local.receivers:
+                receive(raw, True)
+            publish(raw)
+
+        return send
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None], *, directly: bool = False) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`.
 
-        `directly`: in the sender's thread, where topic and time (not lock-step) allow it, see `direct`.
-        An exception costs the message that it came with, is logged and counted; later ones are served.
+        `directly`: in the thread of a sender in this process, where time (not lock-step) allows it.
         """
-        kind, qos = message_class(topic.type), control_qos(topic, lockstep=self.lockstep)
-        guarded = self._surviving(f'message of {topic.name} not used', callback)
-        events = self._events(topic)
-        if directly and not self.lockstep:
-            receiver = self._thread.direct.receiver(self.node.resolve_topic_name(topic.name), guarded)
-            self._receivers.append(receiver)
-            guarded = receiver.take_published
+        if directly and self._direct:
+            receive = self._direct_receiver(topic, callback)
+        else:
+            receive = self._guarded(f'message of {topic.name} not used', callback)
+        events = None  # of discovery; a thread that polls the messages gets none
+        if topic.writers:
+            watch, trouble = self.publisher_watch, f'writers of {topic.name} not known'
+            events = SubscriptionEventCallbacks(
+                matched=self._guarded(trouble, lambda _: watch.check_anew(topic))
+            )
 
         def create() -> None:
+            qos = control_qos(topic, lockstep=self.lockstep)
+            kind = message_class(topic.type)
             subscription = self.node.create_subscription(
-                kind, topic.name, guarded, qos, raw=True, event_callbacks=events
+                kind, topic.name, receive, qos, raw=True, event_callbacks=events
             )
             if topic.writers:
                 self.publisher_watch.watch(topic, subscription)
 
-        self._change(create)
+        if self._serving:
+            self._thread.change(create)
+        else:
+            create()
 
     def unsubscribe(self, topic: Topic) -> None:
         """End the subscriptions of `topic`, if there are any: no message is taken after the return.
@@ -158,19 +176,19 @@ class DataPath:
         self._serving = True
         self._thread.add(self.node)
 
-    def add_poll(self, work: Work) -> None:
-        """Let the thread that serves the messages do `work` too, between them, again and again.
+    def add_poll(self, poll: Poll) -> None:
+        """Let the thread that serves the messages call `poll` too, between them, again and again.
 
         For lock-step in one process: work that only continues what happens in this thread.
         """
-        self._works.append(self._surviving('work not done', work))
-        self._thread.add_poll(self._works[-1])
+        self._polls.append(self._guarded('work not done', poll))
+        self._thread.add_poll(self._polls[-1])
 
     def remove_polls(self) -> None:
-        """Return when none of the attended work is done any more."""
-        while self._works:
-            self._thread.remove_poll(self._works[-1])  # where this is refused the work goes on
-            self._works.pop()
+        """Return when no poll of this path is called any more."""
+        while self._polls:
+            self._thread.remove_poll(self._polls[-1])  # where this is refused the poll goes on
+            self._polls.pop()
 
     def stop(self) -> None:
         """End serving and destroy the node; safe to call twice."""
@@ -178,41 +196,49 @@ class DataPath:
             return
         self._stopped = True
         self.remove_polls()
-        for receiver in self._receivers:
-            receiver.end()
+        for local, receive, one_at_a_time in self._received_directly:
+            local.receivers.remove(receive)
+            with one_at_a_time:
+                """Wait for the message that a sender hands over."""
         if self._serving:
             self._thread.remove(self.node)
-        for name in self._sent_directly:
-            self._thread.direct.end_sender(name)
+        for local in self._sent_directly:
+            local.senders -= 1
         self.publisher_watch.end()
         self.node.destroy_node()
 
-    def _events(self, topic: Topic) -> SubscriptionEventCallbacks | None:
-        """Return what is done when a publisher comes or goes; a thread that polls does not hear it."""
-        if not topic.writers:
-            return None
-        trouble, watch = f'writers of {topic.name} not known', self.publisher_watch
-        noticed = self._surviving(trouble, lambda _: watch.notice(topic))
-        return SubscriptionEventCallbacks(matched=noticed)
+    def _direct_receiver(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[..., None]:
+        local = self._thread.local_topics[self.node.resolve_topic_name(topic.name)]
+        one_at_a_time, trouble = threading.RLock(), f'message of {topic.name} not used'
 
-    def _change(self, make: Callable[[], Any]) -> None:
-        """Change what the thread may be serving."""
-        if self._serving:
-            self._thread.change(make)
-        else:
-            make()
+        def receive(raw: bytes, directly: bool = False) -> None:
+            # By the middleware comes what a sender of this process has handed over before, or a message of a
+            # stranger, who is known from discovery.
+            if local.senders and not directly:
+                return
+            with one_at_a_time:
+                if not self._stopped:
+                    try:
+                        callback(raw)
+                    except Exception as error:
+                        self._count_error(trouble, error)
 
-    def _surviving(self, trouble: str, callback: Callable[..., Any]) -> Callable[..., Any]:
+        local.receivers.append(receive)
+        self._received_directly.append((local, receive, one_at_a_time))
+        return receive
+
+    def _guarded(self, trouble: str, callback: Callable[[Any], Any] | Poll) -> Callable[..., Any]:
         # The border of the data thread: an exception would end it, and with it every node that it serves.
-        logger = self.node.get_logger()
-
         def guarded(*arguments: Any) -> Any:
             try:
                 return callback(*arguments)
             except Exception as error:
-                self.refused += 1
-                self.refusal = f'{trouble}: {type(error).__name__}: {error}'
-                logger.error(self.refusal, throttle_duration_sec=1.0)
+                self._count_error(trouble, error)
                 return False
 
         return guarded
+
+    def _count_error(self, trouble: str, error: Exception) -> None:
+        self.refused += 1
+        self.refusal = f'{trouble}: {type(error).__name__}: {error}'
+        self.node.get_logger().error(self.refusal, throttle_duration_sec=1.0)

@@ -1,4 +1,4 @@
-"""Who publishes a topic whose writers the registry names, and who else does.
+"""Who publishes: the nodes of the graph, and others on a topic whose writers the registry names.
 
 The answer comes from discovery, not from what is sent: a stranger is known with or before its first message.
 A killed writer stays in discovery until its lease is over, and looks like a second one of its name.
@@ -6,6 +6,7 @@ A killed writer stays in discovery until its lease is over, and looks like a sec
 
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,7 +21,7 @@ LONGEST_DOUBT = 6.0
 NAMING_TIME = 1.0
 """How long discovery may need to name the sender of a message, s, chosen: the name travels by itself."""
 
-_LOOK_PERIOD = 0.05  # s, chosen: while an activation waits
+_CHECK_PERIOD = 0.05  # s, chosen: while an activation waits
 _NAMELESS = '_NODE_NAME_UNKNOWN_'  # rmw_fastrtps, until the name has come
 
 
@@ -33,14 +34,14 @@ class _WatchedTopic:
     """What is known of the publishers of one topic."""
 
     subscription: Subscription
-    count: int = -1  # of publishers at the last look
+    count: int = -1  # of publishers at the last check
     confirmed: str = ''
     suspected: str = ''
-    since: float = 0.0  # of the doubt, s, steady clock
+    since: float = 0.0  # of the suspicion, s, steady clock
 
 
 class PublisherWatch:
-    """Holds the publishers of the watched topics against those that the registry names; any thread may ask.
+    """Holds the publishers of the watched topics against those that the registry names; for any thread.
 
     A topic's own writers are the nodes `<writer>_io` in the namespace of `node`, each once. Where none of
     them is there, one other node may stand in for them: a replay or a test bench.
@@ -57,7 +58,7 @@ class PublisherWatch:
         self._on_change = on_change
         self._watched: dict[Topic, _WatchedTopic] = {}
         self._guard = threading.Lock()
-        self._delivery = threading.RLock()
+        self._reporting = threading.RLock()
 
     def watch(self, topic: Topic, subscription: Subscription) -> None:
         """Watch the writers of `topic`."""
@@ -74,15 +75,15 @@ class PublisherWatch:
         with self._guard:
             self._watched.clear()
 
-    def notice(self, topic: Topic) -> None:
-        """Look who has come to `topic`, or gone."""
+    def check_anew(self, topic: Topic) -> None:
+        """Check the publishers of `topic` even if their number is what it was."""
         with self._guard:
             if topic in self._watched:
                 self._watched[topic].count = -1
-        self.look()
+        self.check()
 
-    def look(self) -> None:
-        """Look at each topic whose publishers have changed in number, or are in doubt."""
+    def check(self) -> None:
+        """Check each topic whose publishers have changed in number, or are suspected."""
         with self._guard:
             before = self.confirmed, self.suspected
             for topic, watched in self._watched.items():
@@ -95,58 +96,56 @@ class PublisherWatch:
             self.suspected = next((each.suspected for each in every if each.suspected), '')
             changed = before != (self.confirmed, self.suspected)
         if changed:
-            self.deliver()
+            self.report()
 
-    def deliver(self) -> None:
+    def report(self) -> None:
         """Call `on_change` with what holds now."""
-        with self._delivery:
+        with self._reporting:
             with self._guard:
-                confirmed, suspected = self.confirmed, self.suspected
-            self._on_change(confirmed, suspected)
+                conflict = self.confirmed, self.suspected
+            self._on_change(*conflict)
 
-    def wait_for_own(self, ending: threading.Event) -> None:
-        """Return when no other writer is there, or raise `PublisherConflictError`; a doubt is waited for."""
+    def wait_for_sole(self, ending: threading.Event) -> None:
+        """Return when no other writer is there; raise `PublisherConflictError` if one is confirmed."""
         while True:
-            self.look()
+            self.check()
             if not (self.confirmed or self.suspected):
                 return
-            if self.confirmed or ending.wait(_LOOK_PERIOD):
+            if self.confirmed or ending.wait(_CHECK_PERIOD):
                 raise PublisherConflictError(self.confirmed or self.suspected)
 
     def _judge(self, topic: Topic, watched: _WatchedTopic) -> None:
         now = time.monotonic()
-        since = watched.since if watched.suspected else now
+        watched.since = watched.since if watched.suspected else now
         confirmed, suspected = self._others(topic)
-        if suspected and now - since > LONGEST_DOUBT:
+        if suspected and now - watched.since > LONGEST_DOUBT:
             confirmed, suspected = confirmed or suspected, []
-        watched.since = since
-        watched.confirmed = _sentence(topic, confirmed, 'end it') if confirmed else ''
-        watched.suspected = _sentence(topic, suspected, _IF_KILLED) if suspected else ''
+        killed = f'a killed one is gone after {LONGEST_DOUBT:g} s, else end it'
+        watched.confirmed = _sentence(topic, confirmed, 'end it')
+        watched.suspected = _sentence(topic, suspected, killed)
 
     def _others(self, topic: Topic) -> tuple[list[str], list[str]]:
         """Return the publishers of `topic` that are certainly not its own, and those that may not be."""
-        space = self._node.get_namespace().rstrip('/')
-        infos = self._node.get_publishers_info_by_topic(topic.name)
-        names = [
+        names = Counter(
             _NAMELESS
             if info.node_name == _NAMELESS
             else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-            for info in infos
+            for info in self._node.get_publishers_info_by_topic(topic.name)
             if info.topic_type == topic.type
-        ]
-        own = {f'{space}/{writer}_io' for writer in topic.writers}
-        twice = sorted({name for name in names if names.count(name) > 1})
-        others = {name for name in names if name not in own}
+        )
+        twice = sorted(name for name, count in names.items() if count > 1)
+        if len(names) <= 1:  # one name alone stands in for the writers, or is one of them
+            return [], twice
+        space = self._node.get_namespace().rstrip('/')
+        others = names.keys() - {f'{space}/{writer}_io' for writer in topic.writers}
         nameless = others & {_NAMELESS}
-        if len(set(names)) > 1:  # one name alone stands in for the writers, or is one of them
-            return sorted(others - nameless), twice or sorted(nameless)
-        return [], twice
+        return sorted(others - nameless), twice or sorted(nameless)
 
 
 class UnnamedPublisher:
     """A second writer that is known by what it sends alone, until discovery names it."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._since: float | None = None  # s, steady clock
 
     def is_awaited(self, nameless: bool) -> bool:
@@ -159,10 +158,20 @@ class UnnamedPublisher:
         return now - self._since < NAMING_TIME
 
 
-_IF_KILLED = f'a killed one is gone after {LONGEST_DOUBT:g} s, else end it'
+def present_nodes(seen_by: Node) -> list[tuple[str, str]]:
+    """Return name and namespace of every node that `seen_by` sees, itself included.
+
+    The list of names that rclpy gives keeps for ever those of a process whose last words were read after its
+    end was known: rmw_dds_common 3.2, `GraphCache::update_participant_entities`, makes an unknown participant
+    known. So the publishers that each node has on `/parameter_events` are counted instead.
+    """
+    infos = seen_by.get_publishers_info_by_topic('/parameter_events')
+    return [(info.node_name, info.node_namespace) for info in infos]
 
 
 def _sentence(topic: Topic, names: list[str], remedy: str) -> str:
+    if not names:
+        return ''
     who = ' and '.join(name.replace(_NAMELESS, 'a node without a name') for name in names)
     own = ' and '.join(topic.writers)
     return f'{who} must not publish {topic.name} too (limit: one writer, {own}): {remedy}'

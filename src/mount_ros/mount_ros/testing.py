@@ -103,7 +103,7 @@ def domain() -> Iterator[int]:
 @pytest.fixture
 def context(_observer: 'Node') -> Iterator['Context']:
     """Return the context of this process's tests; fails if a test leaves a node behind."""
-    from mount_ros.nodes.present import present_nodes
+    from mount_ros.publishers import present_nodes
 
     yield _observer.context
     alone = [(_observer.get_name(), _observer.get_namespace())]

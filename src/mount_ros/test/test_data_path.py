@@ -333,7 +333,7 @@ def test_who_waits_when_the_thread_ends_gets_the_reason(pair, monkeypatch):
     def fail(executor):
         raise RuntimeError('the executor is broken')
 
-    monkeypatch.setattr(mount_ros.data_thread, '_take_effect', fail)
+    monkeypatch.setattr(mount_ros.data_thread, '_drain', fail)
     refusal = _outcome(receiver.path.add_poll, lambda: False)
     assert isinstance(refusal, DataThreadEndedError)
     assert 'RuntimeError: the executor is broken' in str(refusal)
@@ -349,12 +349,12 @@ def test_a_thread_that_does_not_answer_is_not_waited_for_for_ever(pair, monkeypa
 
     receiver.path.add_poll(block)
     assert blocked.wait(LIMIT)
-    monkeypatch.setattr(mount_ros.data_thread, '_PATIENCE', 0.05)
+    monkeypatch.setattr(mount_ros.data_thread, '_CHANGE_TIMEOUT', 0.05)
     refusal = _outcome(receiver.path.remove_polls)
     release.set()
     monkeypatch.undo()
     assert isinstance(refusal, DataThreadError)
-    assert 'has not answered for 0.05 s' in str(refusal)
+    assert 'did not respond for 0.05 s' in str(refusal)
 
 
 def test_a_callback_that_would_wait_for_its_own_thread_is_refused(pair):

@@ -1,13 +1,14 @@
 """Direct delivery within a process: in the sender's thread, once, published besides, never after the end."""
 
+import sys
 import threading
+import types
 
 import pytest
 from rclpy.node import Node
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
-from mount_ros.direct import DirectDelivery
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import DISPLACEMENT
@@ -133,14 +134,34 @@ def test_an_exception_of_the_receiver_is_not_the_sender_s(make_path, context):
     assert 'ZeroDivisionError: no' in receiver.refusal
 
 
-def test_a_sender_that_has_ended_leaves_the_topic_to_the_middleware():
-    direct, taken = DirectDelivery(), []
-    receiver = direct.receiver('/displacement', taken.append)
-    direct.sender('/displacement', lambda raw: None)
-    receiver.take_published(b'beside')
-    direct.end_sender('/displacement')
-    receiver.take_published(b'alone')
-    assert taken == [b'alone']
-    receiver.end()
-    receiver.take(b'of a sender that was under way')
-    assert taken == [b'alone']
+def test_a_sender_that_has_ended_leaves_the_topic_to_the_middleware(make_path, context):
+    thread = DataThread(context)
+    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
+    sender.sender(DISPLACEMENT)
+    taken = Taken()
+    receiver.subscribe(DISPLACEMENT, taken, directly=True)
+    receiver.start()
+    sender.stop()
+    stranger = make_path('stranger', DataThread(context))
+    send = stranger.sender(DISPLACEMENT)
+    wait_until(lambda: not receiver.unmatched() and not stranger.unmatched(), 'connection')
+    wait_until(lambda: (send(sample(9)), taken.stamps)[1], 'the message')
+
+
+def test_one_function_hands_a_message_over_and_a_lone_sender_publishes_without_any(make_path, context):
+    thread, calls = DataThread(context), []
+    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
+    send = sender.sender(DISPLACEMENT)
+
+    def take(raw):
+        sys.setprofile(None)
+
+    message = sample(1)
+    receiver.subscribe(DISPLACEMENT, take, directly=True)
+    sys.setprofile(lambda frame, event, _: event == 'call' and calls.append(frame.f_code.co_name))
+    try:
+        send(message)
+    finally:
+        sys.setprofile(None)
+    assert calls == ['send', 'receive', 'take']
+    assert not isinstance(make_path('lone', None).sender(DISPLACEMENT), types.FunctionType)

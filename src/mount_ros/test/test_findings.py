@@ -4,6 +4,7 @@ import random
 
 import pytest
 
+from mount_ros.messages.verdicts import Flags, flags_of
 from mount_ros.nodes.diagnostics import (
     WINDOW,
     ActiveFindings,
@@ -75,3 +76,8 @@ def test_a_graver_level_is_told_at_once_and_the_first_error_speaks_alone():
 def test_a_verdict_without_findings_passes():
     verdict = Verdict(Level.ERROR, 'as it is')
     assert ActiveFindings().keep(verdict) is verdict
+
+
+def test_flags_are_what_a_node_has_published_as_true():
+    assert flags_of({'fatal': 'True', 'held': 'False', 'samples': '1'}) == Flags(fatal=True)
+    assert flags_of({}) == Flags()

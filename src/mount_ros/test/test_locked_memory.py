@@ -9,19 +9,19 @@ import pytest
 TELL = """
 import resource
 from pathlib import Path
-from mount_ros.nodes import locked_memory
+from mount_ros.nodes import scheduling
 
 def locked():
     return int(Path('/proc/self/status').read_text().split('VmLck:')[1].split()[0])
 
 {before}
-print(locked_memory.lock_memory(), locked() > 1000, end=' ')
+print(scheduling.lock_memory(), locked() > 1000, end=' ')
 new = bytearray(50_000_000)
 print(locked() > 50_000)
 """
 LIMITED = """
 resource.setrlimit(resource.RLIMIT_MEMLOCK, (8 << 20, 8 << 20))
-locked_memory._MAY_LOCK = 0
+scheduling._MAY_LOCK = 0
 """
 
 

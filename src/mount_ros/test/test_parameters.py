@@ -8,7 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity
-from mount_ros.nodes.parameters import DeclaringNode, SpecimenValues, declare, read
+from mount_ros.nodes.parameters import ParameterNode, SpecimenValues, declare, read
 
 
 class Spring(NamedTuple):
@@ -149,7 +149,7 @@ def make_declaring(context):
 
     def make(**overrides):
         values = [Parameter(name, value=value) for name, value in overrides.items()]
-        node = DeclaringNode('subject', context=context, parameter_overrides=values)
+        node = ParameterNode('subject', context=context, parameter_overrides=values)
         made.append(node)
         declare(node, Settings())
         declare(node, Marks())

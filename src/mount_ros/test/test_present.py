@@ -2,7 +2,7 @@
 
 from rclpy.node import Node
 
-from mount_ros.nodes.present import present_nodes
+from mount_ros.publishers import present_nodes
 from mount_ros.testing import wait_until
 
 

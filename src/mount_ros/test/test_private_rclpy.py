@@ -11,8 +11,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 
+from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.messages.types import message_class
 from mount_ros.private_rclpy import OpenLifecycleNode, given_at_start, raw_taker
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import wait_until

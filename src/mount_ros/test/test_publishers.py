@@ -8,7 +8,7 @@ from rclpy.node import Node
 
 import mount_ros.publishers
 from mount_ros.data_path import DataPath
-from mount_ros.messages.types import message_class
+from mount_ros.messages.cdr import message_class
 from mount_ros.publishers import NAMING_TIME, PublisherConflictError, PublisherWatch, UnnamedPublisher
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import LIMIT, wait_until
@@ -48,7 +48,7 @@ def heard(context):
 def _settled(path):
     """Return what the watch finds; the names of nodes come a little after their publishers."""
     watch = path.publisher_watch
-    wait_until(lambda: watch.look() or '_NAME_UNKNOWN' not in watch.suspected, 'the names')
+    wait_until(lambda: watch.check() or '_NAME_UNKNOWN' not in watch.suspected, 'the names')
     return watch.confirmed, watch.suspected
 
 
@@ -74,10 +74,10 @@ def test_a_second_publisher_is_told_in_the_data_thread_as_soon_as_it_is_found(he
     )
     wait_until(lambda: _settled(heard) == (sentence, ''), 'the name of the stranger')
     with pytest.raises(PublisherConflictError, match='/elsewhere/stranger must not publish'):
-        heard.publisher_watch.wait_for_own(threading.Event())
+        heard.publisher_watch.wait_for_sole(threading.Event())
     stranger.destroy_node()
     wait_until(lambda: _settled(heard) == ('', ''), 'the end of the stranger')
-    heard.publisher_watch.wait_for_own(threading.Event())
+    heard.publisher_watch.wait_for_sole(threading.Event())
 
 
 def test_one_node_alone_may_stand_in_for_the_writer(heard, publish_from):
@@ -115,7 +115,7 @@ def test_an_activation_waits_for_the_end_of_a_doubt_and_no_longer_than_the_proce
     twins = [publish_from('mount_driver_io') for _ in range(2)]
     wait_until(lambda: _settled(heard)[1], 'the doubt')
     ending = threading.Event()
-    waiting = threading.Thread(target=heard.publisher_watch.wait_for_own, args=(ending,))
+    waiting = threading.Thread(target=heard.publisher_watch.wait_for_sole, args=(ending,))
     waiting.start()
     twins[0].destroy_node()
     waiting.join()
@@ -123,7 +123,7 @@ def test_an_activation_waits_for_the_end_of_a_doubt_and_no_longer_than_the_proce
     wait_until(lambda: _settled(heard)[1], 'the doubt')
     ending.set()
     with pytest.raises(PublisherConflictError, match='a killed one is gone after 6 s'):
-        heard.publisher_watch.wait_for_own(ending)
+        heard.publisher_watch.wait_for_sole(ending)
 
 
 def test_each_of_several_writers_may_be_there_once(heard, publish_from):
@@ -149,16 +149,16 @@ def _info(name, kind=DISPLACEMENT.type, namespace='/car'):
 def test_a_node_without_a_name_is_a_doubt_and_one_of_another_type_is_not_heard(heard, monkeypatch):
     infos = [_info('mount_driver_io'), _info('stranger', 'std_msgs/msg/String')]
     monkeypatch.setattr(heard.node, 'get_publishers_info_by_topic', lambda topic: infos)
-    heard.publisher_watch.notice(DISPLACEMENT)
+    heard.publisher_watch.check_anew(DISPLACEMENT)
     assert (heard.publisher_watch.confirmed, heard.publisher_watch.suspected) == ('', '')
     infos.append(_info('_NODE_NAME_UNKNOWN_', namespace='_NODE_NAMESPACE_UNKNOWN_'))
-    heard.publisher_watch.notice(DISPLACEMENT)
+    heard.publisher_watch.check_anew(DISPLACEMENT)
     assert heard.publisher_watch.confirmed == ''
     assert heard.publisher_watch.suspected.startswith(
         'a node without a name must not publish displacement too'
     )
     infos[-1] = _info('evil')
-    heard.publisher_watch.look()
+    heard.publisher_watch.check()
     assert heard.publisher_watch.confirmed.startswith('/car/evil must not publish displacement too')
 
 
@@ -209,13 +209,13 @@ def test_of_two_changes_found_by_two_threads_the_newer_one_is_delivered_last():
 
     watch = PublisherWatch(publishers, on_change)
     watch.watch(DISPLACEMENT, publishers)
-    watch.look()
+    watch.check()
     publishers.names = ('mount_driver_io', 'mount_driver_io')  # a doubt
-    threads = [threading.Thread(target=watch.look)]
+    threads = [threading.Thread(target=watch.check)]
     threads[0].start()
     first.wait(LIMIT)
     publishers.names = ('mount_driver_io', 'stranger')
-    threads.append(threading.Thread(target=watch.look))
+    threads.append(threading.Thread(target=watch.check))
     threads[1].start()
     wait_until(lambda: watch.confirmed, 'the second change')
     going_on.set()

@@ -58,7 +58,7 @@ def system(monkeypatch):
     system = FakeThreads()
     system.bounds = []
     system.now = 0.0
-    monkeypatch.setattr(real_time, 'bound', lambda *limits: system.bounds.append(limits))
+    monkeypatch.setattr(real_time, 'limit_without_sleep', lambda *limits: system.bounds.append(limits))
     return system
 
 
@@ -73,7 +73,7 @@ def looks(whole, system, count, shares=None):
         system.now += WATCH_PERIOD
         for number, share in (shares or {}).items():
             system.times[number] += share * WATCH_PERIOD
-        said.append(whole.look())
+        said.append(whole.check())
     return [sentence for sentence in said if sentence]
 
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from mount_ros.nodes.shared_memory import SHARED_MEMORY, remove_abandoned
+from mount_ros.nodes.shutdown import SHARED_MEMORY, remove_abandoned
 from mount_ros.testing import wait_until
 
 SEGMENT, PORT = 'fastrtps_0123456789abcdef', 'fastrtps_port7411'

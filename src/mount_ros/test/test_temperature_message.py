@@ -3,9 +3,8 @@
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Temperature
 
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.temperature import temperature_layout, temperature_of
-from mount_ros.messages.types import message_class
+from mount_ros.messages.cdr import message_class, serialised
+from mount_ros.messages.sensors import temperature_layout, temperature_of
 from mount_ros.topics import COIL_TEMPERATURE
 
 STAMP = 5_123_456_789

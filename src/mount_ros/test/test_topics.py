@@ -3,7 +3,7 @@
 import pytest
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
-from mount_ros.messages.types import message_class
+from mount_ros.messages.cdr import message_class
 from mount_ros.qos import CONTROL_DEPTH, control_qos, publisher_qos, recording_qos
 from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, RACK_TOPICS, TOPICS, Delivery, topic
 

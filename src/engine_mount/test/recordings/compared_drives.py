@@ -7,7 +7,7 @@ from recorded_drive import PERIOD, START, joint_state
 from rosbags.typesys import Stores, get_typestore
 
 from mount_recorder.bag_writer import BagWriter
-from mount_recorder.offered_qos import OfferedQos
+from mount_recorder.metadata import OfferedQos
 from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 _STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -15,8 +15,8 @@ from engine_mount.recordings.edit.cut import cut
 from engine_mount.recordings.edit.merge import merge
 from engine_mount.recordings.edit.recover import recover
 from mount_recorder.bag_writer import BagWriter
+from mount_recorder.losses import Reception
 from mount_recorder.schemas import schema_text
-from mount_recorder.statement import Reception
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 200

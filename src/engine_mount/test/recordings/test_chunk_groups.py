@@ -17,10 +17,9 @@ from engine_mount.recordings.compare.compare import compare
 from engine_mount.recordings.edit.cut import cut
 from engine_mount.recordings.edit.merge import merge
 from engine_mount.recordings.edit.recover import recover
-from mount_recorder.bag_writer import BagWriter
-from mount_recorder.chunk_groups import OF_A_CAR, OF_OTHERS, chunk_group
-from mount_recorder.filled_chunk import MESSAGE
-from mount_recorder.split import SplitRule
+from mount_recorder.bag_writer import BagWriter, SplitRule
+from mount_recorder.mcap_writer import MESSAGE
+from mount_recorder.topic_groups import OF_A_CAR, OF_OTHERS, topic_group
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, RACK_TOPICS, SIM_TRUTH, TOPICS
 
 COUNT = 400
@@ -72,16 +71,16 @@ def chunks_of(folder):
 
 
 def test_topics_of_a_car_are_one_group_and_all_others_another():
-    groups = {topic.name: chunk_group(f'/left/{topic.name}', topic.type) for topic in TOPICS + RACK_TOPICS}
+    groups = {topic.name: topic_group(f'/left/{topic.name}', topic.type) for topic in TOPICS + RACK_TOPICS}
     assert {name for name, group in groups.items() if group == OF_OTHERS} == {
         'sim/truth',
         'sim/chassis_acceleration',
         'sim/mount_force',
         'sim/clamp_force',
     }
-    assert chunk_group('/measured/force', 'geometry_msgs/msg/WrenchStamped') == OF_OTHERS
-    assert chunk_group('/displacement', 'sensor_msgs/msg/Imu') == OF_OTHERS
-    assert chunk_group('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray') == OF_A_CAR
+    assert topic_group('/measured/force', 'geometry_msgs/msg/WrenchStamped') == OF_OTHERS
+    assert topic_group('/displacement', 'sensor_msgs/msg/Imu') == OF_OTHERS
+    assert topic_group('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray') == OF_A_CAR
 
 
 @pytest.mark.parametrize('made', ['written', 'split', 'cut', 'merged', 'recovered'])
@@ -111,7 +110,7 @@ def without(path, group):
     numbers = {
         number
         for number, channel in summary.channels.items()
-        if chunk_group(channel.topic, summary.schemas[channel.schema_id].name) == group
+        if topic_group(channel.topic, summary.schemas[channel.schema_id].name) == group
     }
     spoilt = 0
     for index in summary.chunk_indexes:
@@ -190,7 +189,7 @@ def test_independent_readers_give_all_messages_in_the_order_of_log_time(drive):
 
 
 def test_the_arrangement_changes_nothing_that_is_read(drive, tmp_path, monkeypatch):
-    monkeypatch.setattr('mount_recorder.piece.chunk_group', lambda name, type_name: 0)
+    monkeypatch.setattr('mount_recorder.bag_writer.topic_group', lambda name, type_name: 0)
     write_drive(tmp_path / 'plain').close()
     assert any({'/displacement', '/sim/truth'} <= topics for topics in chunks_of(tmp_path / 'plain'))
     apart, together = engine_mount.open(drive), engine_mount.open(tmp_path / 'plain')

@@ -18,7 +18,7 @@ from engine_mount.recordings.edit.cut import cut
 from engine_mount.recordings.edit.merge import merge
 from engine_mount.recordings.edit.recover import recover
 from engine_mount.recordings.messages.series import SeriesError
-from mount_recorder.mcap_writer import ChunkedMcap
+from mount_recorder.mcap_writer import McapWriter
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 101
@@ -170,9 +170,9 @@ def test_copies_of_compressed_messages_are_plain_and_say_so(tmp_path, storage, c
 
 def test_times_are_those_of_the_chunks_where_the_statistics_tell_of_others(tmp_path, monkeypatch):
     honest = engine_mount.open(write_drive(tmp_path / 'honest', 50))
-    true = ChunkedMcap._statistics
+    true = McapWriter._statistics
     monkeypatch.setattr(
-        ChunkedMcap, '_statistics', lambda self: replace(true(self), message_start_time=START - 3600 * 10**9)
+        McapWriter, '_statistics', lambda self: replace(true(self), message_start_time=START - 3600 * 10**9)
     )
     lying = engine_mount.open(write_drive(tmp_path / 'lying', 50))
     assert honest.warnings == []

@@ -11,8 +11,7 @@ from rosbags.rosbag2 import Reader
 
 import engine_mount
 from engine_mount.recordings.edit.recover import recover
-from mount_recorder.bag_writer import BagWriter
-from mount_recorder.split import SplitRule
+from mount_recorder.bag_writer import BagWriter, SplitRule
 
 TOPICS = ('/displacement', '/mount_right/event', '/a')
 TYPES = ('sensor_msgs/msg/JointState', 'std_msgs/msg/String', 'std_msgs/msg/String')

@@ -4,8 +4,9 @@ import time
 from collections.abc import Callable, Sequence
 
 from mount_bringup.graph.graph import ACTIVATE, DEACTIVATE, FRESH_DIAGNOSTICS, Graph
-from mount_bringup.graph.nodes import DRIVER, SIM, GraphError, GraphNode, is_set
+from mount_bringup.graph.nodes import DRIVER, SIM, GraphError, GraphNode
 from mount_models.sampling import SAMPLE_RATE
+from mount_ros.messages.verdicts import flags_of
 
 _LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
 
@@ -60,7 +61,7 @@ class Activation:
             self._graph.reports.note_active(driver)
 
     def _needs_initialisation(self, node: GraphNode) -> bool:
-        return not node.is_a(DRIVER) and is_set(self._driver(node)[1], 'needs_initialisation')
+        return not node.is_a(DRIVER) and flags_of(self._driver(node)[1]).needs_initialisation
 
     def _note(self, node: GraphNode, reason: str) -> None:
         """Note why a node was activated again: one note for each node, of the last time, with a count."""

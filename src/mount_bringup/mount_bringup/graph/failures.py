@@ -13,9 +13,9 @@ from mount_bringup.graph.nodes import (
     Figures,
     GraphError,
     GraphNode,
-    is_set,
 )
 from mount_models.sampling import sample_time_ns
+from mount_ros.messages.verdicts import flags_of
 
 _WINDOW = 60.0  # s, chosen: within which the failures of a node are counted
 
@@ -109,7 +109,7 @@ def table_holds(driver: Figures, init: Figures) -> bool:
     except (KeyError, ValueError):
         return False
     both_active = driver.get('state') == init.get('state') == 'active'
-    return both_active and whole and measured > since and not is_set(driver, 'needs_initialisation')
+    return both_active and whole and measured > since and not flags_of(driver).needs_initialisation
 
 
 class FailureCount:

@@ -25,8 +25,8 @@ from mount_bringup.graph.reports import NodeReports
 from mount_bringup.graph.shutdown import Interrupted
 from mount_ros.messages.event import read_mark
 from mount_ros.nodes.diagnostics import Level
-from mount_ros.nodes.leaving import Deadline, leave_middleware
-from mount_ros.nodes.present import present_nodes
+from mount_ros.nodes.shutdown import Deadline, leave_middleware
+from mount_ros.publishers import present_nodes
 from mount_ros.qos import publisher_qos, recording_qos
 from mount_ros.topics import CURRENT_FORCE_TABLE, DIAGNOSTICS, EVENT, SESSION
 

@@ -21,8 +21,8 @@ from mount_bringup.graph.processes import QUIET_START
 from mount_bringup.graph.run import GRAPHS, SUPERVISOR
 from mount_models.arithmetic.compiled import compilation_told
 from mount_ros.environment import prepare_environment
+from mount_ros.nodes.process import environment_of_children
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
-from mount_ros.nodes.starter import environment_of_children
 
 _PATIENCE = '86400'  # s, chosen: the supervisor has limits of its own, and a recorder may write for long
 

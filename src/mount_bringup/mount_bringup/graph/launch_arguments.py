@@ -84,7 +84,7 @@ COMMON_ARGUMENTS = (
     ),
     LaunchArgument(
         'log_level',
-        'what the nodes say at least',
+        'lowest level of the log of the nodes',
         default='info',
         choices=('debug', 'info', 'warn', 'error', 'fatal'),
     ),
@@ -112,6 +112,6 @@ VEHICLE_ARGUMENTS = (
         'channels', 'channel of each of several mounts, such as can0,can1; empty: as in the config file'
     ),
     LaunchArgument('port', f'{PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
-    LaunchArgument('duration', 's after which the graph ends; empty: when it is told to end'),
+    LaunchArgument('duration', 's after which the graph ends; empty: at Ctrl-C'),
 )
 """The arguments of the graph in the car."""

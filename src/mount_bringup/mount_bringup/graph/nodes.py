@@ -18,18 +18,13 @@ Figures = Mapping[str, str]
 """The figures of a report on `/diagnostics`, its `level` and `sentence`; empty where there is no report."""
 
 
-def is_set(figures: Figures, name: str) -> bool:
-    """Return whether a flag among the figures is true, such as `fatal` or `needs_initialisation`."""
-    return figures.get(name) == 'True'
-
-
 @dataclass(frozen=True)
 class GraphNode:
     """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without.
 
     `mount` is the namespace of its mount within that of the graph, empty where there is one mount alone, or
-    for what all mounts share. A node that refuses to be activated is asked `activations` times; those at
-    which the machine was too late for the 1 kHz loop do not count.
+    for what all mounts share. An activation is tried `activations` times; attempts at which the machine was
+    too late for the 1 kHz loop do not count.
     """
 
     name: str
@@ -72,7 +67,7 @@ CONTROL = GraphNode(
 )
 
 SIMULATED: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
-"""Start order: who listens comes before who speaks, and the coil's table before who uses it."""
+"""Start order: a subscriber before its publisher, and the coil's table before the node that uses it."""
 
 VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""

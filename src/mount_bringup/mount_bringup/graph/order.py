@@ -21,10 +21,15 @@ from mount_bringup.graph.nodes import (
     name_in,
     of_mounts,
 )
-from mount_bringup.mounts import settings_of_mount
 from mount_bringup.parameter_file import settings_of_file
-from mount_bringup.sample_rate import NODES, check_sample_rate
-from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
+from mount_bringup.settings import (
+    NODES,
+    SettingError,
+    check_sample_rate,
+    checked_settings,
+    defaults_of_nodes,
+    settings_of_mount,
+)
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
@@ -58,7 +63,8 @@ class LaunchOrder(NamedTuple):
 def vehicle_order(given: Texts) -> LaunchOrder:
     """Return the graph in the car; a `ValueError` says what cannot be."""
     order = launch_order(VEHICLE, VEHICLE_ARGUMENTS, given, 'car')
-    return order._replace(duration=number_of('duration', given['duration'] or 'inf', float('inf')))
+    duration = given['duration']
+    return order._replace(duration=number_of('duration', duration, 1e9)) if duration else order
 
 
 def launch_order(

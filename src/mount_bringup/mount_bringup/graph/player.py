@@ -13,7 +13,7 @@ from pathlib import Path
 import yaml
 
 from mount_bringup.graph.nodes import GraphError
-from mount_ros.nodes.starter import tied
+from mount_ros.nodes.process import tied
 from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE, DISPLACEMENT, Delivery, Topic
 
 PLAYED = (DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE)

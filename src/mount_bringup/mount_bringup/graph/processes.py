@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 
 from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups, name_in
-from mount_ros.nodes.starter import environment_of_children
+from mount_ros.nodes.process import environment_of_children
 
 QUIET_START = 'import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); '
 """The begin of a program: until it takes signals, SIGINT ends it at once and without a traceback."""

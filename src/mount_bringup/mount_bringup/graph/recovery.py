@@ -24,9 +24,10 @@ from mount_bringup.graph.failures import (
     table_holds,
 )
 from mount_bringup.graph.graph import CONFIGURE, DEACTIVATE, Graph
-from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphError, GraphNode, is_set
+from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphError, GraphNode
 from mount_bringup.graph.processes import NodeProcesses
 from mount_recorder.folders import next_recording
+from mount_ros.messages.verdicts import flags_of
 
 _START_LIMIT = 60.0  # s, chosen
 _REQUEST_PERIOD = 0.5  # s, chosen: the middleware may still know the dead predecessor, and ask that one
@@ -62,7 +63,7 @@ class Recovery:
         self._count.note(failure, time.monotonic())
         for node in failure.nodes:
             figures = self._graph.figures(node)
-            if node.is_a(DRIVER) and is_set(figures, 'coil_model_known'):
+            if node.is_a(DRIVER) and flags_of(figures).coil_model_known:
                 self._celsius[node.full_name] = float(figures['coil_model_celsius'])
         self.report(f'{failure.reason}; {self._action(whole).value}')
 

@@ -1,13 +1,13 @@
-"""The reports of the nodes on `/diagnostics`: what they say, and since when a node is silent."""
+"""The last report of each node on `/diagnostics`, and the nodes that are silent."""
 
 import time
 from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from mount_bringup.graph.nodes import CONTROL, DRIVER, Figures, GraphError, GraphNode, is_set
+from mount_bringup.graph.nodes import CONTROL, DRIVER, Figures, GraphError, GraphNode
 from mount_ros.messages.event import Mark
-from mount_ros.messages.verdicts import verdicts_in
+from mount_ros.messages.verdicts import flags_of, verdicts_in
 from mount_ros.nodes.diagnostics import Level
 
 SILENCE_LIMIT = 4.0
@@ -116,14 +116,14 @@ class NodeReports:
         """Raise `GraphError` if the report of a node is fatal for the graph."""
         for name, node in self._nodes.items():
             figures = self.figures(node)
-            if is_set(figures, 'fatal'):
+            if flags_of(figures).fatal:
                 raise GraphError(f'{name}: {figures["sentence"]}{self._unanswered(figures)}')
 
     def initialisation_request(self) -> str:
         """Return why a node requests a new initialisation, or an empty text."""
         for name, node in self._nodes.items():
             figures = self.figures(node)
-            if is_set(figures, 'needs_initialisation'):
+            if flags_of(figures).needs_initialisation:
                 return f'{name}: {figures["sentence"]}'
         return ''
 

@@ -22,31 +22,31 @@ from mount_bringup.graph.supervisor import Parameters, Supervisor
 from mount_bringup.settings import SettingError
 from mount_recorder.session import new_session, session_text
 from mount_ros.environment import prepare_environment
-from mount_ros.nodes.leaving import end_process
+from mount_ros.nodes.shutdown import end_process
 
 SUPERVISOR = 'mount_supervisor'
 
-Graph = tuple[Sequence[LaunchArgument], Callable[[Texts], LaunchOrder]]
+LaunchFile = tuple[Sequence[LaunchArgument], Callable[[Texts], LaunchOrder]]
 """The arguments of a launch file, and the function that makes an order of their texts."""
 
 
-def _vehicle() -> Graph:
+def _vehicle() -> LaunchFile:
     return VEHICLE_ARGUMENTS, vehicle_order
 
 
-def _sim() -> Graph:
+def _sim() -> LaunchFile:
     from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
 
     return SIM_ARGUMENTS, sim_order
 
 
-def _replay() -> Graph:
+def _replay() -> LaunchFile:
     from mount_bringup.graph.replay import REPLAY_ARGUMENTS, replay_order
 
     return REPLAY_ARGUMENTS, replay_order
 
 
-GRAPHS: dict[str, Callable[[], Graph]] = {'vehicle': _vehicle, 'sim': _sim, 'replay': _replay}
+GRAPHS: dict[str, Callable[[], LaunchFile]] = {'vehicle': _vehicle, 'sim': _sim, 'replay': _replay}
 """The graphs by the name of their launch file; each loads no more than it needs."""
 
 
@@ -62,6 +62,11 @@ def main() -> None:
 def run(command: Sequence[str]) -> int:
     """Run the graph of a command line and return the exit code."""
     logger = get_logger(SUPERVISOR)
+    if '--help' in command:
+        print(
+            f'usage: {SUPERVISOR} {"|".join(GRAPHS)} [ARGUMENT:=TEXT ...]; arguments as of the launch files'
+        )
+        return 0
     try:
         order = ordered(command)
         mounts = list(dict.fromkeys(node.mount for node in order.nodes if node.mount))
@@ -104,11 +109,12 @@ def _supervise(order: LaunchOrder, folder: Path) -> int:
             graph.wait_until(lambda: graph.finished or time.monotonic() > end, float('inf'), 'the end')
             logger.info('the end of the drive')
         except Interrupted:
-            logger.info('told to end')
+            logger.info('interrupted')
         except GraphError as error:
             logger.error(str(error))
             failed = True
-        complaints = graph.stop()
+        finally:
+            complaints = graph.stop()
         for sentence in [*graph.notes, *complaints, *(each.sentence for each in graph.recovery.restarts)]:
             logger.warning(sentence)
     return 1 if failed or complaints or graph.recovery.restarts else 0

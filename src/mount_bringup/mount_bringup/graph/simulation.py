@@ -5,7 +5,7 @@ from mount_bringup.graph.nodes import SIM, SIMULATED
 from mount_bringup.graph.order import LaunchOrder, Settings, Texts, launch_order
 from mount_models.quantity import with_flattened
 from mount_sim.electronics.faults.schedule import FORM, told_faults
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.building import build_excitation
 from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount

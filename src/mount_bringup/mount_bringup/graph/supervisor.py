@@ -26,11 +26,11 @@ from mount_bringup.graph.player import Player
 from mount_bringup.graph.processes import NodeProcesses
 from mount_bringup.graph.recovery import Recovery, initialise_again
 from mount_bringup.graph.reports import silence_sentence
-from mount_bringup.mounts import settings_of_mount
+from mount_bringup.settings import settings_of_mount
 from mount_ros.environment import loopback_refusal
+from mount_ros.nodes.process import Starter
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
-from mount_ros.nodes.shared_memory import remove_abandoned
-from mount_ros.nodes.starter import Starter
+from mount_ros.nodes.shutdown import remove_abandoned
 
 Parameters = dict[str, dict[str, object]]
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from engine_mount.settings.options import with_sample_rate
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (
     CONTROL,
@@ -24,8 +25,8 @@ from mount_bringup.graph.nodes import (
     GraphSettings,
     Grouping,
 )
+from mount_bringup.graph.shutdown import ending_signals
 from mount_bringup.graph.supervisor import Supervisor
-from mount_bringup.sample_rate import with_sample_rate
 from mount_cli.bench.processes import children, memory, processor_time
 from mount_cli.bench.relay import EVENTS, SPIN
 from mount_models.sampling import SAMPLE_RATE
@@ -84,7 +85,7 @@ def run_graph(
         )
         supervisor = Supervisor(SIMULATED, settings, Path(folder))
         begin = time.monotonic()
-        try:
+        with ending_signals(supervisor.interrupt), _stopped(supervisor):
             supervisor.start(lambda told: session_text({'parameters': told}), lambda words: None)
             start = time.monotonic() - begin
             _serve(supervisor, _SETTLING)
@@ -95,8 +96,6 @@ def run_graph(
             after, bus = supervisor.figures(DRIVER), supervisor.figures(SIM)
             samples, answered = (int(after[name]) - before[name] for name in ('samples', 'setpoints'))
             lost = int(supervisor.figures(RECORDER)['lost'])
-        finally:
-            supervisor.stop()
     return ChainRun(
         float(bus['latency_median_s']),
         float(bus['latency_p99_s']),
@@ -106,6 +105,15 @@ def run_graph(
         1.0 - answered / max(1, samples),
         lost,
     )
+
+
+@contextlib.contextmanager
+def _stopped(supervisor: Supervisor) -> Iterator[None]:
+    """Stop the graph at the end, whatever it is."""
+    try:
+        yield
+    finally:
+        supervisor.stop()
 
 
 def run_relay(
@@ -171,7 +179,7 @@ def _line(peer: subprocess.Popen[str]) -> str:
 
 
 def _command(parts: Sequence[str], port: int, *options: str) -> list[str]:
-    return [sys.executable, '-m', 'mount_cli.bench.relay', *parts, '--port', str(port), *options]
+    return [sys.executable, '-P', '-m', 'mount_cli.bench.relay', *parts, '--port', str(port), *options]
 
 
 @contextlib.contextmanager

@@ -45,8 +45,8 @@ def check(
 ) -> None:
     """Drive the manoeuvre suite and tell which limits hold, the worst first."""
     from engine_mount.recordings.run.folder import make_run_folder, new_place
+    from engine_mount.settings.options import settings_of_options
     from mount_bringup.graph.domain import chosen_domain
-    from mount_bringup.settings import settings_of_options
     from mount_cli.screen import TerminalScreen
     from mount_experiments.check.judgement import all_verdicts, passed
     from mount_experiments.check.page import PAGE, write_page

@@ -75,7 +75,7 @@ def cut(
 
 
 def _seconds(text: str) -> float:
-    from mount_recorder.split import duration_in_nanoseconds
+    from engine_mount.recordings.run.amounts import duration_in_nanoseconds
 
     plain = text.replace('.', '', 1).isdigit()
     return duration_in_nanoseconds(f'{text}s' if plain else text) / 1e9

@@ -177,9 +177,9 @@ def drive(
     namespace: Namespace = '',
 ) -> None:
     """Drive the simulated car through the whole graph, record it and print what happened."""
+    from engine_mount.settings.options import settings_of_options, with_sample_rate
     from mount_bringup.graph.domain import chosen_domain
-    from mount_bringup.sample_rate import with_sample_rate
-    from mount_bringup.settings import SettingError, checked_settings, settings_of_options
+    from mount_bringup.settings import SettingError, checked_settings
     from mount_cli.screen import TerminalScreen
     from mount_replay.drive.drive import DriveOrder, record_drive, recorder_parameters
     from mount_replay.drive.recorder_options import recorder_options

@@ -24,7 +24,7 @@ Examples:
 `engine-mount faults --page docs/reference/faults.md` - all, with the page
 """
 
-_DRIVE = (sys.executable, '-c', 'from mount_cli.command import main; main()', 'drive')
+_DRIVE = (sys.executable, '-P', '-c', 'from mount_cli.command import main; main()', 'drive')
 
 
 def faults(

@@ -19,7 +19,8 @@ OtherThanRecorded = Annotated[
 
 def changes_of(settings: list[str]) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: value}} of NAME=VALUE, or raise `BadParameter` or a `ValueError`."""
-    from mount_bringup.settings import SettingError, settings_of_options
+    from engine_mount.settings.options import settings_of_options
+    from mount_bringup.settings import SettingError
     from mount_replay.replay import parsed_changes
 
     try:

@@ -48,10 +48,7 @@ def view(
         str, typer.Option(help='address to listen at; other than this machine: by a token')
     ] = '127.0.0.1',
     port: Annotated[int, typer.Option(help='of the page')] = 8137,
-    foxglove_port: Annotated[
-        int | None,
-        typer.Option(help='of the Foxglove server, 0: none; default: 8765, or none with --host'),
-    ] = None,
+    foxglove_port: Annotated[int, typer.Option(help='of the Foxglove server, 0: none')] = 8765,
     beside: Annotated[
         bool, typer.Option('--beside/--no-beside', help='simulate other mounts and policies beside')
     ] = True,
@@ -60,11 +57,9 @@ def view(
 ) -> None:
     """Show the running graph, or a recording, as a page in the browser and in Foxglove."""
     from mount_bringup.graph.domain import chosen_domain
-    from mount_view.view import FOXGLOVE_PORT, ViewOrder, serve_view
+    from mount_view.view import ViewOrder, serve_view
 
     console = terminal()
-    if foxglove_port is None:
-        foxglove_port = FOXGLOVE_PORT if host == ViewOrder().host else 0  # it asks for no token
     place = None if recording is None else local(recording, console)
     order = ViewOrder(place, rate, begin, chosen_domain(domain), namespace, host, port, foxglove_port, beside)
     serve_view(order, lambda text: console.print(text, soft_wrap=True))
@@ -84,6 +79,7 @@ def status(
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.shutdown import ending_signals
     from mount_report.json_file import write_json
+    from mount_view.feed.feed import FeedError
     from mount_view.screen import status_screen
     from mount_view.view import ViewOrder, model_of, wait_for_state
     from mount_view.window.told import told_state
@@ -101,5 +97,7 @@ def status(
                 raise typer.Exit(1)
             return
         with Live(status_screen(model, feed.title), console=console, refresh_per_second=_REFRESHES) as live:
-            while not ending.wait(1.0 / _REFRESHES):
+            while not model.failure and not ending.wait(1.0 / _REFRESHES):
                 live.update(status_screen(model, feed.title))
+        if model.failure:
+            raise FeedError(model.failure)

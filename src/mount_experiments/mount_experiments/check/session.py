@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from engine_mount.recordings.run.screen import Bar, Screen
-from mount_bringup.mounts import mounts_of
+from engine_mount.settings.mounts import mounts_of
 from mount_bringup.settings import checked_settings
 from mount_experiments.check.suite import Manoeuvre
 from mount_experiments.check.trial import CORE, Result, Trial, broken_down, run_trial

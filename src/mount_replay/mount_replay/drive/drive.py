@@ -9,6 +9,7 @@ from typing import Any
 
 from engine_mount.recordings.run.folder import RunFolder, make_run_folder
 from engine_mount.recordings.run.screen import Screen
+from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import can_port, domain_locks
 from mount_bringup.graph.nodes import (
@@ -24,7 +25,6 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.reports import GraphObserver
 from mount_bringup.graph.shutdown import ending_signals
 from mount_bringup.graph.supervisor import Supervisor
-from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
@@ -37,6 +37,7 @@ from mount_replay.drive.preflight import preflight
 from mount_replay.drive.progress import DriveProgress
 from mount_replay.keyboard import MARK_KEYS, Keyboard
 from mount_replay.loop.recording import record_car, record_core
+from mount_ros.messages.verdicts import flags_of
 from mount_sim.diagnosis import beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
 
@@ -122,7 +123,8 @@ def _drive_graph(
         finally:
             supervisor.reports.observer = GraphObserver()  # of the end the supervisor tells
             recorder = supervisor.figures(RECORDER)
-            if recorder.get('failed') == 'True' and recorder.get('fatal') != 'True':
+            flags = flags_of(recorder)
+            if flags.failed and not flags.fatal:
                 supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
             complaints += [restart.sentence for restart in supervisor.recovery.restarts]

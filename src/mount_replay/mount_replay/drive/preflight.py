@@ -1,8 +1,8 @@
 """Refuses an order that a node would refuse, before any node is started."""
 
+from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from mount_bringup.chosen import Parameters
-from mount_bringup.mounts import mounts_of, settings_of_mounts
-from mount_bringup.sample_rate import check_sample_rate
+from mount_bringup.settings import check_sample_rate
 from mount_control.settings import check_effect
 from mount_driver.parameters import DriverParameters
 from mount_models.quantity import with_flattened
@@ -10,8 +10,8 @@ from mount_recorder.parameters import RecorderParameters
 from mount_replay.drive.recorder_options import checked_recorder
 from mount_replay.loop.chain import CoreChain
 from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.excitation.scenario import build_excitation
 from mount_sim.excitation.shaking import steps_of_sample
 from mount_sim.mount_choice import check_control_of_mount
 from mount_sim.parameters import SimParameters

@@ -23,6 +23,7 @@ from mount_replay.faults.processes import (
     process_of,
     shared_memory_of_others,
 )
+from mount_ros.nodes.process import tied
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
 START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws
@@ -89,7 +90,7 @@ class GraphUnderTest:
         self._log = place.folder / f'{namespace}.log'
         with self._log.open('wb') as log:
             self.process = subprocess.Popen(
-                command,
+                tied(command),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

@@ -118,7 +118,7 @@ class Intruder:
         """Start it and wait until it knows the graph; it is silent until it is told to send."""
         place = [self.kind, str(graph.domain), graph.namespace]
         process = subprocess.Popen(
-            [sys.executable, '-m', _INTRUDER, *place],
+            [sys.executable, '-P', '-m', _INTRUDER, *place],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

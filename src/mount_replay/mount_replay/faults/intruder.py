@@ -30,8 +30,8 @@ from mount_ros.environment import prepare_environment
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.nodes.hosting import ros_context
-from mount_ros.nodes.leaving import end_process
+from mount_ros.nodes.process import ros_context
+from mount_ros.nodes.shutdown import end_process
 
 Step = Callable[[], None]
 """Sends what is due in one period."""

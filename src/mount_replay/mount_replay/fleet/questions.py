@@ -2,6 +2,7 @@
 
 import json
 import os
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,8 @@ NAMES = ('recordings', 'events', 'result')
 """The tables that a folder can hold, each a file NAME.parquet."""
 
 _MEMORY = '1GB'  # chosen: what a question may take, before it is refused
+_TIME_LIMIT = 60.0  # s, chosen: what takes longer is refused
+_ROW_LIMIT = 1_000_000  # chosen: of an answer, which stands in memory
 _LOCKS = (
     'SET python_enable_replacements = false',  # no variable of this program is a table
     'SET enable_external_access = false',  # no other file, no network, no extension
@@ -30,23 +33,34 @@ class QueryError(ValueError):
     """A question cannot be answered; the text says why, and what could be asked."""
 
 
-def query(folder: str | os.PathLike[str], sql: str) -> 'pyarrow.Table':
+def query(folder: str | os.PathLike[str], sql: str, time_limit: float = _TIME_LIMIT) -> 'pyarrow.Table':
     """Return the answer to one SELECT about the tables of a catalogue or result.
 
     Their columns and units: docs/reference/fleet_columns.md. Nothing can be written, and no other file be
-    read. Raises `QueryError`.
+    read. Raises `QueryError`, also for what takes longer than `time_limit` (s).
     """
     engine = required('duckdb', 'a question to a fleet')
     tables = tables_of(folder)
     connection = _locked(engine, tables)
+    timer = threading.Timer(time_limit, connection.interrupt)
+    timer.start()
     try:
         statements = connection.extract_statements(sql)
         if len(statements) != 1 or statements[0].type != engine.StatementType.SELECT:
             raise QueryError('a question is one SELECT statement; tables: ' + ', '.join(tables))
-        return connection.sql(sql).to_arrow_table()
+        rows: pyarrow.Table = connection.sql(sql).limit(_ROW_LIMIT + 1).to_arrow_table()
+        if len(rows) > _ROW_LIMIT:
+            raise QueryError(f'the answer has more than {_ROW_LIMIT} rows (limit): aggregate, or add LIMIT')
+        return rows
+    except engine.InterruptException:
+        raise QueryError(
+            f'no answer within {time_limit:g} s (limit): ask for less, or raise --time-limit'
+        ) from None
     except engine.Error as error:
         raise QueryError(_sentence(str(error), sql, tables)) from None
     finally:
+        timer.cancel()
+        timer.join()
         connection.close()
 
 

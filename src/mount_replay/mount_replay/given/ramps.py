@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.bag.recording import Recording
 from mount_bringup.chosen import chosen_specimen
-from mount_init.coil_temperature import TemperatureReadings
+from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 from mount_models.quantity import with_flattened

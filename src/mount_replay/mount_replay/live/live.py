@@ -18,7 +18,7 @@ from engine_mount.recordings.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_replay.given.input import Notes, ReplayError, has, recorded_parameters
 from mount_replay.given.ramps import MeasuredGap, measured_gaps
 from mount_replay.keyboard import Keyboard
@@ -27,10 +27,10 @@ from mount_replay.live.playback import Playback
 from mount_replay.replay import check_parameters, with_changes
 from mount_ros import topics
 from mount_ros.data_path import DataPath
+from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import stamp_of
-from mount_ros.messages.types import message_class
-from mount_ros.nodes.hosting import ros_context
-from mount_ros.nodes.present import present_nodes
+from mount_ros.nodes.process import ros_context
+from mount_ros.publishers import present_nodes
 from mount_ros.topics import Delivery, Topic
 
 _SHOWN = (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)

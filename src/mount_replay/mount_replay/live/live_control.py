@@ -18,7 +18,7 @@ from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.nodes.hosting import transition
+from mount_ros.nodes.process import transition
 
 _MATCH_LIMIT = 10.0  # s, chosen
 

@@ -8,7 +8,7 @@ from mount_bringup.chosen import Parameters, chosen_control, chosen_specimen
 from mount_control.answering import Answer, Answering
 from mount_control.policy.contract import Policy
 from mount_control.sample_watch import Judgement
-from mount_init.coil_temperature import TemperatureReadings
+from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.quantity import with_flattened

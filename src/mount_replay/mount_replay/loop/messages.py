@@ -13,9 +13,8 @@ from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_ros import topics
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
-from mount_ros.messages.level_imu import level_imu
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
-from mount_ros.messages.temperature import temperature_layout
+from mount_ros.messages.sensors import level_imu, temperature_layout
 from mount_ros.topics import Topic
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.plant import TRUTH

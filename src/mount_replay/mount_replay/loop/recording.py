@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bringup.chosen import Parameters
-from mount_recorder.bag_writer import BagWriter
+from mount_recorder.bag_writer import WHOLE, BagWriter, SplitRule
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_message
-from mount_recorder.split import WHOLE, SplitRule
 from mount_replay.loop.car import run_car_into
 from mount_replay.loop.messages import Columns, CoreMessages
 from mount_replay.loop.run import CoreOutcome, coil_temperature, run_core

@@ -11,8 +11,8 @@ from engine_mount.recordings.audit.report import as_table, sentences
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.run.folder import RunFolder
 from engine_mount.recordings.run.screen import Screen
+from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from mount_bringup.chosen import Parameters, policy_of
-from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_recorder.folders import recordings_of, saved_snapshots
 from mount_recorder.parameters import RecorderParameters
 from mount_report.drive.evaluation import levels_of, samples_at_the_ends

@@ -6,6 +6,7 @@ Here padding is zero and nothing follows the end. It is plain Python: for set-up
 rare messages; the 1 kHz path patches bytes that were made once (`mount_ros.messages.scalars`).
 """
 
+import importlib
 import re
 import struct
 from typing import Any
@@ -26,6 +27,15 @@ _PRIMITIVES = {
 }
 _SEQUENCE = re.compile(r'sequence<(?P<element>[^,>]+)(?:, *\d+)?>')
 _ARRAY = re.compile(r'(?P<element>.+)\[(?P<length>\d+)\]')
+
+
+def message_class(name: str) -> type:
+    """Return the class of a type such as `sensor_msgs/msg/JointState`; raises `ValueError` if unknown."""
+    package, _, kind = name.partition('/msg/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), kind)
+    except (ImportError, AttributeError, TypeError, ValueError):
+        raise ValueError(f'message type {name!r} is not installed; is its package missing?') from None
 
 
 def serialised(message: Any) -> bytes:

@@ -4,6 +4,7 @@ Row-major, shape (2, N). Dimension 0: label `rows: current (A), normal_force (N)
 `activation <stamp>`, the stamp in ns of the `air_gap` message that belongs to the table.
 """
 
+import re
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -82,12 +83,12 @@ def from_bytes(raw: bytes) -> ForceTable:
 
 
 def _activation(label: str) -> int:
-    digits = label.removeprefix(_ACTIVATION_LABEL)
-    if digits == label or not (digits.isascii() and digits.isdigit()):
+    found = re.fullmatch(rf'{_ACTIVATION_LABEL}([0-9]+)', label)
+    if found is None:
         raise _refusal(
             f'must name its activation as "{_ACTIVATION_LABEL}<stamp ns>"; instead received {label!r}'
         )
-    return int(digits)
+    return int(found[1])
 
 
 def _check(rows: FloatArray) -> None:

@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from mount_ros.messages.cdr import serialised
-from mount_ros.topics import Topic
+from mount_ros.topics import Topic, control_trace
 
 _STAMP = struct.Struct('<iI')
 _NUMBER = struct.Struct('<d')
@@ -45,20 +45,45 @@ def stamp_of(raw: bytes) -> int:
     return seconds * _NANOSECONDS + nanoseconds
 
 
-class ScalarsLayout:
+class _Layout:
+    """The bytes of a stamped message in which only the stamp and some runs of numbers ever change."""
+
+    def __init__(self, message: Any, *runs: list[float]):
+        """Take the message to repeat, with `runs` of marks where the numbers stand."""
+        self._template = bytearray(serialised(message))
+        self._numbers = struct.Struct(f'<{len(runs[0])}d')
+        self._offsets = [self._template.index(self._numbers.pack(*run)) for run in runs]
+
+    def pack_rows(self, stamps: NDArray[np.int64], *runs: Numbers | None) -> Rows:
+        """Return the messages of many `stamps` (ns), runs (messages, numbers); the same bytes as `pack`."""
+        rows = np.tile(np.frombuffer(self._template, np.uint8), (len(stamps), 1))
+        if len(stamps) == 0:
+            return rows
+        seconds, nanoseconds = np.divmod(stamps, _NANOSECONDS)
+        if not -_LAST_SECOND <= seconds.min() <= seconds.max() <= _LAST_SECOND:
+            raise ScalarsError(
+                f'stamps must lie within {_LAST_SECOND} s around 0, these reach {stamps.max()} ns'
+            )
+        _put(rows, _STAMP_OFFSET, seconds, '<i4')
+        _put(rows, _STAMP_OFFSET + 4, nanoseconds, '<u4')
+        for offset, numbers in zip(self._offsets, runs, strict=False):
+            if numbers is not None:
+                _put(rows, offset, numbers, '<f8')
+        return rows
+
+
+class ScalarsLayout(_Layout):
     """Packs and unpacks the messages of one topic of named scalars."""
 
     def __init__(self, topic: Topic):
         self.topic = topic
         self.names = topic.names
         count = len(self.names)
-        self._template = bytearray(_template(topic))
-        self._numbers = struct.Struct(f'<{count}d')
-        self._position_offset = _offset_of(self._template, _marks(count, 0))
-        self._velocity_offset = (
-            _offset_of(self._template, _marks(count, count)) if topic.has_derivatives else 0
-        )
-        self._head = bytes(self._template[_STAMP_END : self._position_offset])
+        runs = [_marks(count, 0), _marks(count, count)][: 1 + topic.has_derivatives]
+        message = JointState(name=list(self.names), position=runs[0], velocity=runs[-1] if runs[1:] else [])
+        super().__init__(message, *runs)
+        self._begin, self._velocity_offset = self._offsets[0], self._offsets[-1] if runs[1:] else 0
+        self._head = bytes(self._template[_STAMP_END : self._begin])
 
     def pack(
         self, stamp: int, positions: Sequence[float], velocities: Sequence[float] | None = None
@@ -66,7 +91,7 @@ class ScalarsLayout:
         """Return the message of time `stamp` (ns) with these numbers, in the order of the topic's names."""
         message = self._template
         _STAMP.pack_into(message, _STAMP_OFFSET, *divmod(stamp, _NANOSECONDS))
-        self._numbers.pack_into(message, self._position_offset, *positions)
+        self._numbers.pack_into(message, self._begin, *positions)
         if velocities is not None:
             self._numbers.pack_into(message, self._velocity_offset, *velocities)
         return bytes(message)
@@ -75,34 +100,28 @@ class ScalarsLayout:
         """Return the message of time `stamp` (ns) with positions given as little-endian float64 bytes."""
         message = self._template
         _STAMP.pack_into(message, _STAMP_OFFSET, *divmod(stamp, _NANOSECONDS))
-        message[self._position_offset : self._position_offset + self._numbers.size] = numbers
+        message[self._begin : self._begin + len(numbers)] = numbers
         return bytes(message)
 
-    def pack_rows(
-        self, stamps: NDArray[np.int64], positions: Numbers, velocities: Numbers | None = None
-    ) -> Rows:
-        """Return the messages of many `stamps` (ns), numbers (messages, names); the same bytes as `pack`."""
-        rows = _stamped_rows(self._template, stamps)
-        _put_numbers(rows, self._position_offset, positions)
-        if velocities is not None:
-            _put_numbers(rows, self._velocity_offset, velocities)
-        return rows
+    def fits(self, raw: bytes) -> bool:
+        """Return whether a message has this layout."""
+        return len(raw) == len(self._template) and raw[_STAMP_END : self._begin] == self._head
 
     def unpack(self, raw: bytes) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         """Return (stamp ns, positions, velocities) in the order of the topic's names; velocities may be ().
 
         Raises `ScalarsError` where a declared name is missing.
         """
-        if len(raw) != len(self._template) or raw[_STAMP_END : self._position_offset] != self._head:
+        if len(raw) != len(self._template) or raw[_STAMP_END : self._begin] != self._head:
             return self._unpack_foreign(raw)
-        positions = self._numbers.unpack_from(raw, self._position_offset)
+        seconds, nanoseconds = _STAMP.unpack_from(raw, _STAMP_OFFSET)
+        positions = self._numbers.unpack_from(raw, self._begin)
         velocities = self._numbers.unpack_from(raw, self._velocity_offset) if self._velocity_offset else ()
-        return stamp_of(raw), positions, velocities
+        return seconds * _NANOSECONDS + nanoseconds, positions, velocities
 
     def _unpack_foreign(self, raw: bytes) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         message = _decoded(raw)
-        missing = [name for name in self.names if name not in message.name]
-        if missing or len(message.position) != len(message.name):
+        if not {*self.names} <= {*message.name} or len(message.position) != len(message.name):
             raise ScalarsError(
                 f'{self.topic.name}: the message names {list(message.name)} with '
                 f'{len(message.position)} positions; needed are {list(self.names)} with one position each'
@@ -123,60 +142,37 @@ class ScalarsReader:
     """
 
     def __init__(self, names: Sequence[str]):
-        self._names = names
-        self._head, self._size = b'', 0
-        self._places: list[int | None] = []
-        self._begin = 0
+        self._wanted = names
+        self._learn(names)
 
     def read(self, raw: bytes) -> tuple[int, list[float]]:
         """Return (stamp ns, positions) in the order of the names."""
-        if len(raw) != self._size or raw[_STAMP_END : self._begin] != self._head:
-            self._learn(raw)
-        numbers = [
-            math.nan if place is None else _NUMBER.unpack_from(raw, place)[0] for place in self._places
-        ]
-        return stamp_of(raw), numbers
+        if not self._layout.fits(raw):
+            self._learn(_decoded(raw).name)
+        stamp, positions, _ = self._layout.unpack(raw)
+        return stamp, [math.nan if place is None else positions[place] for place in self._places]
 
-    def _learn(self, raw: bytes) -> None:
-        message = _decoded(raw)
-        names = list(message.name)
-        if len(message.position) != len(names):
-            raise ScalarsError(f'a message with {len(names)} names has {len(message.position)} positions')
-        message.position = _marks(len(names), 0)
-        marked = bytearray(serialised(message))
-        if len(marked) > len(raw):
-            raise ScalarsError(f'a message of {len(raw)} bytes is cut; its content takes {len(marked)}')
-        self._begin = _offset_of(marked, _marks(len(names), 0)) if names else _STAMP_END
-        self._head, self._size = raw[_STAMP_END : self._begin], len(raw)
-        self._places = [
-            self._begin + _NUMBER.size * names.index(name) if name in names else None for name in self._names
-        ]
+    def _learn(self, names: Sequence[str]) -> None:
+        self._layout = ScalarsLayout(control_trace(names))
+        places = {name: place for place, name in enumerate(names)}
+        self._places = [places.get(name) for name in self._wanted]
 
 
-class OneNumberLayout:
+class OneNumberLayout(_Layout):
     """Packs a stamped message of any type in which only the stamp and one number ever change."""
 
     def __init__(self, message: Any, path: str):
         """Take the message to repeat; `path` names the number, such as `wrench.force.z`."""
-        mark = _marks(1, 0)
         *owners, field = path.split('.')
-        owner = functools.reduce(getattr, owners, message)
-        setattr(owner, field, mark[0])
-        self._template = bytearray(serialised(message))
-        self._number = struct.Struct('<d')
-        self._offset = _offset_of(self._template, mark)
+        mark = _marks(1, 0)
+        setattr(functools.reduce(getattr, owners, message), field, mark[0])
+        super().__init__(message, mark)
 
     def pack(self, stamp: int, number: float) -> bytes:
         """Return the message of time `stamp` (ns) with this number."""
         _STAMP.pack_into(self._template, _STAMP_OFFSET, *divmod(stamp, _NANOSECONDS))
-        self._number.pack_into(self._template, self._offset, number)
+        _NUMBER.pack_into(self._template, self._offsets[0], number)
         return bytes(self._template)
-
-    def pack_rows(self, stamps: NDArray[np.int64], numbers: Numbers) -> Rows:
-        """Return the messages of many `stamps` (ns) with one number each; the same bytes as `pack`."""
-        rows = _stamped_rows(self._template, stamps)
-        _put_numbers(rows, self._offset, np.reshape(numbers, (-1, 1)))
-        return rows
 
 
 def _decoded(raw: bytes) -> JointState:
@@ -186,41 +182,12 @@ def _decoded(raw: bytes) -> JointState:
         raise ScalarsError(f'a message of {len(raw)} bytes is no JointState ({error})') from None
 
 
-def _stamped_rows(template: bytearray, stamps: NDArray[np.int64]) -> Rows:
-    """Return one copy of the message for each stamp (ns), with the stamp in it."""
-    rows = np.tile(np.frombuffer(template, np.uint8), (len(stamps), 1))
-    seconds, nanoseconds = np.divmod(stamps, _NANOSECONDS)
-    if len(stamps) and not -_LAST_SECOND <= seconds.min() <= seconds.max() <= _LAST_SECOND:
-        raise ScalarsError(f'stamps must lie within {_LAST_SECOND} s around 0, these reach {stamps.max()} ns')
-    middle = _STAMP_OFFSET + 4
-    rows[:, _STAMP_OFFSET:middle] = _as_bytes(seconds, '<i4')
-    rows[:, middle:_STAMP_END] = _as_bytes(nanoseconds, '<u4')
-    return rows
-
-
-def _put_numbers(rows: Rows, offset: int, numbers: Numbers) -> None:
-    raw = _as_bytes(numbers, '<f8')
+def _put(rows: Rows, offset: int, values: NDArray[Any], kind: str) -> None:
+    """Write the bytes of each row of numbers."""
+    raw = np.ascontiguousarray(values, kind).view(np.uint8).reshape(len(rows), -1)
     rows[:, offset : offset + raw.shape[1]] = raw
-
-
-def _as_bytes(values: NDArray[Any], kind: str) -> Rows:
-    """Return the bytes of each row of numbers, (rows, bytes)."""
-    encoded = np.ascontiguousarray(values, kind)
-    return encoded.view(np.uint8).reshape(len(encoded), encoded.itemsize * math.prod(encoded.shape[1:]))
 
 
 def _marks(count: int, first: int) -> list[float]:
     """Return numbers that no string in the message can be mistaken for."""
     return [1e300 + 1e290 * (first + index) for index in range(count)]
-
-
-def _template(topic: Topic) -> bytes:
-    count = len(topic.names)
-    message = JointState(name=list(topic.names), position=_marks(count, 0))
-    if topic.has_derivatives:
-        message.velocity = _marks(count, count)
-    return serialised(message)
-
-
-def _offset_of(template: bytearray, numbers: list[float]) -> int:
-    return template.index(struct.pack(f'<{len(numbers)}d', *numbers))

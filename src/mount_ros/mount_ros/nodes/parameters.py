@@ -1,11 +1,10 @@
-"""Node parameters declared from parameter sets: unit, sentence and range travel with the value."""
+"""Node parameters: declared from parameter sets with unit, sentence and range, and when they can be set."""
 
 import contextlib
 import math
 import threading
 from array import array
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -26,11 +25,10 @@ from mount_ros.private_rclpy import OpenLifecycleNode, given_at_start, integer_a
 P = TypeVar('P', bound=NamedTuple)
 
 USE_SIM_TIME = 'use_sim_time'
-SIM_TIME_REFUSED = (
+_SIM_TIME_REFUSED = (
     'use_sim_time must be false: the stamps of the messages are the time of this graph, also of one that is '
     'played back, and its watches go by the steady clock; /clock is not needed'
 )
-"""Why a node takes no time from `/clock`."""
 
 
 def declare(node: Node, defaults: NamedTuple, prefix: str = '', only: Collection[str] | None = None) -> None:
@@ -38,25 +36,22 @@ def declare(node: Node, defaults: NamedTuple, prefix: str = '', only: Collection
 
     With `only` no others than these fields.
     """
-    notes = quantities(defaults)
-    kinds = get_type_hints(type(defaults))
+    notes, kinds = quantities(defaults), get_type_hints(type(defaults))
     for name, value in defaults._asdict().items():
         full = f'{prefix}.{name}' if prefix else name
         if only is not None and name not in only:
             continue
         if hasattr(value, '_asdict'):
             declare(node, value, full)
-        elif isinstance(value, tuple):
-            _declare_texts(node, full, value, _descriptor(notes.get(name), kinds[name]))
-        else:
-            node.declare_parameter(full, value, _descriptor(notes.get(name), kinds[name]))
-
-
-def _declare_texts(node: Node, name: str, texts: tuple[str, ...], descriptor: ParameterDescriptor) -> None:
-    """Declare a list of texts, which may be empty: rclpy takes an empty list for one of bytes."""
-    given = node.declare_parameter(name, Parameter.Type.STRING_ARRAY, descriptor)
-    if given.type_ is Parameter.Type.NOT_SET:
-        node.set_parameters([Parameter(name, Parameter.Type.STRING_ARRAY, list(texts))])
+            continue
+        descriptor = _descriptor(notes[name], kinds[name]) if name in notes else ParameterDescriptor()
+        if not isinstance(value, tuple):
+            node.declare_parameter(full, value, descriptor)
+            continue
+        # A list of texts, which may be empty: rclpy takes an empty list for one of bytes.
+        given = node.declare_parameter(full, Parameter.Type.STRING_ARRAY, descriptor)
+        if given.type_ is Parameter.Type.NOT_SET:
+            node.set_parameters([Parameter(full, Parameter.Type.STRING_ARRAY, list(value))])
 
 
 def read(node: Node, defaults: P, prefix: str = '') -> P:
@@ -66,50 +61,6 @@ def read(node: Node, defaults: P, prefix: str = '') -> P:
         return with_flattened(defaults, values, prefix)
     except ParameterError as error:
         raise ParameterError(f'{node.get_name()}: {error}') from None
-
-
-def refuse_unknown(node: Node) -> None:
-    """Raise `ParameterError` for a value that was given at the start to what is no parameter of `node`.
-
-    ROS itself ignores it silently, so a misspelt name would leave a default at work.
-    """
-    known = list(node.get_parameters_by_prefix(''))
-    for name in sorted(given_at_start(node)):
-        check_name(node.get_name(), name, known)
-
-
-def refuse_sim_time(node: Node) -> None:
-    """Raise `ParameterError` if `node` was told to take its time from `/clock`."""
-    if node.get_parameter(USE_SIM_TIME).value:
-        raise ParameterError(f'{node.get_name()}: {SIM_TIME_REFUSED}')
-
-
-def fitted(node: Node, parameters: Iterable[Parameter]) -> list[Parameter]:
-    """Return parameters about to be set on `node` in the types that it has declared.
-
-    A whole number becomes a float where one is wanted; so does the text of a float such as 5e-05 or nan, as
-    which `ros2 param load` hands on what `ros2 param dump` has written. An empty list becomes one of the
-    wanted kind, since ROS cannot tell of what it is empty. Raises `ParameterError` for an unknown name.
-    """
-    known = list(node.get_parameters_by_prefix(''))
-    fit = []
-    for parameter in parameters:
-        check_name(node.get_name(), parameter.name, known)
-        wanted = Parameter.Type(node.describe_parameter(parameter.name).type)
-        if wanted is Parameter.Type.DOUBLE and parameter.type_ in _MAY_BE_FLOAT:
-            with contextlib.suppress(ValueError):  # ROS refuses it then, by its type
-                parameter = Parameter(parameter.name, value=float(parameter.value))
-        elif wanted is Parameter.Type.STRING_ARRAY and _is_empty_list(parameter.value):
-            parameter = Parameter(parameter.name, wanted, [])
-        fit.append(parameter)
-    return fit
-
-
-_MAY_BE_FLOAT = (Parameter.Type.INTEGER, Parameter.Type.STRING)
-
-
-def _is_empty_list(value: Any) -> bool:
-    return isinstance(value, (list, tuple, array, bytes)) and len(value) == 0
 
 
 class SpecimenValues:
@@ -130,44 +81,80 @@ class SpecimenValues:
         What an earlier file gave goes back to its default if this one does not name it. Raises
         `ParameterError` for a value that the parameter refuses.
         """
-        changes = {}
+        changes = []
         for name, default in flattened(defaults).items():
             full = f'{prefix}.{name}' if prefix else name
             present = self._node.get_parameter(full).value
             if full not in self._at_start and present == self._given.get(full, default):
                 self._given[full] = values.get(name, default)
                 if self._given[full] != present:
-                    changes[full] = self._given[full]
-        for result in self._node.set_parameters([Parameter(name, value=v) for name, v in changes.items()]):
+                    changes.append(Parameter(full, value=self._given[full]))
+        for result in self._node.set_parameters(changes):
             if not result.successful:
                 raise ParameterError(f'{self._node.get_name()}: {result.reason}')
 
 
-def _descriptor(quantity: Quantity | None, kind: type) -> ParameterDescriptor:
-    descriptor = ParameterDescriptor()
-    if quantity is None:
-        return descriptor
-    descriptor.description = f'{quantity.meaning} [{quantity.unit}]; {quantity.source}'
-    if quantity.words:
-        descriptor.additional_constraints = f'one of {quantity.limits}'
-    if quantity.may_be_unknown:
-        # rclpy holds NaN to be outside every range; `read` checks this one
-        descriptor.description += '; nan: unknown'
-        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}, or nan'
-        return descriptor
-    if math.isinf(quantity.low) != math.isinf(quantity.high):  # ROS knows ranges with two ends alone
-        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}'
-    if kind is float and math.isfinite(quantity.low) and math.isfinite(quantity.high):
-        descriptor.floating_point_range = [
-            FloatingPointRange(from_value=float(quantity.low), to_value=float(quantity.high))
-        ]
-    if kind is int and math.isfinite(quantity.low) and math.isfinite(quantity.high):
-        descriptor.integer_range = [IntegerRange(from_value=int(quantity.low), to_value=int(quantity.high))]
-    return descriptor
+class Change(NamedTuple):
+    """A parameter before and after it was set."""
+
+    old: Any
+    new: Any
 
 
-class DeclaringNode(OpenLifecycleNode):
-    """Takes a whole number for a float, at the start and later, and names what is near an unknown name."""
+class ParameterNode(OpenLifecycleNode):
+    """A lifecycle node that refuses parameters in words: of wrong types, of unknown names, at a wrong time.
+
+    A whole number becomes a float where one is declared; so does the text of a float such as 5e-05 or nan, as
+    which `ros2 param load` hands on what `ros2 param dump` has written. An empty list becomes one of the
+    declared kind, since ROS cannot tell of what it is empty.
+
+    From `fix_parameters` to `free_parameters` those in `run_time_parameters` alone can be set.
+    """
+
+    run_time_parameters: frozenset[str] = frozenset()
+    """Names of the parameters that can be set on the configured node: `check_parameters`, `apply_changes`."""
+
+    def __init__(self, name: str, **arguments):
+        super().__init__(name, **arguments)
+        self._of_rclpy = self._parameter_names()  # such as use_sim_time
+        self._in_use: dict[str, Any] = {}  # all values while they are fixed
+        self._holder: int | None = None  # the thread that makes a transition
+        self.add_on_set_parameters_callback(self._judge_parameters)
+        self.add_post_set_parameters_callback(self._apply_parameters)
+
+    def check_parameters(self, values: Mapping[str, Any]) -> None:
+        """Raise a `ValueError` if the configured node could not go on with these values, {name: value}."""
+
+    def apply_changes(self, changes: Mapping[str, Change]) -> None:
+        """Go on with the parameters as they are now; `changes` were set while the node was configured."""
+
+    def fix_parameters(self) -> None:
+        """From now on the node works with what its parameters are."""
+        own = self._parameter_names() - self._of_rclpy
+        self._in_use = {name: self.get_parameter(name).value for name in own}
+
+    def free_parameters(self) -> None:
+        """Let everything be set again; safe to call twice."""
+        self._in_use = {}
+
+    @contextlib.contextmanager
+    def parameters_held(self) -> Iterator[None]:
+        """Let nothing be set but by this thread: the node is in a transition."""
+        before, self._holder = self._holder, threading.get_ident()
+        try:
+            yield
+        finally:
+            self._holder = before
+
+    def refuse_given(self) -> None:
+        """Raise `ParameterError` for a value given at the start to an unknown name, and for simulated time.
+
+        ROS itself ignores an unknown name silently, so a misspelt one would leave a default at work.
+        """
+        for name in sorted(given_at_start(self)):
+            check_name(self.get_name(), name, self._parameter_names())
+        if self.get_parameter(USE_SIM_TIME).value:
+            raise ParameterError(f'{self.get_name()}: {_SIM_TIME_REFUSED}')
 
     def declare_parameter(self, name: str, value: Any = None, *arguments, **options) -> Parameter:
         """Declare a parameter; raises `ParameterError` where what was given at the start does not fit it."""
@@ -186,97 +173,79 @@ class DeclaringNode(OpenLifecycleNode):
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set all of the parameters or, for the reason in the result, none."""
         try:
-            return super().set_parameters_atomically(fitted(self, parameter_list))
+            return super().set_parameters_atomically([self._converted(each) for each in parameter_list])
         except ParameterError as error:
             return SetParametersResult(successful=False, reason=str(error))
 
+    def _converted(self, parameter: Parameter) -> Parameter:
+        """Return a parameter about to be set in the type that is declared."""
+        name, value = parameter.name, parameter.value
+        check_name(self.get_name(), name, self._parameter_names())
+        declared = Parameter.Type(self.describe_parameter(name).type)
+        if declared is Parameter.Type.DOUBLE and type(value) in (int, str):
+            with contextlib.suppress(ValueError):  # ROS refuses it then, by its type
+                return Parameter(name, value=float(value))
+        if declared is Parameter.Type.STRING_ARRAY and isinstance(value, list | tuple | array | bytes):
+            return parameter if len(value) else Parameter(name, declared, [])
+        return parameter
 
-class Change(NamedTuple):
-    """A parameter before and after it was set."""
+    def _parameter_names(self) -> frozenset[str]:
+        return frozenset(self.get_parameters_by_prefix(''))
 
-    old: Any
-    new: Any
-
-
-class ParameterGate:
-    """Stands before the parameters that are declared after it; it is closed while the node is configured.
-
-    Closed, it lets through changes of the parameters in `run_time` that `check` does not refuse by a
-    `ValueError`, and hands them to `take` when they are set; `check` gets all values as they would be, {name:
-    value}. Every other change is refused with the sentence that says when it can be made.
-    """
-
-    def __init__(
-        self,
-        node: Node,
-        run_time: frozenset[str],
-        check: Callable[[Mapping[str, Any]], None],
-        take: Callable[[Mapping[str, Change]], None],
-    ):
-        self._node = node
-        self._run_time = run_time
-        self._check = check
-        self._take = take
-        self._foreign = frozenset(node.get_parameters_by_prefix(''))  # of rclpy itself, such as use_sim_time
-        self._present: dict[str, Any] | None = None  # all values while the gate is closed
-        self._holder: int | None = None  # the thread that makes a transition
-        node.add_on_set_parameters_callback(self._judge)
-        node.add_post_set_parameters_callback(self._pass_on)
-
-    @contextmanager
-    def held(self) -> Iterator[None]:
-        """Let nothing through but what this thread sets: the node is amid a transition."""
-        before, self._holder = self._holder, threading.get_ident()
+    def _judge_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         try:
-            yield
-        finally:
-            self._holder = before
-
-    def close(self) -> None:
-        """From now on the node works with what its parameters are."""
-        own = [name for name in self._node.get_parameters_by_prefix('') if name not in self._foreign]
-        self._present = {name: self._node.get_parameter(name).value for name in own}
-
-    def open(self) -> None:
-        """Let everything through again; safe to call twice."""
-        self._present = None
-
-    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
-        if any(parameter.name == USE_SIM_TIME and parameter.value for parameter in parameters):
-            return SetParametersResult(successful=False, reason=SIM_TIME_REFUSED)
-        if self._holder not in (None, threading.get_ident()):
-            return SetParametersResult(successful=False, reason=self._amid_transition(parameters[0].name))
-        changes = self._changes(parameters)
-        fixed = [name for name in changes if name not in self._run_time]
-        if fixed:
-            return SetParametersResult(successful=False, reason=self._when(fixed[0]))
-        try:
-            if changes and self._present is not None:
-                self._check({**self._present, **{name: change.new for name, change in changes.items()}})
+            self._check_changes(parameters)
         except ValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _pass_on(self, parameters: list[Parameter]) -> None:
+    def _check_changes(self, parameters: list[Parameter]) -> None:
+        if any(parameter.name == USE_SIM_TIME and parameter.value for parameter in parameters):
+            raise ParameterError(_SIM_TIME_REFUSED)
+        if self._holder not in (None, threading.get_ident()):
+            what, node = parameters[0].name, self.get_name()
+            raise ParameterError(f'{what} cannot be set during a transition of {node}: wait for its end')
         changes = self._changes(parameters)
-        if changes and self._present is not None:
-            self._present.update({name: change.new for name, change in changes.items()})
-            self._take(changes)
+        for name in changes:
+            if name not in self.run_time_parameters:
+                known = ', '.join(sorted(self.run_time_parameters)) or 'nothing'
+                raise ParameterError(
+                    f'{name} can be set before configure: deactivate and clean up first; '
+                    f'what can be set at run time is {known}'
+                )
+        if changes:
+            self.check_parameters({**self._in_use, **{name: each.new for name, each in changes.items()}})
+
+    def _apply_parameters(self, parameters: list[Parameter]) -> None:
+        if changes := self._changes(parameters):
+            self._in_use.update({name: change.new for name, change in changes.items()})
+            self.apply_changes(changes)
 
     def _changes(self, parameters: list[Parameter]) -> dict[str, Change]:
-        present = self._present or {}
+        used = self._in_use
         return {
-            parameter.name: Change(present[parameter.name], parameter.value)
+            parameter.name: Change(used[parameter.name], parameter.value)
             for parameter in parameters
-            if parameter.name in present and parameter.value != present[parameter.name]
+            if parameter.name in used and parameter.value != used[parameter.name]
         }
 
-    def _amid_transition(self, name: str) -> str:
-        return f'{name} cannot be set while {self._node.get_name()} is amid a transition: wait for its end'
 
-    def _when(self, name: str) -> str:
-        known = ', '.join(sorted(self._run_time)) or 'nothing'
-        return (
-            f'{name} can be set before configure: deactivate and clean up first; '
-            f'what can be set at run time is {known}'
-        )
+def _descriptor(quantity: Quantity, kind: type) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor()
+    descriptor.description = f'{quantity.meaning} [{quantity.unit}]; {quantity.source}'
+    ends = [math.isfinite(quantity.low), math.isfinite(quantity.high)]
+    if quantity.words:
+        descriptor.additional_constraints = f'one of {quantity.limits}'
+    if quantity.may_be_unknown:
+        # rclpy holds NaN to be outside every range; `read` checks this one
+        descriptor.description += '; nan: unknown'
+        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}, or nan'
+    elif not all(ends):
+        if any(ends):  # ROS knows ranges with two ends alone
+            descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}'
+    elif kind is float:
+        span = FloatingPointRange(from_value=float(quantity.low), to_value=float(quantity.high))
+        descriptor.floating_point_range = [span]
+    elif kind is int:
+        descriptor.integer_range = [IntegerRange(from_value=int(quantity.low), to_value=int(quantity.high))]
+    return descriptor

@@ -3,31 +3,39 @@
 import contextlib
 import gc
 import os
+import select
 import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
 from mount_models.quantity import ParameterError
 from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
-from mount_ros.nodes.aside import SPIN_PERIOD, wake
-from mount_ros.nodes.leaving import end_process, leave_middleware
-from mount_ros.nodes.lifecycle import SafeLifecycleNode
+from mount_ros.nodes.lifecycle import SPIN_PERIOD, SafeLifecycleNode, wake
 from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
-from mount_ros.nodes.shared_memory import remove_abandoned_of_the_dead
-from mount_ros.nodes.starter import Starter, given_priority
+from mount_ros.nodes.shutdown import end_process, leave_middleware, remove_abandoned_of_the_dead
+
+# What a process gets from its starter. By the environment, so that it holds for nodes of the supervisor and
+# of `ros2 launch` alike; without it a node stands for itself.
+_STARTER, _PRIORITY = 'ENGINE_MOUNT_STARTER', 'ENGINE_MOUNT_PRIORITY'
 
 Create = Callable[[], SafeLifecycleNode]
+
+
+class TransitionError(ValueError):
+    """A node refused a transition; the text names it and its reason."""
 
 
 def run_node(create: Create, args: list[str] | None = None) -> None:
@@ -42,40 +50,86 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     An exception in one of them or in a thread of its data ends all in the same way, with exit code 1.
     """
     inherited = drop_real_time()
-    real_time = RealTime(given_priority() or inherited)
+    real_time = RealTime(int(os.environ.get(_PRIORITY, '0')) or inherited)
     prepare_environment()
+    ending = _Ending()
+    ending.add_signals(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     nodes = _created(creates, args)
-    data_thread = DataThread(nodes[0].context, nodes[0].report_failure)
-    over = _Ending()
+    data_thread = DataThread(nodes[0].context, nodes[0].report_failure, shared=len(nodes) > 1)
     for node in nodes:
         node.data_thread = data_thread
         node.after_configure = _freeze
-        node.after_failure = over.report_failure
+        node.after_failure = ending.report_failure
         node.real_time = real_time
     logger = nodes[0].get_logger()
     if inherited:
         logger.warning(started_in_real_time(inherited))
-    over.listen(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     _freeze()
     real_time.keep_memory()
-    services = [_Service(node, over) for node in nodes]
-    over.wait(real_time, logger.warning)
+    services = [_Service(node, ending) for node in nodes]
+    ending.wait(real_time, logger.warning)
     for node in nodes:
         node.ending.set()
-    if over.starter.ended:
-        logger.error(f'{over.starter.name} has ended, so this one ends too, at 0 A: start the graph again')
+    if ending.starter.ended:
+        name = ending.starter.name
+        logger.error(f'{name} has ended, so this one ends too, at 0 A: start the graph again')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()
     for node in reversed(nodes):
         node.close()
     real_time.close()  # until here no load keeps the coil from 0 A
-    code = 1 if over.failed else 0
+    code = 1 if ending.failed else 0
     left = leave_middleware(partial(_take_down, nodes), code=code)
-    if over.starter.ended:
+    if ending.starter.ended:
         remove_abandoned_of_the_dead()  # that of the starter; what it started takes its own
+    for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C: Python restores other handlers first
+        signal.signal(number, signal.SIG_IGN)
     if not left or code:
         end_process(code)
+
+
+def environment_of_children(priority: int) -> dict[str, str]:
+    """Return what processes need that shall end with this one and run their loops at `priority` (0: none)."""
+    return {_STARTER: str(os.getpid()), _PRIORITY: str(priority)}
+
+
+_TIED = """
+import ctypes, os, signal, sys
+ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG of Linux, linux/prctl.h; it outlives exec
+if os.getppid() != int(sys.argv[1]):  # it ended before
+    sys.exit(1)
+os.execvp(sys.argv[2], sys.argv[2:])
+"""
+
+
+def tied(command: Sequence[str]) -> list[str]:
+    """Return the command that runs `command`, a foreign program, and is killed when this process ends.
+
+    By the kernel, whatever ends this process (prctl(2)): a process that knows its starter ends by itself. To
+    be started by a thread that lives as long as this process; what `command` starts in turn is its own.
+    """
+    return [sys.executable, '-I', '-S', '-c', _TIED, str(os.getpid()), *command]
+
+
+# Nodes in a process that also does other work.
+
+
+@contextlib.contextmanager
+def ros_context(domain: int) -> Iterator[Context]:
+    """Give a context of the middleware in a ROS domain."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield context
+    finally:
+        rclpy.try_shutdown(context=context)
+
+
+def transition(step: Callable[[], TransitionCallbackReturn], node: SafeLifecycleNode, name: str) -> None:
+    """Take a node through a transition, or raise `TransitionError` with the node's own reason."""
+    if step() != TransitionCallbackReturn.SUCCESS:
+        raise TransitionError(f'{name} refused: {node.sentence}')
 
 
 def _created(creates: Sequence[Create], args: list[str] | None) -> list[SafeLifecycleNode]:
@@ -95,7 +149,7 @@ def _created(creates: Sequence[Create], args: list[str] | None) -> list[SafeLife
 
 
 def _freeze() -> None:
-    """Collect garbage now, and never look again at what stands: a full collection takes tens of milliseconds.
+    """Collect garbage now, and never visit again what stands: a full collection takes tens of milliseconds.
 
     Done when something large has been set up and no answer is due yet.
     """
@@ -109,8 +163,29 @@ def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
     rclpy.try_shutdown()
 
 
+class Starter:
+    """The process that started this one: without it a node must not go on driving the coil."""
+
+    def __init__(self) -> None:
+        self.descriptors: list[int] = []
+        """What can be read once it has ended; none where it is not known, or had ended before."""
+        self._had_ended = False
+        number = os.environ.get(_STARTER)
+        self.name = f'the process that started this one ({number})'
+        if number is not None:
+            try:
+                self.descriptors = [os.pidfd_open(int(number))]
+            except ProcessLookupError:
+                self._had_ended = True
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has ended; never where none is known."""
+        return self._had_ended or bool(select.select(self.descriptors, [], [], 0.0)[0])
+
+
 class _Ending:
-    """Lets the main thread sleep until a signal, a thread or the end of the starter says that all shall end.
+    """Lets the main thread sleep until a signal, a thread or the end of the starter ends the process.
 
     By a pipe: a lock, as in `threading.Event`, is held for ever by a second signal that comes amid the first.
     It is written to where the signal arrives, before Python knows of it: a handler in Python waits for the
@@ -118,41 +193,37 @@ class _Ending:
     """
 
     def __init__(self) -> None:
+        self.failed = False
+        self.starter = Starter()
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
-        self.starter = Starter()
-        self.failed = False
 
-    def listen(self, *signals: int) -> None:
+    def add_signals(self, *signals: int) -> None:
         """Wake the main thread by these signals too."""
         signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
         for number in signals:
             signal.signal(number, lambda *_: None)
 
-    def tell(self) -> None:
-        with contextlib.suppress(BlockingIOError):  # full: it has been told often enough
+    def end(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # full: it is awake anyway
             os.write(self._write, b'.')
 
     def report_failure(self) -> None:
         self.failed = True
-        self.tell()
+        self.end()
 
-    def wait(self, real_time: RealTime, say: Callable[[str], None]) -> None:
-        """Look after the priority of the process until it shall end; `say` takes why it was given back."""
+    def wait(self, real_time: RealTime, warn: Callable[[str], object]) -> None:
+        """Look after the priority of the process until it shall end; `warn` takes why it was given back."""
         period = WATCH_PERIOD if real_time.priority else None
         while not self.starter.ended:
-            told = self._read_for(period)
-            if any(number != signal.SIGXCPU for number in told):
+            ready, _, _ = select.select([self._read, *self.starter.descriptors], [], [], period)
+            # The numbers of the signals that came, 46 of what is no signal; nothing after a period.
+            signals = os.read(self._read, 4096) if self._read in ready else b''
+            if any(number != signal.SIGXCPU for number in signals):
                 return
-            sentence = real_time.ran_without_sleep() if told else real_time.look()
+            sentence = real_time.ran_without_sleep() if signals else real_time.check()
             if sentence:
-                say(sentence)
-
-    def _read_for(self, period: float | None) -> bytes:
-        """Return the numbers of the signals that came, 46 of what is no signal; nothing after `period` s."""
-        if self.starter.wait_beside(self._read, period):
-            return os.read(self._read, 4096)
-        return b''
+                warn(sentence)
 
 
 class _Service:
@@ -162,9 +233,9 @@ class _Service:
     there takes the interpreter from the data path.
     """
 
-    def __init__(self, node: SafeLifecycleNode, over: _Ending):
+    def __init__(self, node: SafeLifecycleNode, ending: _Ending):
         self._node = node
-        self._over = over
+        self._ending = ending
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         self._thread = threading.Thread(target=self._serve, name=node.get_name())
@@ -186,4 +257,4 @@ class _Service:
             traceback.print_exc()
             self._node.report_failure(f'{type(error).__name__}: {error}')
         finally:
-            self._over.tell()
+            self._ending.end()

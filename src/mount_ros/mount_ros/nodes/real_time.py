@@ -4,7 +4,7 @@ The threads have it while a node is active, and behind them those that take turn
 holds the interpreter and waits for a processor holds up the loop, whatever the loop's priority. (Sixteen
 threads wanted to run on two cores; the loop came up to 140 ms late beside an ordinary thread of its process,
 97 ms beside one of niceness -15, and 5 ms beside one in real time.) The memory of the process is kept in
-place from its start on (`locked_memory`).
+place from its start on (`scheduling`).
 
 A watch gives the priority back, for all of them until an activation after 30 s or more, when
 
@@ -17,39 +17,30 @@ or threads in C spin on all cores while another one has it, the system's own bou
 process; the electronics then go to 0 A by their own watch.
 """
 
-import contextlib
 import math
 import re
-import resource
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from mount_ros.nodes.locked_memory import lock_memory
-from mount_ros.nodes.scheduling import Threads
+from mount_ros.nodes.scheduling import Threads, limit_without_sleep, lock_memory
 
 HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
 WATCH_PERIOD = 0.2  # s, chosen
 _WINDOW = 5  # periods, chosen: 1 s
 _SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
-_MISSED = 0.5  # of the periods between two looks, chosen
-_LATE = 15  # looks in a row, chosen: 3 s; to catch up after a stall of the machine takes less
+_MISSED = 0.5  # of the periods between two checks, chosen
+_LATE = 15  # checks in a row, chosen: 3 s; to catch up after a stall of the machine takes less
 _REST = 30.0  # s, chosen: no activation takes it again meanwhile, else restarts keep the machine busy
-_PATIENCE = (
-    3  # periods of the watch without a pulse, chosen: 0.6 s; Linux leaves 50 ms of each second at least
-)
-_WITHOUT_SLEEP = (
-    1.0  # s, chosen: processor time of a thread between two sleeps; after a stall of 2 s it is 0.6 s
-)
+_STARVED = 3  # periods without a pulse, chosen: 0.6 s; Linux leaves 50 ms of each second at least
+_WITHOUT_SLEEP = 1.0  # s of processor time between two sleeps, chosen; after a stall of 2 s it is 0.6 s
 _LAST = 3.0  # s, chosen: the same, until the process is killed
 # Threads of Fast DDS that take data and call its readers. By the rule of RTPS for ports (7400 + 250 domain
 # + 11 + 2 participant) theirs are odd, those of discovery even.
 _MIDDLEWARE = re.compile(r'dds\.udp\.\d*[13579]')
-_ORDINARY = (
-    'dds.ev.'  # the middleware's timers: an ordinary thread that wakes often, and needs no interpreter
-)
+_ORDINARY = 'dds.ev.'  # the middleware's timers: an ordinary thread that wakes often, without the interpreter
 
 
 class LoopTiming(NamedTuple):
@@ -64,7 +55,7 @@ class RealTimeThreads(NamedTuple):
 
     names: frozenset[str]
     interpreter: bool = True
-    """Whether it cannot wait 0.1 s for the interpreter, so that who takes turns with it comes behind it."""
+    """Whether it cannot wait 0.1 s for the interpreter: threads that take turns with it come behind it."""
 
 
 class RealTimeLoop(Protocol):
@@ -74,6 +65,12 @@ class RealTimeLoop(Protocol):
 
     def loop_timing(self) -> LoopTiming:
         """Return how its loop has kept its time so far; zeros where it has no clock of its own."""
+
+
+class _Check(NamedTuple):
+    time: float  # s
+    used: dict[int, float]  # processor time of each thread that has the priority, s
+    timing: LoopTiming
 
 
 class RealTime:
@@ -93,11 +90,13 @@ class RealTime:
         self._clock = clock
         self._watcher = self._threads.own
         self._loops: list[RealTimeLoop] = []
-        self._stepped_down, self._ordinary_until = False, -math.inf  # s
+        self._ordinary_until = -math.inf  # s
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
-        self._past: deque[_Look] = deque(maxlen=_WINDOW + 1)
-        self._late: list[LoopTiming] = []  # of each of the last looks since which most periods were missed
+        self._past: deque[_Check] = deque(maxlen=_WINDOW + 1)
+        self._late: list[
+            LoopTiming
+        ] = []  # between the last checks, in each of which most periods were missed
         self._waiting: tuple[float, int] = (math.nan, 0)  # processor time of the ordinary thread; periods
 
     @property
@@ -114,16 +113,14 @@ class RealTime:
 
     def begin(self, loop: RealTimeLoop) -> None:
         """Give the threads of `loop` their priority, those too that it will make while it is active."""
-        if not self.priority:
-            return
         with self._guard:
-            if loop in self._loops:
+            if not self.priority or loop in self._loops:
                 return
             self._loops.append(loop)
             if self._clock() >= self._ordinary_until:
-                self._stepped_down, self.given_back = False, ''
+                self.given_back = ''
             self._past.clear()
-            bound(_WITHOUT_SLEEP, _LAST)
+            limit_without_sleep(_WITHOUT_SLEEP, _LAST)
             self._give()
 
     def end(self, loop: RealTimeLoop) -> None:
@@ -133,34 +130,35 @@ class RealTime:
                 self._loops.remove(loop)
                 self._give()
 
-    def look(self) -> str:
-        """Look after the priority, once per `WATCH_PERIOD`; return why it was just given back, if it was."""
-        with self._guard:
-            if not self._loops or self._stepped_down:
-                return ''
-            self._give()
-            self._past.append(_Look(self._clock(), self._used(), self._loop_timing()))
-            return self._give_back(self._overuse() or self._starved() or self._missed())
-
-    def ran_without_sleep(self) -> str:
-        """Give the priority back since the system has told (SIGXCPU) that a thread does not sleep."""
-        with self._guard:
-            if not self._loops or self._stepped_down:
-                return ''
-            text = f'a thread of the loop has used the processor for {_WITHOUT_SLEEP:g} s without a sleep'
-            return self._give_back(f'{text} (limit {_WITHOUT_SLEEP:g} s)')
-
     def close(self) -> None:
         """End for good: all threads are ordinary ones from now on."""
         with self._guard:
             self._loops.clear()
             self._give()
 
-    # What is held.
+    def check(self) -> str:
+        """Look after the priority, once per `WATCH_PERIOD`; return why it was just given back, if it was."""
+        with self._guard:
+            if not self._loops or self.given_back:
+                return ''
+            self._give()
+            used = {number: self._threads.processor_time(number) for number in self._held}
+            every = [loop.loop_timing() for loop in self._loops]
+            timing = LoopTiming(sum(each.periods for each in every), sum(each.missed for each in every))
+            self._past.append(_Check(self._clock(), used, timing))
+            return self._give_back(self._overuse() or self._starved() or self._missed())
+
+    def ran_without_sleep(self) -> str:
+        """Give the priority back since the system has reported (SIGXCPU) a thread that does not sleep."""
+        with self._guard:
+            if not self._loops or self.given_back:
+                return ''
+            text = f'a thread of the loop has used the processor for {_WITHOUT_SLEEP:g} s without a sleep'
+            return self._give_back(f'{text} (limit {_WITHOUT_SLEEP:g} s)')
 
     def _give(self) -> None:
         """Let the threads of the loops, and no others, have the priority."""
-        wanted = self._wanted() if self._loops and self.permitted and not self._stepped_down else {}
+        wanted = self._wanted() if self._loops and self.permitted and not self.given_back else {}
         try:
             for number, priority in wanted.items() - self._held.items():
                 self._threads.run(number, priority)
@@ -172,9 +170,10 @@ class RealTime:
 
     def _wanted(self) -> dict[int, int]:
         """Return {thread: priority}."""
-        own = frozenset[str]().union(*(loop.real_time_threads.names for loop in self._loops))
+        every = [loop.real_time_threads for loop in self._loops]
+        own = frozenset[str]().union(*(each.names for each in every))
         wanted = {}
-        if any(loop.real_time_threads.interpreter for loop in self._loops):
+        if any(each.interpreter for each in every):
             wanted = dict.fromkeys(self._threads.of_python(), max(1, self.priority - 1))
         for number, name in self._threads.names().items():
             if name in own or _MIDDLEWARE.fullmatch(name):
@@ -183,25 +182,15 @@ class RealTime:
 
     def _give_back(self, reason: str) -> str:
         if reason:
-            remedy = (
-                'lower the load of this machine or the number of graphs on it, then activate again, not '
-                f'before {_REST:g} s'
-            )
-            self._stepped_down, self._ordinary_until = True, self._clock() + _REST
+            self._ordinary_until = self._clock() + _REST
             self._past.clear()
+            self.given_back = (
+                f'real-time priority {self.priority} given back: {reason}; lower the load of this machine or '
+                f'the number of graphs on it, then activate again, not before {_REST:g} s'
+            )
             self._give()
-            bound(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
-            self.given_back = f'real-time priority {self.priority} given back: {reason}; {remedy}'
-        return self.given_back if reason else ''
-
-    # What is looked at.
-
-    def _used(self) -> dict[int, float]:
-        return {number: self._threads.processor_time(number) for number in self._held}
-
-    def _loop_timing(self) -> LoopTiming:
-        every = [loop.loop_timing() for loop in self._loops]
-        return LoopTiming(sum(timing.periods for timing in every), sum(timing.missed for timing in every))
+            limit_without_sleep(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
+        return self.given_back
 
     def _overuse(self) -> str:
         if len(self._past) <= _WINDOW:
@@ -216,17 +205,16 @@ class RealTime:
         return ''
 
     def _starved(self) -> str:
-        names = self._threads.names().items()
-        number = next((number for number, name in names if name.startswith(_ORDINARY)), None)
-        if number is None:
-            return ''
-        used, (before, periods) = self._threads.processor_time(number), self._waiting
-        waits = used == before and self._threads.waits(number)
-        self._waiting = (used, periods + 1 if waits else 0)
-        if self._waiting[1] < _PATIENCE:
-            return ''
-        limit = _PATIENCE * WATCH_PERIOD
-        return f'an ordinary thread had to wait for a processor for {limit:g} s (limit {limit:g} s)'
+        for number, name in self._threads.names().items():
+            if name.startswith(_ORDINARY):
+                used, (before, periods) = self._threads.processor_time(number), self._waiting
+                waits = used == before and self._threads.waits(number)
+                self._waiting = (used, periods + 1 if waits else 0)
+                if self._waiting[1] < _STARVED:
+                    return ''
+                limit = _STARVED * WATCH_PERIOD
+                return f'an ordinary thread had to wait for a processor for {limit:g} s (limit {limit:g} s)'
+        return ''
 
     def _missed(self) -> str:
         if len(self._past) < 2:
@@ -240,22 +228,3 @@ class RealTime:
         periods, missed = (sum(each) for each in zip(*self._late, strict=True))
         limits = f'{100 * _MISSED:g} % for {_LATE * WATCH_PERIOD:g} s'
         return f'the loop missed {missed} of {periods} periods (limit {limits})'
-
-
-class _Look(NamedTuple):
-    time: float  # s
-    used: dict[int, float]  # processor time of each thread that has the priority, s
-    timing: LoopTiming
-
-
-def bound(soft: float, hard: float) -> None:
-    """Let the system tell by SIGXCPU that a thread in real time has run for `soft` s without a sleep.
-
-    After `hard` s it kills the process. A lower limit that is set already stays.
-    """
-    _, highest = resource.getrlimit(resource.RLIMIT_RTTIME)
-    limits = [round(1e6 * seconds) for seconds in (soft, hard)]
-    if highest != resource.RLIM_INFINITY:
-        limits = [min(limit, highest) for limit in limits]
-    with contextlib.suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_RTTIME, (limits[0], limits[1]))

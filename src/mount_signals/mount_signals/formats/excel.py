@@ -2,6 +2,7 @@
 
 import zipfile
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, time, timedelta
 from pathlib import Path
@@ -20,6 +21,8 @@ _SECOND = 1_000_000_000  # ns
 _MISSING = ('', '#N/A', '#NV', '-', 'NaN', 'nan')
 _MOST_TITLES = 200  # rows without numbers at the beginning, chosen
 _LARGEST = 1 << 29  # bytes of a workbook when unpacked, chosen: a full sheet of a million rows of ten numbers
+
+_MOST_CELLS = 20_000_000  # of a sheet, rows times width, chosen: 160 MB
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,8 @@ class Workbook:
         self._path = path
         with reading(path, 'Excel workbook (.xlsx)'):
             _check_size(path)
-            book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-            tables = [(sheet.title, list(sheet.iter_rows(values_only=True))) for sheet in book.worksheets]
-            book.close()
+            with closing(openpyxl.load_workbook(path, read_only=True, data_only=True)) as book:
+                tables = [(sheet.title, list(_rows(path, sheet))) for sheet in book.worksheets]
         sheets = [sheet for title, rows in tables if (sheet := self._sheet(title, rows)) is not None]
         if not sheets:
             raise SignalError(f'{path} holds no table of numbers in any of its {len(tables)} sheets')
@@ -128,6 +130,19 @@ class Workbook:
                     f'{self._path}, sheet {sheet.title!r}, cell {_cell(place, number)}: {str(cell)[:40]!r} '
                     'is no number; enter it as a number, or remove the row'
                 )
+
+
+def _rows(path: Path, sheet: Any) -> Iterator[tuple[Any, ...]]:
+    """Give the rows of a sheet; one far cell makes a row as wide as the sheet."""
+    cells = 0
+    for row in sheet.iter_rows(values_only=True):
+        cells += len(row)
+        if cells > _MOST_CELLS:
+            raise SignalError(
+                f'{path}, sheet {sheet.title!r} has more than {_MOST_CELLS} cells (limit), {len(row)} '
+                'in a row: remove the cells far right, or export the sheet as CSV and read that'
+            )
+        yield row
 
 
 def _is_samples(row: tuple[Any, ...], rows: list[tuple[Any, ...]], number: int) -> bool:

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.signals.signal import FloatArray
 from mount_ros import topics
-from mount_ros.messages.level_imu import level_imu
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
+from mount_ros.messages.sensors import level_imu
 from mount_ros.topics import JOINT_STATE, Delivery, Scalar, Topic
 from mount_signals.units.quantities import Quantity
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_mount.recordings.bag.told_units import units_text
 from engine_mount.recordings.signals.signal import FloatArray
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
@@ -44,8 +45,8 @@ def write_channels(
         for channel in channels:
             place = channel.place
             # of topics that every command takes the registry tells the unit
-            units = {place.field: channel.unit} if place.topic.name.startswith(PREFIX) else None
-            writer.add_topic(f'/{place.topic.name}', place.topic.type, units=units)
+            units = {place.field: channel.unit} if place.topic.name.startswith(PREFIX) else {}
+            writer.add_topic(f'/{place.topic.name}', place.topic.type, details=units_text(units))
         writer.write(f'/{SESSION.name}', session_message(session_text(session)), begin)
         for first in range(begin, end + 1, _BLOCK):
             _write_block(writer, channels, first, first + _BLOCK)

@@ -12,10 +12,10 @@ from std_srvs.srv import Trigger
 
 from mount_bringup.graph.nodes import RECORDER
 from mount_recorder.collector import Collector
-from mount_ros.environment import prepare_environment
+from mount_ros.environment import loopback_refusal, prepare_environment
 from mount_ros.qos import control_qos
 from mount_ros.topics import TOPICS, Topic
-from mount_view.feed.feed import Message, Receive
+from mount_view.feed.feed import FeedError, Message, Receive
 
 _ANSWER_LIMIT = 3.0  # s, chosen: of the recorder to a mark
 _PERIOD = 0.02  # s, chosen: less than a picture of the page
@@ -27,6 +27,9 @@ class RunningGraph:
     live = True
 
     def __init__(self, domain: int, namespace: str = ''):
+        """Raises `FeedError` where no process can reach another."""
+        if refusal := loopback_refusal():
+            raise FeedError(refusal)
         prepare_environment()
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)

@@ -36,9 +36,9 @@ from engine_mount.recordings.messages.time_axis import TimeAxis
 from engine_mount.recordings.messages.times import NO_TIMES, Times, distinct, is_in
 from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_RATE
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.losses import RECORDER_RECORD
 from mount_recorder.stamp_watch import FARTHEST
-from mount_recorder.statement import RECORDER_RECORD
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,

@@ -11,7 +11,7 @@ from engine_mount.recordings.events.recorded_events import recorded_marks
 from engine_mount.recordings.messages.time_axis import TimeAxis
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_recorder.automatic_marks import MarkKind
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import DISPLACEMENT
 
 _SAME = 5.0  # s, chosen: a mark that repeats the sentence of a report so soon is of the same fault

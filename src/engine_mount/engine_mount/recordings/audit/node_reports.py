@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from engine_mount.recordings.bag.recording import ReadingError, Recording
 from engine_mount.recordings.messages.series import SeriesError
-from mount_ros.messages.verdicts import ToldVerdict, verdicts_in
+from mount_ros.messages.verdicts import NodeVerdict, verdicts_in
 from mount_ros.topics import DIAGNOSTICS
 
 _AT_ONCE = 256  # messages in memory, chosen
@@ -47,7 +47,7 @@ def node_reports(recording: Recording) -> list[NodeReport]:
     return sorted(reports, key=lambda report: report.log_time)
 
 
-def _report(log_time: int, verdict: ToldVerdict) -> NodeReport:
+def _report(log_time: int, verdict: NodeVerdict) -> NodeReport:
     namespace, _, node = verdict.node.rpartition('/')
     texts = (namespace.strip('/'), node, verdict.sentence, verdict.figures.get('state', ''))
     namespace, node, sentence, state = map(sys.intern, texts)  # very many are alike

@@ -8,7 +8,7 @@ import numpy as np
 from engine_mount.recordings.audit.audit import TopicAudit
 from engine_mount.recordings.bag.column_parts import ColumnPart, column_parts
 from engine_mount.recordings.bag.recording import Recording
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 _CURRENT = CURRENT_SETPOINT.names[0]

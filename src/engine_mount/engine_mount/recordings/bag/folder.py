@@ -4,13 +4,13 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.bag.metadata import MetadataError, read_metadata
+from engine_mount.recordings.bag.metadata import BagInformation, MetadataError, read_metadata
 from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
 from engine_mount.recordings.container.sqlite_file import SqliteFile
 from engine_mount.recordings.container.stored import StoredFile
 from engine_mount.recordings.container.unpacking import COMPRESSED_SUFFIXES
 from mount_models.plain_yaml import YamlError, text_of_file
-from mount_recorder.metadata import METADATA_NAME, BagInformation
+from mount_recorder.metadata import METADATA_NAME
 
 _STORAGES = {'mcap': '.mcap', 'sqlite3': '.db3'}
 _NUMBER = re.compile(r'(.*)_(\d+)')

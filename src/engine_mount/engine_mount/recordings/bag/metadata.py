@@ -1,18 +1,56 @@
-"""What a recording says of itself: its description in all versions, units, losses of its recorder."""
+"""What a recording says of itself: its description in all versions, quality of service, losses of its recorder."""
 
 import functools
-import json
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from mount_models.plain_yaml import plain_yaml
-from mount_recorder.metadata import ROOT, BagInformation, FileInformation, TopicInformation
-from mount_recorder.offered_qos import NANOSECONDS, OfferedQos
-from mount_recorder.told_units import KEY
+from mount_recorder.metadata import NANOSECONDS, NO_TIME, ROOT, VERSION, OfferedQos
 
 
 class MetadataError(ValueError):
     """A description of a recording is not understood."""
+
+
+@dataclass(frozen=True)
+class TopicInformation:
+    """One topic of a recording."""
+
+    name: str
+    type: str
+    message_count: int
+    serialization_format: str = 'cdr'
+    offered_qos: tuple[OfferedQos, ...] = ()
+    type_hash: str = ''
+    units: Mapping[str, str] = field(default_factory=dict)  # by field, where the channel tells them
+
+
+@dataclass(frozen=True)
+class FileInformation:
+    """One file of a recording; times in ns."""
+
+    path: str
+    starting_time: int = NO_TIME
+    duration: int = 0
+    message_count: int = 0
+
+
+@dataclass(frozen=True)
+class BagInformation:
+    """A whole recording; times in ns."""
+
+    topics: tuple[TopicInformation, ...]
+    files: tuple[FileInformation, ...]
+    starting_time: int
+    duration: int
+    message_count: int
+    ros_distro: str = ''
+    custom_data: Mapping[str, str] = field(default_factory=dict)
+    version: int = VERSION
+    storage: str = 'mcap'
+    compression_format: str = ''
+    compression_mode: str = ''
 
 
 def read_metadata(text: str) -> BagInformation:
@@ -156,12 +194,3 @@ def read_statement(record: Mapping[str, str]) -> dict[str, dict[str, int]]:
         return {str(name): {key: int(count) for key, count in row.items()} for name, row in topics.items()}
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         return {}
-
-
-def units_in(details: Mapping[str, str]) -> dict[str, str]:
-    """Return the units by field that a channel's metadata tell, {} where it tells none that is understood."""
-    try:
-        units = json.loads(details.get(KEY, '{}'))
-    except json.JSONDecodeError:
-        return {}
-    return {str(name): str(unit) for name, unit in units.items()} if isinstance(units, dict) else {}

@@ -8,8 +8,8 @@ from typing import Any
 
 import yaml
 
+from engine_mount.recordings.bag.metadata import BagInformation
 from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_recorder.metadata import BagInformation
 
 KEY = 'made_from'
 ZERO_KEY = 'zero_ns'

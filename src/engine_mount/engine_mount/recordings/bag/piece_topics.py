@@ -6,7 +6,8 @@ What the files say counts more: there it is under checksums.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from engine_mount.recordings.bag.metadata import QosError, read_qos, units_in
+from engine_mount.recordings.bag.metadata import BagInformation, QosError, TopicInformation, read_qos
+from engine_mount.recordings.bag.told_units import units_in
 from engine_mount.recordings.container.stored import StoredFile, StoredTopic
 from engine_mount.recordings.messages.definitions import (
     Definition,
@@ -15,9 +16,8 @@ from engine_mount.recordings.messages.definitions import (
     text_definition,
 )
 from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_recorder.metadata import BagInformation, TopicInformation
-from mount_recorder.offered_qos import OfferedQos
-from mount_recorder.piece import PIECE_RECORD
+from mount_recorder.bag_writer import PIECE_RECORD
+from mount_recorder.metadata import OfferedQos
 
 
 @dataclass

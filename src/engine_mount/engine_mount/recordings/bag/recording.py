@@ -11,7 +11,12 @@ from typing import Any
 import numpy as np
 
 from engine_mount.recordings.bag.folder import BagFolderError, find_pieces, open_piece
-from engine_mount.recordings.bag.metadata import MetadataError, read_metadata
+from engine_mount.recordings.bag.metadata import (
+    BagInformation,
+    MetadataError,
+    TopicInformation,
+    read_metadata,
+)
 from engine_mount.recordings.bag.origin import ZERO_KEY, origin
 from engine_mount.recordings.bag.piece_topics import (
     Declared,
@@ -25,8 +30,8 @@ from engine_mount.recordings.messages.definitions import Definition
 from engine_mount.recordings.messages.series import Column, Heads, Payloads, Series, heads_of
 from engine_mount.recordings.messages.time_axis import Arrivals, TimeAxis, anchors, axis_of
 from engine_mount.recordings.messages.times import Times
-from mount_recorder.chunk_groups import registered_topic
-from mount_recorder.metadata import METADATA_NAME, BagInformation, TopicInformation
+from mount_recorder.metadata import METADATA_NAME
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 

@@ -12,7 +12,7 @@ from engine_mount.recordings.messages.time_axis import TimeAxis
 from engine_mount.recordings.messages.times import distinct, is_in
 from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_RATE
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
 Places = NDArray[np.int64]

@@ -9,8 +9,8 @@ import numpy as np
 from mcap.records import Attachment
 from numpy.typing import NDArray
 
-from mount_recorder.piece import PIECE_RECORD
-from mount_recorder.statement import RECORDER_RECORD
+from mount_recorder.bag_writer import PIECE_RECORD
+from mount_recorder.losses import RECORDER_RECORD
 
 ACCOUNTS = ('rosbag2', RECORDER_RECORD, PIECE_RECORD)
 """Metadata in which a recording tells of itself; one that is made of it has its own."""

@@ -12,7 +12,7 @@ import yaml
 from engine_mount.recordings.bag.metadata import read_statement
 from engine_mount.recordings.bag.recording import Recording
 from mount_models.plain_yaml import plain_yaml
-from mount_recorder.statement import RECORDER_RECORD, Reception, excerpt_statement
+from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
 
 SOURCES = 'sources'  # key in the record of the recorder
 
@@ -53,8 +53,11 @@ def inherited_statement(sources: Sources, kept: Mapping[str, int]) -> dict[str, 
         identity: {name: [entry.received, entry.overflowed, entry.missing] for name, entry in topics.items()}
         for identity, topics in sources.items()
     }
-    kept_of_sources = {name: kept.get(name, 0) for name in total}
-    return {**excerpt_statement(total, kept_of_sources), SOURCES: yaml.safe_dump(rows, sort_keys=False)}
+    kept_here = {name: kept.get(name, 0) for name in total}
+    return {
+        **loss_statement(total, kept_here, excerpt=True),
+        SOURCES: yaml.safe_dump(rows, sort_keys=False),
+    }
 
 
 def _record(recording: Recording) -> Mapping[str, str]:

@@ -19,9 +19,9 @@ from engine_mount.recordings.container.mcap_reading.chunks import Chunk
 from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
 from engine_mount.recordings.edit.inherited_statement import inherited_statement, sources_of
 from engine_mount.recordings.edit.verbatim import VerbatimBag
-from mount_recorder.chunk_groups import chunk_group
+from mount_recorder.losses import RECORDER_RECORD
 from mount_recorder.metadata import NO_TIME
-from mount_recorder.statement import RECORDER_RECORD
+from mount_recorder.topic_groups import topic_group
 
 _SECOND = 1e9  # ns
 _NEAR = 600 * _SECOND  # chosen: chunks are shorter by far
@@ -208,7 +208,7 @@ def _lost_inside(file: McapFile) -> int:
 
 def _by_group(file: McapFile) -> Iterable[list[Chunk]]:
     """Return the whole chunks of each group of topics, all in one where one may hold topics of several."""
-    group_of = {number: chunk_group(topic.name, topic.type) for number, topic in file.topics.items()}
+    group_of = {number: topic_group(topic.name, topic.type) for number, topic in file.topics.items()}
     found: dict[frozenset[int | None], list[Chunk]] = {}
     for chunk in file.chunks:
         if not file.is_damaged(chunk):

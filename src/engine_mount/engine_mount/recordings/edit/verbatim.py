@@ -11,22 +11,10 @@ from mcap.records import Attachment
 from engine_mount.recordings.bag.piece_topics import offers_of
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.container.stored import ACCOUNTS, StoredTopic
-from mount_recorder.bag_writer import create_folder
-from mount_recorder.chunk_groups import chunk_group
-from mount_recorder.mcap_writer import LONG_CHUNK_SIZE, ChunkedMcap
-from mount_recorder.metadata import (
-    METADATA_NAME,
-    NO_TIME,
-    BagInformation,
-    FileInformation,
-    TopicInformation,
-    embedded_text,
-    metadata_text,
-)
-from mount_recorder.record_file import RecordFile
-
-_PROFILE = 'ros2'
-_LIBRARY = 'engine-mount mount_recorder 0.1.0'
+from mount_recorder.bag_writer import LIBRARY, create_folder, file_entry
+from mount_recorder.mcap_writer import LONG_CHUNK_SIZE, McapWriter
+from mount_recorder.metadata import METADATA_NAME, TopicEntry, bag_description, embedded_record, metadata_text
+from mount_recorder.topic_groups import topic_group
 
 
 class VerbatimBag:
@@ -37,11 +25,9 @@ class VerbatimBag:
         self._file_name = f'{self.folder.name}_0.mcap'
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int], int] = {}
-        self._topics: dict[int, TopicInformation] = {}
+        self._topics: dict[int, StoredTopic] = {}  # by channel
         create_folder(self.folder)
-        self._file = RecordFile(self.folder / self._file_name)
-        self._container = ChunkedMcap(self._file, LONG_CHUNK_SIZE)
-        self._container.start(_PROFILE, _LIBRARY)
+        self._container = McapWriter(self.folder / self._file_name, LIBRARY, LONG_CHUNK_SIZE)
 
     @property
     def kept(self) -> int:
@@ -74,17 +60,10 @@ class VerbatimBag:
         self._schemas[definition] = schema_id
         wanted = (topic.name, topic.encoding, schema_id)
         if wanted not in self._channels:
-            group = chunk_group(topic.name, topic.type)
+            group = topic_group(topic.name, topic.type)
             added = self._container.add_channel(*wanted, topic.details, group)
             self._channels[wanted] = added
-            self._topics[added] = TopicInformation(
-                name=topic.name,
-                type=topic.type,
-                message_count=0,
-                serialization_format=topic.encoding,
-                offered_qos=offers_of(topic),
-                type_hash=topic.details.get('topic_type_hash', ''),
-            )
+            self._topics[added] = topic
         return self._channels[wanted]
 
     def write(self, channel: int, raw: bytes, log_time: int, publish_time: int, sequence: int) -> None:
@@ -118,38 +97,24 @@ class VerbatimBag:
     def close(self, custom_data: Mapping[str, str], ros_distro: str) -> None:
         """Write summary and `metadata.yaml`."""
         self._container.flush()
-        information = self._information(custom_data, ros_distro)
-        self._container.add_metadata('rosbag2', {'serialized_metadata': embedded_text(information)})
-        self._container.finish()
-        self._file.close()
-        (self.folder / METADATA_NAME).write_text(metadata_text(information), encoding='utf-8')
+        topics = {topic.name: self._entry(topic) for topic in self._topics.values()}
+        files = [file_entry(self._file_name, self._container)]
+        description = bag_description(topics.values(), files, custom_data, ros_distro or 'jazzy')
+        self._container.finish(embedded_record(description))
+        (self.folder / METADATA_NAME).write_text(metadata_text(description), encoding='utf-8')
 
     def discard(self) -> None:
         """Remove the recording from the disk."""
         with contextlib.suppress(OSError):
-            self._file.close()
+            self._container.file.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _information(self, custom_data: Mapping[str, str], ros_distro: str) -> BagInformation:
-        counts = self.kept_by_topic
-        start, end = self.time_range or (NO_TIME, NO_TIME)
-        topics = {topic.name: topic for topic in self._topics.values()}
-        return BagInformation(
-            topics=tuple(
-                TopicInformation(
-                    name=name,
-                    type=topic.type,
-                    message_count=counts[name],
-                    serialization_format=topic.serialization_format,
-                    offered_qos=topic.offered_qos,
-                    type_hash=topic.type_hash,
-                )
-                for name, topic in topics.items()
-            ),
-            files=(FileInformation(self._file_name, start, end - start, self.kept),),
-            starting_time=start,
-            duration=end - start,
-            message_count=self.kept,
-            ros_distro=ros_distro or 'jazzy',
-            custom_data=custom_data,
+    def _entry(self, topic: StoredTopic) -> TopicEntry:
+        return TopicEntry(
+            name=topic.name,
+            type=topic.type,
+            message_count=self.kept_by_topic[topic.name],
+            offered_qos=offers_of(topic),
+            type_hash=topic.details.get('topic_type_hash', ''),
+            encoding=topic.encoding,
         )

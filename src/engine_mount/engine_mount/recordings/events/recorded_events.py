@@ -9,7 +9,7 @@ from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.switching_changes import switching_places
 from engine_mount.recordings.messages.series import Series, SeriesError
 from engine_mount.recordings.messages.time_axis import TimeAxis
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.messages.event import Mark, read_mark
 from mount_ros.topics import CONTROL_TRACE, EVENT
 

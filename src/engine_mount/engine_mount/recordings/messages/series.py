@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from engine_mount.recordings.messages.definitions import Definition, installed_definition
 from engine_mount.recordings.messages.layout import HEAD, OPTIONS, Layout, LayoutError, decode, layout_of
 from engine_mount.recordings.messages.times import NO_TIMES, Times
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
 
 Column = NDArray[np.float64]

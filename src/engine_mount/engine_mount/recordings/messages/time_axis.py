@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from engine_mount.recordings.messages.series import SeriesError
 from engine_mount.recordings.messages.stamps import misdated
 from engine_mount.recordings.messages.times import Times
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
 _ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)

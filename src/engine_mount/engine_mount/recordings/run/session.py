@@ -12,7 +12,7 @@ from engine_mount.recordings.bag.recording import ReadingError, Recording
 from engine_mount.recordings.messages.series import SeriesError
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE, SAMPLE_RATE
-from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import SESSION
 
 

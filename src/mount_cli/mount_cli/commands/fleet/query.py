@@ -38,6 +38,9 @@ def query(
     out: Annotated[
         Path | None, typer.Option(metavar='FILE', help='with --csv or --json: write the answer to this file')
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option(min=0.1, metavar='S', help='a question that takes longer is refused')
+    ] = 60.0,
 ) -> None:
     """Ask a catalogue or a result a question in SQL."""
     from mount_replay.fleet.questions import query as answer_of
@@ -46,7 +49,7 @@ def query(
         raise typer.BadParameter('choose --csv or --json, not both')
     if out is not None and not (csv or as_json):
         raise typer.BadParameter('--out goes with --csv or --json')
-    answer = answer_of(folder, sql)
+    answer = answer_of(folder, sql, time_limit)
     if not (csv or as_json):
         print_rows(answer, terminal())
         return

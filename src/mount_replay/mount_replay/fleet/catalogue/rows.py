@@ -17,7 +17,7 @@ from engine_mount.recordings.run.session import (
     told_session,
     versions_told,
 )
-from mount_bringup.changed_parameters import changed_parameters
+from engine_mount.settings.changes import changed_parameters
 from mount_bringup.chosen import Parameters
 from mount_replay.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
 from mount_replay.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures

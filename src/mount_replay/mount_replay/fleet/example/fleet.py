@@ -15,8 +15,8 @@ import numpy as np
 
 import engine_mount
 from engine_mount.recordings.edit.cut import cut
-from mount_bringup.mounts import mounts_of, settings_of_mounts
-from mount_bringup.sample_rate import with_sample_rate
+from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.settings.options import with_sample_rate
 from mount_bringup.settings import checked_settings
 from mount_recorder.session import session_text
 from mount_recorder.versions import versions

@@ -17,8 +17,8 @@ from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.run.session import session_parameters
 from engine_mount.recordings.signals.even_grid import evenly_spaced
 from engine_mount.recordings.signals.signal import signal_of
+from engine_mount.settings.options import with_sample_rate
 from mount_bringup.chosen import control_parameters
-from mount_bringup.sample_rate import with_sample_rate
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.policy.contract import Policy, trace_dtype
 from mount_control.sample_watch import SampleCounts

@@ -1,0 +1,97 @@
+"""Settings as the user writes them, before a node or a core run has them."""
+
+import numpy as np
+import pytest
+
+from engine_mount.settings.options import owned, settings_of_options
+from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
+from mount_control.policy import continuous_viscous
+from mount_control.policy.registry import POLICIES
+from mount_models.damper import DamperError, damper_curve
+from mount_models.quantity import ParameterError
+
+POINTS = {'velocity': [0.0, 0.004, 0.1], 'force': [0.0, 0.0, 200.0]}
+
+
+@pytest.mark.parametrize(
+    ('option', 'curve'),
+    [
+        ('viscous_2500', damper_curve('viscous_2500')),
+        ('{law: viscous, dead_zone: 0.002}', damper_curve({'law': 'viscous', 'dead_zone': 0.002})),
+        ('{velocity: [0, 0.004, 0.1], force: [0, 0, 200]}', damper_curve(POINTS)),
+    ],
+)
+def test_a_damper_is_given_to_core_and_nodes_in_one_text(option, curve):
+    settings = checked_settings(settings_of_options([f'mount_control.damper={option}']))
+    assert isinstance(settings['mount_control']['damper'], str)  # what a node can declare
+    assert np.array_equal(damper_curve(settings['mount_control']['damper']).table, curve.table)
+
+
+def test_the_points_of_a_file_are_in_the_settings_so_that_a_session_keeps_them(tmp_path):
+    file = tmp_path / 'own.csv'
+    file.write_text('velocity,force\n0,0\n0.004,0\n0.1,200\n')
+    settings = checked_settings(settings_of_options([f'mount_control.damper={file}']))
+    file.unlink()
+    assert np.array_equal(damper_curve(settings['mount_control']['damper']).table, damper_curve(POINTS).table)
+    with pytest.raises(DamperError, match='cannot be read'):
+        checked_settings({'mount_control': {'damper': str(file)}})
+
+
+@pytest.mark.parametrize(
+    ('name', 'meant'),
+    [
+        ('mount_sim.seed', ('mount_sim', 'seed')),
+        ('seed', ('mount_sim', 'seed')),
+        ('motorway.gap_depth', ('mount_sim', 'motorway.gap_depth')),
+        ('policy', ('mount_control', 'policy')),
+        ('continuous_viscous.quality', ('mount_control', 'continuous_viscous.quality')),
+        ('sample_rate', ('mount_control', 'sample_rate')),  # each node has one
+        ('left/mount_control.policy', ('left/mount_control', 'policy')),
+        ('mount_sim.mount_left.friction.scale', ('mount_sim', 'mount_left.friction.scale')),
+        ('mount_sim.sede', ('mount_sim', 'sede')),  # refused where the types are known
+    ],
+)
+def test_a_parameter_is_named_with_its_node_or_without(name, meant):
+    assert owned(name) == meant
+
+
+@pytest.mark.parametrize(
+    ('name', 'sentence'),
+    [
+        ('sede', "'sede' is no parameter of any node; did you mean seed"),
+        ('mount_contrl.policy', 'did you mean mount_control.policy'),
+        ('coil.duration', "'coil.duration' is a parameter of a, b: write which, as in a.coil.duration"),
+    ],
+)
+def test_a_name_that_is_no_ones_or_several_ones_is_refused_with_what_to_write(name, sentence):
+    known = {'a': {'coil.duration': 1.0}, 'b': {'coil.duration': 1.0}} if name.startswith('coil') else None
+    with pytest.raises(ParameterError) as refusal:
+        owned(name, known)
+    assert sentence in str(refusal.value)
+
+
+def test_a_policy_that_is_registered_later_has_its_parameters(monkeypatch):
+    before = defaults_of_nodes()['mount_control']
+    monkeypatch.setitem(POLICIES, 'another', continuous_viscous)
+    assert {name for name in defaults_of_nodes()['mount_control'] if name not in before} == {
+        f'another.{name.partition(".")[2]}' for name in before if name.startswith('continuous_viscous.')
+    }
+
+
+def test_what_one_caller_changes_in_the_defaults_no_other_sees():
+    for values in defaults_of_nodes().values():
+        values.clear()
+    assert all(defaults_of_nodes().values())
+
+
+@pytest.mark.parametrize('option', ['seed', '=1', 'mount_sim.seed'])
+def test_a_setting_without_name_or_value_is_a_wrong_use(option):
+    with pytest.raises(SettingError, match='write NAME=VALUE or NODE'):
+        settings_of_options([option])
+
+
+def test_a_node_that_is_misspelt_is_refused_with_the_right_name():
+    with pytest.raises(
+        ParameterError, match="'left/mount_contrl' is no node of the graph; did you mean mount_c"
+    ):
+        checked_settings(settings_of_options(['left/mount_contrl.policy=x']))
