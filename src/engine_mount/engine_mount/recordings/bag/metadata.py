@@ -1,4 +1,4 @@
-"""What a recording says of itself: its description in all versions, quality of service, losses of its recorder."""
+"""What a recording says of itself: its description, quality of service, losses of its recorder."""
 
 import functools
 from collections.abc import Mapping
