@@ -170,7 +170,7 @@ def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mo
     job = Job(('rack',), {'mount_sim': quiet_bench, 'mount_control': paper})
     found = []
     for step in (5e-5, 2.5e-5):
-        monkeypatch.setattr('mount_sim.excitation.scenario.STEP_TIME', step)
+        monkeypatch.setattr('mount_sim.excitation.building.STEP_TIME', step)
         found.append(np.array(run_job(job)[1]['harmonics_n'])[[0, 2, 4, 6]])
     assert not np.array_equal(*found)
     assert found[1] == pytest.approx(found[0], rel=0.005)
