@@ -21,9 +21,8 @@ setup(
     extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
     entry_points={
         'console_scripts': [
-            'mount_supervisor = mount_bringup.graph.launched:main',
-            'mount_composed = mount_bringup.graph.composed:main',
-            'mount_prepare = mount_bringup.prepare:main',
+            'mount_supervisor = mount_ros.start:main',
+            'mount_prepare = mount_ros.start:main',
         ]
     },
 )

@@ -15,5 +15,5 @@ setup(
     ],
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
-    entry_points={'console_scripts': ['mount_driver = mount_driver.node:main']},
+    entry_points={'console_scripts': ['mount_driver = mount_ros.start:main']},
 )

@@ -14,5 +14,5 @@ setup(
     ],
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
-    entry_points={'console_scripts': ['mount_init = mount_init.node:main']},
+    entry_points={'console_scripts': ['mount_init = mount_ros.start:main']},
 )

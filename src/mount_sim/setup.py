@@ -14,5 +14,5 @@ setup(
     ],
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests
-    entry_points={'console_scripts': ['mount_sim = mount_sim.node:main']},
+    entry_points={'console_scripts': ['mount_sim = mount_ros.start:main']},
 )

@@ -54,6 +54,6 @@ LIBRARIES = {
 }
 
 ROS = {
-    'ament_index_python', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'launch_ros', 'lifecycle_msgs',
+    'ament_index_python', 'diagnostic_msgs', 'geometry_msgs', 'launch', 'lifecycle_msgs',
     'rcl_interfaces', 'rclpy', 'sensor_msgs', 'std_msgs', 'std_srvs',
 }  # fmt: skip

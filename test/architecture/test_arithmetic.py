@@ -45,7 +45,6 @@ ALLOWED = {
     ('mount_sim.plant.check', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_sim.plant.car_check', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_sim.plant.engine_body', 'np.linalg'): 'natural frequencies, by which parameters are refused',
-    ('mount_sim.plant.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimate', 'np.sum'): 'whole numbers',

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 from libraries import LIBRARIES
-from sources import REPOSITORY, SOURCES, files_behind, module_files, modules_of
+from sources import PACKAGES, REPOSITORY, SOURCES, files_behind, module_files, modules_of
 from test_imports import CAR
 
 from mount_bringup.graph.nodes import SIMULATED
 
 LAUNCH_FILES = sorted((SOURCES / 'mount_bringup' / 'launch').glob('*.launch.py'))
-SUPERVISORS = ['mount_bringup.graph.supervisor', 'mount_bringup.graph.launched']
+SUPERVISORS = ['mount_bringup.graph.run', 'mount_bringup.graph.simulation', 'mount_bringup.graph.replay']
 MODULES = [*(f'{node.package}.node' for node in SIMULATED), *SUPERVISORS]
 BEGIN = [*LAUNCH_FILES, *(module_files()[name] for name in MODULES)]
 
@@ -46,6 +46,33 @@ def test_what_the_car_starts_loads_where_nothing_of_the_desk_is_installed(wanted
     command = [sys.executable, '-c', LOAD, *arguments]
     ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
+
+
+START_OF_A_VEHICLE = """
+import runpy, sys
+from unittest.mock import MagicMock
+sys.modules.update(dict.fromkeys(sys.argv[2].split(), MagicMock()))
+runpy.run_path(sys.argv[1])['generate_launch_description']()
+from mount_bringup.graph.run import ordered
+ordered(['vehicle', 'recording:=none', 'policy:=switched_viscous'])
+print(*sys.modules)
+"""
+
+
+def test_a_launch_of_the_vehicle_loads_neither_simulator_nor_desk_nor_reader_of_recordings():
+    [launch_file] = [file for file in LAUNCH_FILES if file.name == 'vehicle.launch.py']
+    launch = set(modules_of(module_files()['mount_bringup.graph.launch']))
+    stand_ins = ' '.join(
+        sorted(name for name in launch if name.split('.')[0] in ('launch', 'ament_index_python'))
+    )
+    command = [sys.executable, '-c', START_OF_A_VEHICLE, str(launch_file), stand_ins]
+    loaded = subprocess.run(
+        command, cwd=REPOSITORY, capture_output=True, text=True, check=True
+    ).stdout.split()
+    desk = set(PACKAGES) - CAR
+    assert 'mount_bringup.graph.supervisor' in loaded
+    assert not {name.split('.')[0] for name in loaded} & (desk | {'mount_sim', 'rosbags', 'pandas', 'typer'})
+    assert not {'scipy.optimize', 'scipy.integrate', 'scipy.signal'} & {*loaded}
 
 
 def test_what_the_car_loads_and_rosdep_cannot_install_is_in_the_file_that_the_readme_names():

@@ -35,7 +35,7 @@ ROS = ('rclpy', 'sensor_msgs', 'std_msgs', 'diagnostic_msgs', 'geometry_msgs', '
 REGISTRY = 'mount_ros.topics'  # plain data, which any file may read
 # Beside node.py: verdicts are `mount_ros.nodes.diagnostics.Verdict`, plain data.
 MAY_TOUCH_ROS = {
-    'mount_driver': {'node.py', 'diagnosis.py'},
+    'mount_driver': {'node.py', 'health.py'},
     'mount_init': {'node.py'},
     'mount_control': {'node.py', 'diagnosis.py'},
     'mount_sim': {'node.py', 'diagnosis.py', 'loop.py'},

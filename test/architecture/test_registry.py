@@ -44,8 +44,7 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
     'mount_recorder/collector.py',
     'mount_ros/data_path.py',
     'mount_ros/nodes/diagnostics.py',
-    'mount_bringup/graph/own_node.py',
-    'mount_bringup/graph/launched.py',  # what a played bag says, so that the control can follow it
+    'mount_bringup/graph/graph.py',
     'mount_cli/bench/relay.py',  # not of the graph: bare rclpy to compare with
 }
 

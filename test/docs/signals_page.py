@@ -6,7 +6,7 @@
 from generated import PAGES, cell, table, written_by
 
 from mount_driver.can_library import Database, Message, Signal
-from mount_driver.codec import DATABASE_FILE
+from mount_driver.protocol import DATABASE_FILE
 
 PAGE = PAGES / 'signals.md'
 

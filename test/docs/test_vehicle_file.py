@@ -6,8 +6,7 @@ import pytest
 from vehicle_file import FILE, text
 
 from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS
-from mount_bringup.graph.nodes import VEHICLE
-from mount_bringup.graph.order import launch_order
+from mount_bringup.graph.order import vehicle_order
 from mount_bringup.settings import defaults_of_nodes
 
 
@@ -18,7 +17,7 @@ def ordered(monkeypatch):
     def order(file):
         given = {argument.name: argument.default for argument in VEHICLE_ARGUMENTS}
         given |= {'config': str(file), 'record': 'false'}
-        return launch_order(VEHICLE, VEHICLE_ARGUMENTS, given).settings.parameters
+        return vehicle_order(given).settings.parameters
 
     return order
 

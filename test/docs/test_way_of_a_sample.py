@@ -13,7 +13,7 @@ def test_every_function_on_the_way_of_a_sample_is_where_the_page_says():
     section = PAGE.read_text(encoding='utf-8').split('## The way of one sample')[1].split('\n## ')[0]
     rows = [line for line in section.splitlines() if line.startswith('| ')][1:]
     passed = [
-        place for row in rows for place in re.findall(r'`(\w+)/(\w+\.py)`: ((?:`[\w.]+`(?:, )?)+)', row)
+        place for row in rows for place in re.findall(r'`(\w+)/([\w/]+\.py)`: ((?:`[\w.]+`(?:, )?)+)', row)
     ]
     assert len(passed) >= len(rows) > 5
     for package, file, names in passed:

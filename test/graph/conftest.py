@@ -6,7 +6,7 @@ import pytest
 
 from mount_bringup.graph.domain import can_port
 from mount_driver.bus import MULTICAST_GROUP, open_bus
-from mount_driver.codec import MountCodec
+from mount_driver.protocol import MountCodec
 
 
 @pytest.fixture

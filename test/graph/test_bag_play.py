@@ -13,10 +13,6 @@ import numpy as np
 import pytest
 
 from engine_mount.recordings.bag.recording import open_recording
-from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
-from mount_bringup.graph.launched import arguments_of
-from mount_bringup.graph.processes import node_environment, parameter_text
-from mount_bringup.graph.replay_order import replay_order
 
 PLAYER = Path(__file__).with_name('bag_player.py')
 REFERENCE = Path(__file__).resolve().parents[2] / 'bags' / 'reference' / 'rough'
@@ -37,7 +33,7 @@ def started():
 
 @pytest.fixture
 def replay(tmp_path, domain, started, monkeypatch):
-    """Start the processes of a replay as children of this one, as launch would; give the end."""
+    """Run the supervisor of a replay as launch does; return exit code and output."""
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
     command = tmp_path / 'bin' / 'ros2'
     command.parent.mkdir()
@@ -46,30 +42,21 @@ def replay(tmp_path, domain, started, monkeypatch):
     monkeypatch.setenv('PATH', f'{command.parent}:{os.environ["PATH"]}')
 
     def run(**given):
-        texts = {argument.name: argument.default for argument in REPLAY_ARGUMENTS}
-        order = replay_order({**texts, 'recording': str(tmp_path / 'again'), **given})
-        for node in order.nodes:
-            file = tmp_path / f'{node.name}.yaml'
-            file.write_text(parameter_text([node], order.settings))
-            program = f'from {node.package}.node import main; main()'
-            arguments = ['--ros-args', '--params-file', str(file)]
-            started.append(start(program, arguments, node_environment([node], 0)))
-        program = 'from mount_bringup.graph.launched import main; main()'
-        started.append(start(program, arguments_of(order), node_environment((), 0)))
-        output, _ = started[-1].communicate(timeout=LIMIT)
-        return started[-1].returncode, output
+        texts = {'recording': str(tmp_path / 'again'), **given}
+        process = subprocess.Popen(
+            [
+                *(sys.executable, '-c', 'from mount_bringup.graph.run import main; main()', 'replay'),
+                *(f'{name}:={text}' for name, text in texts.items()),
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        started.append(process)
+        output, _ = process.communicate(timeout=LIMIT)
+        return process.returncode, output
 
     return run
-
-
-def start(program, arguments, environment):
-    return subprocess.Popen(
-        [sys.executable, '-c', program, *arguments],
-        env={**os.environ, **environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
 
 
 def setpoints(folder):

@@ -21,7 +21,7 @@ from mount_models.quantity import with_flattened
 from mount_recorder.session import session_text
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, ReplayOrder, replay
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 
 DRIVE = {

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.messages.series import Series
 from mount_bringup.chosen import policy_of
-from mount_bringup.mount_choice import with_control_of_mount
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.arithmetic.series import series_of
 from mount_models.damper import damper_curve
@@ -28,7 +27,8 @@ from mount_report.drive.evaluation import switching, tracking_error
 from mount_report.drive.signals import DriveSignals, load_drive
 from mount_ros import topics
 from mount_ros.topics import Topic
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.building import build_excitation
+from mount_sim.mount_choice import with_control_of_mount
 from mount_sim.plant.simulated_mount import DivergedError
 
 PAPER = {'policy': 'switched_viscous'}

@@ -3,9 +3,7 @@
 from launch import LaunchDescription
 
 from mount_bringup.graph.launch import launch_description
-from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
-from mount_bringup.graph.replay_order import replay_order
 
 
 def generate_launch_description() -> LaunchDescription:
-    return launch_description(REPLAY_ARGUMENTS, replay_order)
+    return launch_description('replay')

@@ -2,10 +2,8 @@
 
 from launch import LaunchDescription
 
-from mount_bringup.graph.launch import graph_description
-from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS
-from mount_bringup.graph.nodes import SIMULATED
+from mount_bringup.graph.launch import launch_description
 
 
 def generate_launch_description() -> LaunchDescription:
-    return graph_description(SIMULATED, SIM_ARGUMENTS, 'sim.yaml')
+    return launch_description('sim', 'sim.yaml')

@@ -2,10 +2,8 @@
 
 from launch import LaunchDescription
 
-from mount_bringup.graph.launch import graph_description
-from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS
-from mount_bringup.graph.nodes import VEHICLE
+from mount_bringup.graph.launch import launch_description
 
 
 def generate_launch_description() -> LaunchDescription:
-    return graph_description(VEHICLE, VEHICLE_ARGUMENTS, 'vehicle.yaml')
+    return launch_description('vehicle', 'vehicle.yaml')

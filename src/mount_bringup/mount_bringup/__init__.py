@@ -1,1 +1,1 @@
-"""Launch files, configuration, supervisor and the engine-mount command."""
+"""Launch files, configuration and the supervisor of the graph."""

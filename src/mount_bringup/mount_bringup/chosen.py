@@ -1,4 +1,4 @@
-"""The parts of initialisation and control that the parameters of a run choose, as the nodes choose them."""
+"""Controller, policy and specimen that the parameters of a run choose, as the nodes choose them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +21,7 @@ def control_parameters(parameters: Parameters) -> ControlParameters:
 
 
 def check_policy(parameters: Parameters) -> None:
-    """Refuse what the chosen policy cannot work with; raises a `ValueError`."""
+    """Refuse parameters with which the chosen policy cannot work; raises a `ValueError`."""
     policy, own = policy_of(parameters)
     policy.design(own, 1.0 / control_parameters(parameters).sample_rate)
 

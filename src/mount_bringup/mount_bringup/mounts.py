@@ -9,8 +9,6 @@ from typing import Any
 
 from mount_bringup.settings import OF_EACH
 from mount_models.quantity import ParameterError
-from mount_sim.parameters import SimParameters
-from mount_sim.plant.places import mount_names, values_of_mount
 
 Settings = Mapping[str, Mapping[str, Any]]
 """{node: {parameter: value}}."""
@@ -20,7 +18,12 @@ _SIM = 'mount_sim'
 
 def mounts_of(settings: Settings) -> tuple[str, ...]:
     """Return the names of the mounts, none where there is one mount alone; raises `ParameterError`."""
-    names = mount_names(str(settings.get(_SIM, {}).get('mounts', SimParameters().mounts)))
+    text = str(settings.get(_SIM, {}).get('mounts', ''))
+    names: tuple[str, ...] = ()
+    if text:
+        from mount_sim.plant.places import mount_names  # not in the car
+
+        names = mount_names(text)
     for node in settings:
         mount, slash, name = node.rpartition('/')
         if slash and (mount not in names or name not in OF_EACH):
@@ -38,6 +41,8 @@ def settings_of_mount(settings: Settings, mount: str) -> dict[str, dict[str, Any
         if own := settings.get(f'{mount}/{node}'):
             found[node] = {**found.get(node, {}), **own}
     if _SIM in found:
+        from mount_sim.plant.places import values_of_mount
+
         found[_SIM] = values_of_mount(found[_SIM], mount)
     return found
 

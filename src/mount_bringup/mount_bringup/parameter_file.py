@@ -1,14 +1,13 @@
-"""Parameter files of ROS 2 read before a node starts, for ROS ignores silently what it does not know."""
+"""Parameter files of ROS 2, checked before a node starts: ROS itself ignores an unknown name silently."""
 
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from mount_bringup.settings import SettingError
+from mount_bringup.settings import SettingError, general_name_of
 from mount_models.plain_yaml import YamlError, yaml_in_file
 from mount_models.quantity import check_name
-from mount_sim.plant.places import general_name
 
 _VALUES = 'ros__parameters'
 
@@ -36,13 +35,12 @@ def settings_in(
         if not nodes:
             raise SettingError(f'{file}: {pattern!r} is no node of the graph; known are {", ".join(known)}')
         for name, value in _flat(values):
-            check_name(
-                f'{" or ".join(nodes)} ({file})',
-                general_name(name),
-                {name for node in nodes for name in known[node]},
-            )
-            for node in nodes:
-                if general_name(name) in known[node] and _matches(pattern, f'{namespace.strip("/")}/{node}'):
+            owners = [node for node in nodes if general_name_of(node, name) in known[node]]
+            if not owners:
+                names = {name for node in nodes for name in known[node]}
+                check_name(f'{" or ".join(nodes)} ({file})', name, names)
+            for node in owners:
+                if _matches(pattern, f'{namespace.strip("/")}/{node}'):
                     settings.setdefault(node, {})[name] = value
     return settings
 

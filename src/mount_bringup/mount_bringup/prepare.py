@@ -8,14 +8,12 @@ from mount_control.settings import control_settings
 from mount_init.initialisation import load_compiled_laws
 from mount_models.arithmetic.compiled import compilation_told
 from mount_models.specimen import chosen_specimen
-from mount_sim.electronics.faults.schedule import Faults
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.simulated_car import SimulatedCar
-from mount_sim.plant.simulated_mount import SimulatedMount
 
 _SCENARIOS = ('bench', 'motorway')
-_TWO_MOUNTS = {'mounts': 'left,right'}
+_MOUNTS = ('', 'left,right')
 
 
 def prepare(scenarios: Sequence[str] = _SCENARIOS, policies: Sequence[str] = tuple(POLICIES)) -> None:
@@ -25,13 +23,9 @@ def prepare(scenarios: Sequence[str] = _SCENARIOS, policies: Sequence[str] = tup
     for policy in policies:
         load_compiled_law(control_settings({'policy': policy}, specimen))
     for scenario in scenarios:
-        sim = SimParameters(scenario=scenario)
-        excitation = build_excitation(sim)
-        mount = SimulatedMount(
-            sim.plant, excitation, sim.seed, Faults((), sim.seed, sim.sample_rate), sim.sample_rate
-        )
-        car = SimulatedCar({'scenario': scenario, **_TWO_MOUNTS}, excitation)
-        for each in (mount, *car.mounts.values()):
+        excitation = build_excitation(SimParameters(scenario=scenario))
+        cars = [SimulatedCar({'scenario': scenario, 'mounts': mounts}, excitation) for mounts in _MOUNTS]
+        for each in (mount for car in cars for mount in car.mounts.values()):
             each.measure()
             each.advance(0.0)
 

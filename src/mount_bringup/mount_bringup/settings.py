@@ -1,9 +1,9 @@
-"""Parameters of the nodes as given by the user: names known, types as declared, before a node starts."""
+"""The settings of a user for the nodes: names known, types as declared, before a node starts."""
 
 import contextlib
 import difflib
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -15,35 +15,40 @@ from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, check_name, flattened
 from mount_models.specimen_choice import SpecimenChoice
 from mount_recorder.parameters import RecorderParameters
-from mount_sim.parameters import NodeParameters, SimParameters
-from mount_sim.plant.places import general_name
 
 Known = Mapping[str, Mapping[str, Any]]
 _FIRST = 'mount_control'  # the node that is meant where none is named
 
 OF_EACH = ('mount_driver', 'mount_init', 'mount_control')
 """Nodes that each mount of a car has."""
-_NODES = (*OF_EACH, 'mount_sim', 'mount_recorder')
+_NODES = ('mount_driver', 'mount_sim', 'mount_init', 'mount_control', 'mount_recorder')
 
 
 class SettingError(ParameterError):
     """An option `--set` is not written as it must be; the text says how."""
 
 
-def defaults_of_nodes() -> dict[str, dict[str, Any]]:
+def defaults_of_nodes(nodes: Sequence[str] = _NODES) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
-    return {
-        'mount_driver': {**_defaults(DriverParameters), **_defaults(SpecimenChoice)},
-        'mount_sim': {**_defaults(SimParameters), **_defaults(NodeParameters)},
-        'mount_init': {**_defaults(InitParameters), **_defaults(SpecimenChoice)},
-        'mount_control': control.defaults(),  # not kept: a policy may be registered later
-        'mount_recorder': {**_defaults(RecorderParameters)},
-    }
+    return {node: dict(_defaults(node)) for node in _NODES if node in nodes}
+
+
+def _defaults(node: str) -> Mapping[str, Any]:
+    if node == 'mount_control':
+        return control.defaults()  # not kept: a policy may be registered later
+    return _kept_defaults(node)
 
 
 @functools.cache
-def _defaults(parameters: Callable[[], Any]) -> Mapping[str, Any]:
-    return flattened(parameters())
+def _kept_defaults(node: str) -> Mapping[str, Any]:
+    if node == 'mount_sim':
+        from mount_sim.parameters import NodeParameters, SimParameters  # not in the car
+
+        return flattened(SimParameters()) | flattened(NodeParameters())
+    if node == 'mount_recorder':
+        return flattened(RecorderParameters())
+    own = DriverParameters() if node == 'mount_driver' else InitParameters()
+    return flattened(own) | flattened(SpecimenChoice())
 
 
 def settings_of_options(options: Sequence[str], known: Known | None = None) -> dict[str, dict[str, Any]]:
@@ -119,17 +124,21 @@ def checked_settings(
             hint = f'; did you mean {near[0]}?' if near else ''
             raise ParameterError(f'{node!r} is no {owner}{hint or "; known are " + ", ".join(known)}')
         for name in values:
-            check_name(node, _general(kind, name), known[kind])
+            check_name(node, general_name_of(kind, name), known[kind])
         checked[node] = {
-            name: _typed(f'{node}.{name}', value, known[kind][_general(kind, name)])
+            name: _typed(f'{node}.{name}', value, known[kind][general_name_of(kind, name)])
             for name, value in _with_damper_text(kind, values).items()
         }
     return checked
 
 
-def _general(node: str, name: str) -> str:
+def general_name_of(node: str, name: str) -> str:
     """Return the parameter behind that of one mount, as in mount_sim.mount_left.friction.scale."""
-    return general_name(name) if node == 'mount_sim' else name
+    if node != 'mount_sim' or not name.startswith('mount_'):
+        return name
+    from mount_sim.plant.places import general_name
+
+    return general_name(name)
 
 
 def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:

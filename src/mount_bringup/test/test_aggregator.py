@@ -8,8 +8,8 @@ import yaml
 from rclpy.node import Node
 
 import mount_bringup
-from mount_bringup.graph.liveliness import SILENCE_LIMIT
 from mount_bringup.graph.nodes import SIMULATED
+from mount_bringup.graph.reports import SILENCE_LIMIT
 from mount_ros.nodes.diagnostics import Diagnostics, Level, Verdict
 
 FILE = Path(mount_bringup.__file__).parents[1] / 'config' / 'diagnostic_aggregator.yaml'

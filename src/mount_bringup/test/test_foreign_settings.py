@@ -15,8 +15,8 @@ from mount_bringup.settings import checked_settings, defaults_of_nodes, settings
 from mount_control.settings import check_policies, control_settings, defaults
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
-from mount_models.damper_points import DamperError
-from mount_models.friction.coefficient_check import CoefficientsRefusedError
+from mount_models.damper import DamperError
+from mount_models.friction.contact import CoefficientsRefusedError
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, quantities, with_flattened
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE

@@ -7,8 +7,7 @@ import signal
 import pytest
 
 import engine_mount
-from mount_bringup.graph.errors import GraphError
-from mount_bringup.graph.nodes import RECORDER, GraphSettings
+from mount_bringup.graph.nodes import RECORDER, GraphError, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor
 from mount_recorder.folders import recordings_of
 
@@ -29,26 +28,26 @@ def recording_graph(folder, domain, limit=3, **parameters):
 
 
 def pid_of(graph):
-    [process] = graph._processes
+    [process] = graph._processes._processes
     return process._process.pid
 
 
 def lose(graph, number):
     """Send a signal to the recorder and wait until the graph works again."""
-    before = len(graph.restarts)
+    before = len(graph.recovery.restarts)
     os.kill(pid_of(graph), number)
-    graph.wait_until(lambda: len(graph.restarts) > before, LIMIT, 'recovery')
+    graph.wait_until(lambda: len(graph.recovery.restarts) > before, LIMIT, 'recovery')
     graph.wait_until(lambda: graph.figures(RECORDER).get('state') == 'active', LIMIT, 'an active recorder')
 
 
 def test_a_killed_recorder_begins_a_new_recording_and_the_old_one_stays_readable(tmp_path, domain):
     told = []
     with recording_graph(tmp_path, domain) as graph:
-        graph.tell_loss = told.append
+        graph.recovery.report = told.append
         graph.wait_until(lambda: int(graph.figures(RECORDER).get('received', 0)) > 2, LIMIT, 'messages')
         lose(graph, signal.SIGKILL)
-        [restart] = graph.restarts
-    assert restart.loss.names == 'mount_recorder'
+        [restart] = graph.recovery.restarts
+    assert restart.failure.names == 'mount_recorder'
     assert 'ended with code -9' in told[0]
     assert 'started again with a new recording' in restart.sentence
     first, second = recordings_of(tmp_path / 'recording')
@@ -59,13 +58,11 @@ def test_a_killed_recorder_begins_a_new_recording_and_the_old_one_stays_readable
     assert len(whole['session']) == 1  # latched by the supervisor, so the new recording tells what it is
 
 
-def test_a_recorder_that_stands_still_counts_as_dead_after_the_limit(tmp_path, domain):
+def test_a_recorder_that_stands_still_is_treated_as_failed_after_the_limit(tmp_path, domain):
     with recording_graph(tmp_path, domain) as graph:
         lose(graph, signal.SIGSTOP)
-        told = (
-            'mount_recorder told nothing on /diagnostics for 4 s (limit 4 s, usual is 1 s) and counts as dead'
-        )
-        assert f'{told}: look for' in graph.restarts[0].sentence
+        expected = 'mount_recorder: no diagnostics for 4 s (limit 4 s): treated as failed; check its log'
+        assert expected in graph.recovery.restarts[0].sentence
 
 
 @pytest.mark.slow
@@ -77,7 +74,7 @@ def test_one_that_stands_still_for_less_goes_on(tmp_path, domain):
         os.kill(process, signal.SIGCONT)
         graph.serve_for(3.0)
         assert pid_of(graph) == process
-        assert graph.restarts == []
+        assert graph.recovery.restarts == []
 
 
 @pytest.mark.slow

@@ -5,22 +5,20 @@ from pathlib import Path
 import pytest
 
 import mount_bringup
-from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS
-from mount_bringup.graph.matches import unmatched
+from mount_bringup.graph.graph import Graph
+from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS
 from mount_bringup.graph.nodes import (
-    CONTROL,
     DRIVER,
-    INIT,
     RECORDER,
-    SIM,
     SIMULATED,
-    VEHICLE,
+    GraphSettings,
     Grouping,
     ending_order,
     groups,
     of_mounts,
 )
-from mount_bringup.graph.order import launch_order
+from mount_bringup.graph.order import vehicle_order
+from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
 from mount_bringup.mounts import mounts_of, settings_of_mount, settings_of_mounts
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError
@@ -79,15 +77,16 @@ def test_nodes_of_each_mount_start_side_by_side_and_end_before_the_electronics()
     assert len(composed) == 4
 
 
-def test_topics_that_are_waited_for_are_those_of_the_mount():
-    recorder, left, right, *_ = of_mounts((RECORDER, DRIVER, SIM, INIT, CONTROL), MOUNTS)
-    told = {'unmatched': '/car/left/current_setpoint, /car/right/displacement, /car/left/event'}
-    assert unmatched(left, told, (recorder, left, right), '/car') == ['current_setpoint']
-    assert unmatched(right, told, (recorder, left, right), '/car') == ['displacement']
-    assert unmatched(recorder, told, (recorder, left, right), '/car') == [
-        'left/current_setpoint',
-        'right/displacement',
-    ]
+def test_topics_that_are_waited_for_are_those_of_the_mount(monkeypatch):
+    nodes = recorder, left, right = of_mounts((RECORDER, DRIVER), MOUNTS)
+    graph = Graph(nodes, GraphSettings(namespace='/car'))
+    unmatched = '/car/left/current_setpoint, /car/right/displacement, /car/left/event'
+    monkeypatch.setattr(graph, 'figures', lambda node: {'unmatched': unmatched})
+    assert graph.missing_topics(left) == ['current_setpoint']
+    assert graph.missing_topics(right) == ['displacement']
+    assert graph.missing_topics(recorder) == ['left/current_setpoint', 'right/displacement']
+    monkeypatch.setattr(graph, 'figures', lambda node: {})
+    assert graph.missing_topics(left) == ['its first diagnostics']
 
 
 def given(arguments, tmp_path, **texts):
@@ -101,7 +100,7 @@ def given(arguments, tmp_path, **texts):
 
 
 def test_launch_gives_each_mount_its_nodes_bus_and_parameters(tmp_path):
-    order = launch_order(SIMULATED, SIM_ARGUMENTS, given(SIM_ARGUMENTS, tmp_path))
+    order = sim_order(given(SIM_ARGUMENTS, tmp_path))
     parameters = order.settings.parameters
     assert list(parameters) == names(of_mounts(SIMULATED, MOUNTS))
     ports = [parameters[f'{mount}/mount_driver']['port'] for mount in MOUNTS]
@@ -114,18 +113,18 @@ def test_launch_gives_each_mount_its_nodes_bus_and_parameters(tmp_path):
 
 def test_launch_in_the_car_gives_each_mount_its_channel(tmp_path):
     arguments = given(VEHICLE_ARGUMENTS, tmp_path, channels='can0, can1')
-    parameters = launch_order(VEHICLE, VEHICLE_ARGUMENTS, arguments).settings.parameters
+    parameters = vehicle_order(arguments).settings.parameters
     assert [parameters[f'{mount}/mount_driver']['channel'] for mount in MOUNTS] == ['can0', 'can1']
     with pytest.raises(ValueError, match='the mounts left and right have one CAN bus, can0'):
-        launch_order(VEHICLE, VEHICLE_ARGUMENTS, given(VEHICLE_ARGUMENTS, tmp_path))
+        vehicle_order(given(VEHICLE_ARGUMENTS, tmp_path))
     for channels in ('can0', 'can0,can0'):
         with pytest.raises(ValueError, match='must name a channel for each of the mounts'):
-            launch_order(VEHICLE, VEHICLE_ARGUMENTS, given(VEHICLE_ARGUMENTS, tmp_path, channels=channels))
+            vehicle_order(given(VEHICLE_ARGUMENTS, tmp_path, channels=channels))
 
 
 def test_a_file_gives_each_mount_in_the_car_its_channel_and_one_of_them_its_own_friction(tmp_path):
     arguments = {**given(VEHICLE_ARGUMENTS, tmp_path), 'config': str(EXAMPLE)}
-    parameters = launch_order(VEHICLE, VEHICLE_ARGUMENTS, arguments).settings.parameters
+    parameters = vehicle_order(arguments).settings.parameters
     assert [parameters[f'{mount}/mount_driver']['channel'] for mount in ('left', 'right')] == ['can0', 'can1']
     assert 'friction.scale' not in parameters['left/mount_control']
     assert parameters['right/mount_control']['friction.scale'] == 0.9

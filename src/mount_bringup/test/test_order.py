@@ -6,10 +6,10 @@ import pytest
 
 import mount_bringup
 from mount_bringup.graph.domain import can_port
-from mount_bringup.graph.launch_arguments import SIM_ARGUMENTS, VEHICLE_ARGUMENTS, check_arguments
-from mount_bringup.graph.launched import arguments_of
-from mount_bringup.graph.nodes import RECORDER, SIMULATED, VEHICLE
-from mount_bringup.graph.order import check_folder, launch_order
+from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS, texts_of
+from mount_bringup.graph.nodes import RECORDER
+from mount_bringup.graph.order import vehicle_order
+from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
 from mount_bringup.settings import SettingError
 from mount_models.quantity import ParameterError
 
@@ -24,13 +24,13 @@ def own_domain(monkeypatch):
 def sim(**given):
     given = {'config': str(CONFIG / 'sim.yaml'), 'recording': 'bags/first', **given}
     defaults = {argument.name: argument.default for argument in SIM_ARGUMENTS}
-    return launch_order(SIMULATED, SIM_ARGUMENTS, {**defaults, **given})
+    return sim_order({**defaults, **given})
 
 
 def vehicle(**given):
     given = {'config': str(CONFIG / 'vehicle.yaml'), 'recording': 'bags/first', **given}
     defaults = {argument.name: argument.default for argument in VEHICLE_ARGUMENTS}
-    return launch_order(VEHICLE, VEHICLE_ARGUMENTS, {**defaults, **given})
+    return vehicle_order({**defaults, **given})
 
 
 def test_the_shipped_files_order_the_graph_and_its_bus_has_the_port_of_domain_and_namespace():
@@ -81,16 +81,11 @@ def test_without_a_recording_there_is_no_recorder():
     assert set(order.settings.parameters) == {'mount_driver', 'mount_sim', 'mount_init', 'mount_control'}
 
 
-def test_the_supervisor_is_told_what_it_supervises():
-    order = vehicle(namespace='right', record='false', duration='30')
-    assert arguments_of(order) == [
-        '--node=mount_driver', '--node=mount_init', '--node=mount_control',
-        '--namespace=right', '--domain=7', '--scenario=car', '--duration=30.0', '--grouping=APART',
-        '--restart-limit=3',
-    ]  # fmt: skip
-    assert '--duration=inf' in arguments_of(vehicle())
-    assert '--scenario=bench' in arguments_of(sim(scenario='bench'))
-    assert '--scenario=motorway' in arguments_of(sim())
+def test_scenario_and_duration_of_an_order():
+    assert (vehicle().scenario, vehicle().duration) == ('car', float('inf'))
+    assert vehicle(duration='30').duration == 30.0
+    assert sim(scenario='bench').scenario == 'bench'
+    assert (sim().scenario, sim(duration='2').duration) == ('motorway', float('inf'))
 
 
 @pytest.mark.parametrize(
@@ -159,20 +154,21 @@ def test_a_sample_rate_of_one_mount_alone_is_refused(tmp_path, text, sentence):
 
 
 def test_an_existing_folder_is_refused_before_anything_starts(tmp_path):
-    check_folder(sim(recording=str(tmp_path / 'new')))
-    check_folder(sim(record='false'))
+    sim(recording=str(tmp_path / 'new'))
+    sim(record='false', recording=str(tmp_path))
     with pytest.raises(SettingError, match=r'exists already; a recording is never written over'):
-        check_folder(vehicle(recording=str(tmp_path)))
+        vehicle(recording=str(tmp_path))
 
 
 @pytest.mark.parametrize(
-    ('word', 'remedy'), [('scenary:=bench', r'did you mean scenario:=\?'), ('qqq:=1', '--show-args tells')]
+    ('word', 'remedy'),
+    [
+        ('scenary:=bench', r'did you mean scenario:=\?'),
+        ('qqq:=1', 'known are config'),
+        ('bench', 'is no argu'),
+    ],
 )
 def test_an_argument_that_the_launch_file_does_not_have_is_refused(word, remedy):
-    command = ['ros2', 'launch', 'mount_bringup', 'sim.launch.py', 'scenario:=bench', word]
+    assert texts_of(['scenario:=bench', 'fault:=a:=b'], SIM_ARGUMENTS)['fault'] == 'a:=b'
     with pytest.raises(SettingError, match=remedy):
-        check_arguments(command, SIM_ARGUMENTS)
-    check_arguments(command[:-1], SIM_ARGUMENTS)
-    check_arguments(
-        [*command[:3], 'car.launch.py', word], SIM_ARGUMENTS
-    )  # it may be for the file around ours
+        texts_of(['scenario:=bench', word], SIM_ARGUMENTS)

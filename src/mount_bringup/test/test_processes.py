@@ -8,7 +8,7 @@ from mount_bringup.graph import processes
 from mount_bringup.graph.nodes import CONTROL, DRIVER, RECORDER, GraphSettings
 from mount_ros.testing import LIMIT, wait_until
 
-TELL = 'import os; print(os.environ["ENGINE_MOUNT_PRIORITY"])'
+PRIORITY = 'import os; print(os.environ["ENGINE_MOUNT_PRIORITY"])'
 
 
 @pytest.mark.parametrize(
@@ -18,17 +18,19 @@ TELL = 'import os; print(os.environ["ENGINE_MOUNT_PRIORITY"])'
 def test_the_loop_is_given_the_priority_and_the_recorder_one_behind_it(
     tmp_path, monkeypatch, node, priority, told
 ):
-    monkeypatch.setattr(processes, '_program', lambda *_: TELL)
+    monkeypatch.setattr(processes, '_program', lambda *_: PRIORITY)
     settings = GraphSettings(priority=priority)
     process = processes.NodeProcess([node], settings, tmp_path)
     assert process.wait() == 0
     assert process.log_file.read_text().strip() == told
 
 
-def test_modules_in_the_working_directory_are_not_imported(tmp_path, monkeypatch):
+@pytest.mark.parametrize('path', ['', ':/nowhere', '/nowhere::/elsewhere', ':'])
+def test_modules_in_the_working_directory_are_not_imported(tmp_path, monkeypatch, path):
     for module in ('yaml', 'queue'):
         (tmp_path / f'{module}.py').write_text('raise SystemExit("foreign code ran")')
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('PYTHONPATH', path)
     monkeypatch.setattr(processes, '_program', lambda *_: 'import queue, yaml')
     process = processes.NodeProcess([CONTROL], GraphSettings(), tmp_path)
     assert process.wait() == 0, process.last_words()
@@ -44,7 +46,9 @@ def held(tmp_path, monkeypatch):
     monkeypatch.setattr(
         processes,
         '_program',
-        lambda *_: f'MountControl = 0; {program}'.replace('from loaded import MountControl', 'import loaded'),
+        lambda *_: f'MountControl = int; {program}'.replace(
+            'from loaded import MountControl', 'import loaded'
+        ),
     )
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     process = processes.NodeProcess([CONTROL], GraphSettings(), tmp_path)
@@ -63,31 +67,47 @@ def test_a_process_loads_at_once_and_makes_its_nodes_when_told_to(held):
 
 
 def test_a_process_that_has_made_nothing_yet_is_ended_without_a_complaint(held):
-    assert processes.end_all([held]) == []
+    assert ended([held]) == []
     assert held.exit_code is not None
 
 
-@pytest.mark.parametrize('at_once', [True, False])
-def test_processes_are_asked_to_end_last_started_first_each_once(at_once):
-    told = []
+def ended(processes_, **how):
+    """End processes and return the complaints."""
+    owner = processes.NodeProcesses()
+    owner._processes += processes_
+    return owner.end(**how)
 
-    class Told:
+
+def test_a_process_that_still_loads_is_ended_quietly_and_without_a_complaint(tmp_path, monkeypatch):
+    (tmp_path / 'loading.py').write_text('import time; print("up", flush=True); time.sleep(600)')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    program = processes._program([CONTROL], '').replace('mount_control.node', 'loading')
+    process = started(monkeypatch, tmp_path, CONTROL, program)
+    assert ended([process]) == []
+    assert process.log_file.read_text() == 'up\n'
+
+
+@pytest.mark.parametrize('at_once', [True, False])
+def test_processes_are_interrupted_last_started_first_each_once(at_once):
+    done = []
+
+    class Noted:
         exit_code = None
         begun, reported = True, False
 
         def __init__(self, name):
             self.name = name
 
-        def ask_to_end(self):
-            told.append(f'ask {self.name}')
+        def interrupt(self):
+            done.append(f'interrupt {self.name}')
 
         def wait(self):
-            told.append(f'wait {self.name}')
+            done.append(f'wait {self.name}')
             return 0
 
-    assert processes.end_all([Told('a'), Told('b')], at_once=at_once) == []
-    in_turn = ['ask b', 'wait b', 'ask a', 'wait a']
-    assert told == (['ask b', 'ask a', 'wait b', 'wait a'] if at_once else in_turn)
+    assert ended([Noted('a'), Noted('b')], at_once=at_once) == []
+    in_turn = ['interrupt b', 'wait b', 'interrupt a', 'wait a']
+    assert done == (['interrupt b', 'interrupt a', 'wait b', 'wait a'] if at_once else in_turn)
 
 
 STANDING = 'import os, signal; print("up", flush=True); os.kill(os.getpid(), signal.SIGSTOP)'
@@ -119,7 +139,7 @@ def started(monkeypatch, folder, node, program, settings=None):
 @pytest.mark.parametrize('at_once', [True, False])
 def test_each_frozen_process_is_killed_and_named(tmp_path, monkeypatch, at_once):
     frozen = [started(monkeypatch, tmp_path, node, STANDING) for node in (DRIVER, CONTROL)]
-    told = processes.end_all(frozen, at_once=at_once)
+    told = ended(frozen, at_once=at_once)
     assert [sentence.split(' after')[0] for sentence in told] == [
         'mount_control ended with code -9',
         'mount_driver ended with code -9',
@@ -137,7 +157,7 @@ def test_a_recorder_is_given_time_while_its_recording_grows_and_no_longer(tmp_pa
     program = WRITING.format(count=100, file=str(file), then=then)
     settings = GraphSettings(parameters={RECORDER.name: {'uri': str(tmp_path / 'run')}})
     recorder = started(monkeypatch, tmp_path, RECORDER, program, settings)
-    told = processes.end_all([recorder])
+    told = ended([recorder])
     assert recorder.exit_code == code
     assert len(file.read_text()) == 100
     assert bool(told) == bool(code)
@@ -147,4 +167,4 @@ def test_a_process_that_died_before_the_end_is_told_once(tmp_path, monkeypatch):
     dead = [started(monkeypatch, tmp_path, node, 'print("up"); exit(3)') for node in (DRIVER, CONTROL)]
     wait_until(lambda: all(process.exit_code is not None for process in dead), 'their ends')
     dead[1].reported = True
-    assert processes.end_all(dead) == ['mount_driver ended with code 3 before it was told to end: up']
+    assert ended(dead) == ['mount_driver ended with code 3 before it was told to end: up']

@@ -13,7 +13,7 @@ import pytest
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
 from engine_mount.recordings.bag.recording import open_recording
-from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS, SIM_ARGUMENTS, VEHICLE_ARGUMENTS
+from mount_bringup.graph.run import GRAPHS
 from mount_ros.testing import wait_until
 
 LIMIT = 240.0  # s: only a hang takes so long
@@ -72,15 +72,12 @@ def run(launch):
     return to_its_end
 
 
-@pytest.mark.parametrize(
-    ('name', 'arguments'),
-    [('sim', SIM_ARGUMENTS), ('vehicle', VEHICLE_ARGUMENTS), ('replay', REPLAY_ARGUMENTS)],
-)
-def test_show_args_tells_every_argument_with_its_meaning(run, name, arguments):
+@pytest.mark.parametrize('name', GRAPHS)
+def test_show_args_tells_every_argument_with_its_meaning(run, name):
     code, output = run(name, '--show-args')
     assert code == 0
     told = ' '.join(output.split())
-    for argument in arguments:
+    for argument in GRAPHS[name]()[0]:
         assert f"'{argument.name}': {argument.description}" in told
 
 

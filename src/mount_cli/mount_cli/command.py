@@ -107,7 +107,8 @@ app.add_typer(road.app, rich_help_panel=_RECORDINGS)
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; every refusal is one sentence and a non-zero exit code."""
-    from mount_bringup.graph.errors import INTERRUPTED, GraphError, Interrupted
+    from mount_bringup.graph.nodes import GraphError
+    from mount_bringup.graph.shutdown import INTERRUPTED, Interrupted
     from mount_ros.nodes.shutdown import end_process
 
     try:

@@ -4,8 +4,7 @@ import os
 import signal
 from typing import Any
 
-from mount_bringup.graph.ending_signals import interrupt_and_remember
-from mount_bringup.graph.errors import INTERRUPTED
+from mount_bringup.graph.shutdown import INTERRUPTED, interrupt_and_remember
 
 
 def main() -> None:

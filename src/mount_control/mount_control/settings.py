@@ -11,8 +11,7 @@ from mount_control.parameters import ControlParameters
 from mount_control.policy.contract import Design, Policy
 from mount_control.policy.registry import POLICIES, chosen_policy, prefix_of
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.coefficient_check import check_friction
-from mount_models.friction.contact import FrictionContact
+from mount_models.friction.contact import FrictionContact, check_friction
 from mount_models.quantity import ParameterError, flattened, with_flattened, with_values
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen import Specimen, SpecimenError

@@ -1,8 +1,8 @@
 """The node between a driver and an initialisation that the test plays, in the real middleware."""
 
 import math
+import re
 import types
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from mount_control.settings import control_settings
 from mount_models.damper import damper_curve
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.specimen import default_specimen, load_specimen, save_specimen
+from mount_models.specimen import DEFAULT_SPECIMEN, default_specimen, load_specimen
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import message_class, serialised
@@ -472,8 +472,9 @@ def test_parameters_that_cannot_work_are_refused_at_configure(make_control, para
 
 def test_the_friction_of_a_specimen_is_in_the_parameters_that_the_session_will_tell(make_control, tmp_path):
     """What is set on purpose stays, even if it is the default; core and node agree on the rest."""
-    friction = {'a_p1': 0.4, 'a_p2': 0.05, 'contact_stiffness': 3e6}
-    save_specimen(replace(default_specimen(), friction=friction), tmp_path / 'left.yaml')
+    friction = '\nfriction: {a_p1: 0.4, a_p2: 0.05, contact_stiffness: 3.0e+6}'
+    text = re.sub(r'\nfriction: \{[^}]*\}', friction, DEFAULT_SPECIMEN.read_text(), count=1)
+    (tmp_path / 'left.yaml').write_text(text)
     default = FrictionCoefficients().a_p1
     settings = {'parameters_file': str(tmp_path / 'left.yaml'), 'friction.a_p1': default}
     control = make_control(**settings)

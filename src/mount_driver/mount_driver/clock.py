@@ -21,7 +21,7 @@ _DRIFT_GAIN = 0.1
 _DRIFT_LIMIT = 500e-6  # chosen: more than twice the +-200 ppm of a usable quartz
 _SLEW_LIMIT = 1000e-6  # chosen: samples 1 ms apart get stamps within 1 us of that
 _FAST_SLEW_LIMIT = 0.1  # chosen: for stamps that lie far in the future
-_TRUSTED_NS = 5_000_000  # ns, chosen: a block without any frame in time says nothing about the clock
+_TRUSTED_NS = 5_000_000  # ns, chosen: of a block without any frame in time the clock is not corrected
 _BLOCKS_TO_BELIEVE = 8  # chosen: 4 s in which every frame is late are no pause but an error of the mapping
 
 

@@ -9,16 +9,16 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 
-from mount_driver.bus import CanLinkError, Reception, may_have_frames, open_bus
+from mount_driver.bus import CanLinkError, Frame, Reception, may_have_frames, open_bus
 from mount_driver.can_library import can
 from mount_driver.clock import Clock
-from mount_driver.codec import MountCodec, Setpoint, WrongCrcError, WrongLengthError
-from mount_driver.e2e_receiver import AliveCounter
-from mount_driver.frame import Frame
-from mount_driver.link import Arrival, Link, Refusal, Stamped
+from mount_driver.layout import FrameError
+from mount_driver.link import Arrival, Counts, Fault, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.watches.guard import Fault, Guard
+from mount_driver.protocol import MountCodec, Setpoint
+from mount_driver.watches.guard import Guard
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw
 from mount_models.sampling import sample_time_ns
@@ -37,7 +37,7 @@ class Exchange:
     it leaves; then `on_judged(stamped)`. `on_temperature(stamp_ns, celsius)` is called for a status with a
     coil temperature, with the last sample's stamp. A callback that hangs does not
     hold up the watch of the hold.
-    `clock` gives the stamps and says by which time ages are judged; `steady() -> ns` is the steady clock.
+    `clock` gives the stamps and the time by which ages are judged; `steady() -> ns` is the steady clock.
     `heat` is the coil's temperature from before, which an activation does not cool; `law` is the ripple's.
     """
 
@@ -62,12 +62,8 @@ class Exchange:
         self.trouble = ''
         """What is wrong with the bus at present; empty when nothing is."""
         self.bus_off = False
-        self.recoveries = 0
-        self.error_frames = 0
-        self.unsent = 0
-        """Setpoint frames that the bus did not take."""
         self.unsent_reason = ''
-        """Why it did not take the last one of them."""
+        """Why the bus did not take the last setpoint frame of `Counts.unsent`."""
         self.last_received = 0
         """Steady clock at the last sound measurement frame, ns; 0 before the first."""
         self._parameters = parameters
@@ -75,27 +71,34 @@ class Exchange:
         self._on_sample = on_sample
         self._on_judged = on_judged
         self._on_temperature = on_temperature
-        self._temperature_stamp: int | None = None  # of the temperature told last
-        self._clock = clock
+        self._temperature_stamp: int | None = None  # of the last temperature that was handed on
+        self._clock, self._lockstep = clock, clock.lockstep
         self._steady = steady
         heat = heat or HeatWatch(parameters.heating)
         self.guard = Guard(parameters, codec, clock, self.link, heat, law or RippleLaw())
         self._ids = (codec.measurement.frame_id, codec.status.frame_id, codec.setpoint.frame_id)
+        self._measurement_id = codec.measurement.frame_id
         self._bus: can.BusABC | None = None
-        self._alive = AliveCounter()
+        self._alive = 0  # counter of the next frame
         self._frame = Frame(codec.setpoint.frame_id, bytes(codec.setpoint.length))
-        self._sending = threading.Lock()  # between setpoints, judgements, the watch and the end
-        self._unjudged: tuple[Stamped, int] | None = None  # the newest sample and when it came (ns)
+        self._sending = threading.RLock()  # between setpoints, judgements, the watch and the end
         self._accepting = False
         self._ending = threading.Event()
         self._threads: list[threading.Thread] = []
+
+    def counts(self) -> Counts:
+        """Return what has been counted so far."""
+        clock, unreadable = self._clock, self.reception.unreadable
+        return replace(self.link.counts, restarts=clock.restarts, gaps=clock.gaps, unreadable=unreadable)
 
     def start(self, *, threaded: bool = True) -> None:
         """Open the bus and begin to receive, in threads or by `poll`; raises `CanLinkError`."""
         self._bus = self._open()
         self._accepting = True
         atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
-        loops = {'can_receive': self._serve, 'can_watch': self._watch_hold} if threaded else {}
+        loops = {'can_receive': self._serve} if threaded else {}
+        if threaded and not self._lockstep:  # where only frames move time, see `_receive`
+            loops['can_watch'] = self._watch_hold
         self._threads = [threading.Thread(target=loops[name], name=name, daemon=True) for name in loops]
         for thread in self._threads:
             thread.start()
@@ -109,20 +112,26 @@ class Exchange:
         with ExitStack() as steps:  # the last one first
             steps.callback(atexit.unregister, self.stop)
             steps.callback(self._close)
-            steps.callback(self._join)
+            for thread in self._threads:
+                if thread is not threading.current_thread():
+                    steps.callback(thread.join)
             steps.callback(self._leave_off)
 
     def send_setpoint(self, stamp: int, current: float) -> bool:
         """Send the current (A) that answers the sample of `stamp` (ns) at once; False if it was refused."""
         with self._sending:
+            link = self.link
             if not self._accepting or self.bus_off or self.trouble:
-                self.link.refuse(Refusal.BUS_LOST)
+                link.refuse(Refusal.BUS_LOST)
                 return False
-            self._judge()
-            setpoint = self.link.answer(stamp, current, self._now())
+            guard = self.guard
+            if guard.unjudged is not None and (fault := guard.judge_sample()) is not None:
+                self.switch_off(fault)
+            now = self._clock.now(0) if self._lockstep else self._steady()
+            setpoint = link.answer(stamp, current, now, guard.limits)
             sent = setpoint is not None and self._send(setpoint)
-            if self.link.double_answer and not self.link.fault:
-                self._send(self.link.switch_off(self.link.double_answer, foreign_writer=True))
+            if link.double_answer and not link.fault:
+                self._send(link.switch_off(Fault(link.double_answer, foreign_writer=True)))
                 return False
             return sent
 
@@ -131,38 +140,38 @@ class Exchange:
 
         The first fault stays, but for a graver one, or for one that names who answers beside the other.
         """
-        if fault is not None:
-            with self._sending:
-                self._switch_off(fault)
+        if fault is None:
+            return
+        with self._sending:
+            link = self.link
+            graver = link.needs_initialisation and not fault.needs_initialisation
+            if not link.fault or graver or link.nameless:
+                self._send(link.switch_off(fault))
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
         bus = self._bus
         return bus is not None and may_have_frames(bus) and self._attempt(0.0)
 
-    def watch(self) -> None:
-        """Send 0 A if the sample that was answered last is too old for its current."""
-        if self._clock.lockstep and self.link.latest is None:
-            return  # time has not begun
+    def watch(self) -> float:
+        """Send 0 A if the sample that was answered last is too old for its current; return s until then."""
         with self._sending:
-            if self._accepting and self.link.off_is_due(self._now()):
+            now = self._now()
+            if self.link.off_is_due(now):
                 self._send(self.link.off())
+            return 1e-9 * self.link.time_until_off(now)
 
     def _serve(self) -> None:
         while not self._ending.is_set() and not self.failure:
             self._attempt(_WAKE)
 
     def _watch_hold(self) -> None:
-        """Look whenever 0 A may be due; in lock-step only frames move time, see `_receive`."""
+        """Look whenever 0 A may be due."""
         try:
-            while not self._clock.lockstep and not self._ending.wait(self._time_until_off()):
-                self.watch()
+            while not self._ending.wait(self.watch()):
+                pass
         except BaseException as error:
             self._fail(error)
-
-    def _time_until_off(self) -> float:
-        with self._sending:
-            return max(0.0, 1e-9 * self.link.time_until_off(self._now()))
 
     def _attempt(self, wait: float) -> bool:
         """Handle the frame that comes within `wait` s; what cannot be recovered ends the exchange safely."""
@@ -190,47 +199,45 @@ class Exchange:
         if bus is None or self.failure:
             return False
         message = self.reception.frame(bus, wait)
-        received = self._steady()
         if message is not None:
-            if message.is_error_frame:
-                self._take_error_frame(message)
-            elif message.arbitration_id == self._ids[0]:
-                self._take_measurement(message, received)
-            elif message.arbitration_id == self._ids[1]:
-                self._take_status(message)
-            elif message.arbitration_id == self._ids[2]:
-                self._take_foreign_setpoint(message)
-        if self._clock.lockstep:
+            received = self._steady()
+            if message.arbitration_id != self._measurement_id or message.is_error_frame:
+                self._take_other(message)
+            elif (stamped := self.link.take(message.data, received)) is None:
+                self._take_unused(received)
+            else:
+                # The displacement leaves first, as its answer is waited for; no answer leaves unjudged.
+                self.bus_off, self.last_received = False, received
+                guard = self.guard
+                guard.unjudged = stamped, stamped.stamp if self._lockstep else received
+                self._on_sample(stamped)
+                with self._sending:
+                    if guard.unjudged is not None and (fault := guard.judge_sample()) is not None:
+                        self.switch_off(fault)
+                self._on_judged(stamped)
+        if self._lockstep and self.link.latest is not None:  # else time has not begun
             self.watch()
         return message is not None
 
-    def _take_measurement(self, message: can.Message, received: int) -> None:
-        stamped = self.link.take(message.data, received)
-        if stamped is not None:
-            self.bus_off = False
-            self.last_received = received
-            self._unjudged = stamped, received
-            self._on_sample(stamped)
-            with self._sending:
-                self._judge()
-            self._on_judged(stamped)
-            return
+    def _take_unused(self, received: int) -> None:
+        """Take a measurement frame that is no new sample."""
         self.switch_off(self.guard.judge_frame(received))
-        if self.link.arrival is Arrival.RESENT:
-            self._answer_again()
+        latest = self.link.latest
+        if self.link.arrival is Arrival.RESENT and latest is not None:
+            with self._sending:
+                setpoint = self.link.answer_again(latest.sample.sample_counter, self._now())
+                if setpoint is not None:
+                    self._send(setpoint)
 
-    def _judge(self) -> None:
-        """Let the watches judge the newest sample once; call it with the lock held."""
-        unjudged, self._unjudged = self._unjudged, None
-        if unjudged is not None and (fault := self.guard.judge_sample(*unjudged)) is not None:
-            self._switch_off(fault)
-
-    def _switch_off(self, fault: Fault) -> None:
-        """See `switch_off`; call it with the lock held."""
-        link = self.link
-        graver = link.needs_initialisation and not fault.needs_initialisation
-        if not link.fault or graver or link.nameless:
-            self._send(link.switch_off(*fault))
+    def _take_other(self, message: can.Message) -> None:
+        """Take a frame that is no measurement."""
+        if message.is_error_frame:
+            self.link.counts.error_frames += 1
+            self.bus_off = self.bus_off or bool(message.arbitration_id & _BUS_OFF)
+        elif message.arbitration_id == self._codec.status.frame_id:
+            self._take_status(message)
+        elif message.arbitration_id == self._codec.setpoint.frame_id:
+            self._take_foreign_setpoint(message)
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
@@ -245,27 +252,12 @@ class Exchange:
     def _take_foreign_setpoint(self, message: can.Message) -> None:
         try:
             _, setpoint = self._codec.decode_setpoint(message.data)
-        except (WrongCrcError, WrongLengthError):
-            return  # nor do the electronics use it; their status tells of it
+        except FrameError:
+            return  # nor do the electronics use it, and their status reports it
         self.switch_off(self.guard.judge_foreign(setpoint, self._now()))
+        # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
         with self._sending:
-            # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
-            if self._accepting:
-                self._send(self.link.off())
-
-    def _take_error_frame(self, message: can.Message) -> None:
-        self.error_frames += 1
-        if message.arbitration_id & _BUS_OFF:
-            self.bus_off = True
-
-    def _answer_again(self) -> None:
-        with self._sending:
-            latest = self.link.latest
-            if latest is None or not self._accepting:
-                return
-            setpoint = self.link.answer_again(latest.sample.sample_counter, self._now())
-            if setpoint is not None:
-                self._send(setpoint)
+            self._send(self.link.off())
 
     def _now(self) -> int:
         return self._clock.now(self._steady())
@@ -275,14 +267,16 @@ class Exchange:
         bus = self._bus
         if bus is None:
             self.unsent_reason = self.trouble
+        if bus is None or not self._accepting:
             return False
         try:
-            self.guard.note_sent(setpoint)
-            self._frame.data = self._codec.encode_setpoint(setpoint, self._alive.next())
+            self.guard.sent.append(setpoint)
+            self._frame.data = self._codec.encode_setpoint(setpoint, self._alive)
+            self._alive = (self._alive + 1) & 0xFF
             bus.send(self._frame)
         except Exception as error:
             # The adapters of python-can raise whatever they like; no frame behind this one may suffer.
-            self.unsent += 1
+            self.link.counts.unsent += 1
             self.unsent_reason = _named(error)
             return False
         return True
@@ -290,23 +284,17 @@ class Exchange:
     def _leave_off(self) -> None:
         """Send 0 A and nothing more; raises `CanLinkError` where the bus did not take it."""
         taken: list[bool] = []
-        with self._sending:
+        with self._sending, ExitStack() as steps:  # what interrupts one frame must not keep back the others
             if not self._accepting:
                 return
-            self._accepting = False
-            with ExitStack() as frames:  # what interrupts one frame must not keep back the others
-                for _ in range(_OFF_FRAMES):
-                    frames.callback(lambda: taken.append(self._send(self.link.off())))
+            steps.callback(setattr, self, '_accepting', False)  # the last step
+            for _ in range(_OFF_FRAMES):
+                steps.callback(lambda: taken.append(self._send(self.link.off())))
         if not all(taken):
             raise CanLinkError(
                 f'{taken.count(False)} of {_OFF_FRAMES} frames with 0 A were not taken by the bus '
                 f'({self.unsent_reason}); the electronics go to 0 A by their own watch'
             )
-
-    def _join(self) -> None:
-        for thread in self._threads:
-            if thread is not threading.current_thread():
-                thread.join()
 
     def _recover(self, error: can.CanError) -> None:
         """Open the bus again and again until it works, `stop` is called, or the time is over."""
@@ -314,7 +302,7 @@ class Exchange:
         deadline = time.monotonic() + self._parameters.recovery_time
         while not self._ending.is_set():
             with self._sending:
-                with suppress(Exception):  # it is lost already: how it ends says nothing new
+                with suppress(Exception):  # it is lost already: how it ends is of no interest
                     self._close()
                 try:
                     self._bus = self._open()
@@ -322,7 +310,7 @@ class Exchange:
                     self.trouble = str(refused)
                 else:
                     self.trouble = ''
-                    self.recoveries += 1
+                    self.link.counts.recoveries += 1
                     return
             if time.monotonic() > deadline:
                 raise CanLinkError(

@@ -8,13 +8,13 @@ setpoint timeout. So nothing but a new sample and its own answer prolongs it, ev
 """
 
 from collections import deque
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
 from mount_driver.clock import Clock
-from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
-from mount_driver.e2e_receiver import E2EReceiver, Outcome
-from mount_models.sampling import SAMPLE_TIME_NS
+from mount_driver.protocol import E2EReceiver, Measurement, MountCodec, Outcome, Setpoint, Status
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS
 
 _REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 20 ms are refused anyway
 _COUNTER_MASK = 0xFFFF
@@ -25,6 +25,10 @@ _DOUBLE_ANSWERS = 3  # chosen: a node that ends makes one, a ramp that gives way
 _DOUBLE_PERIOD = 1_000_000_000  # ns, chosen: in it a node does not end three times
 _MEASURED = 6  # fields of a measurement, without its status bits: when sent again these are the same
 _SLACK = 2  # samples, chosen: more may have been taken in a time than fit in by the clock's steps
+_RATE_TOLERANCE = 0.2  # of the period, chosen: less than any other rate lies beside, more than samples jitter
+_FARTHEST = 8  # samples, chosen: over more the counters may have begun anew
+_OFF_RATE = 10  # samples in a row, chosen: 5 to 20 ms
+_new = tuple.__new__  # makes a named tuple without the call of a Python function
 
 
 class Arrival(IntEnum):
@@ -33,8 +37,11 @@ class Arrival(IntEnum):
     NEW = 0
     RESENT = 1  # the sample that came last, once more
     LATE = 2  # older than the last one: not used
-    CORRUPT = 3  # wrong CRC or length: not used
+    CORRUPT = 3  # wrong CRC, length or content: not used
     DISORDERED = 4  # repeated or of wrong sequence by its alive counter, or soon after such: not used
+
+
+_NEW = Arrival.NEW  # a look-up in the class costs more
 
 
 class Refusal(Enum):
@@ -51,7 +58,54 @@ class Refusal(Enum):
     SWITCHED_OFF = 'a fault keeps the coil at 0 A until mount_driver is activated again'
 
 
-_LATE = frozenset((Refusal.STALE, Refusal.UNKNOWN_SAMPLE))
+@dataclass
+class Counts:
+    """What has been counted since the activation, by the names of the figures in the diagnostics."""
+
+    samples: int = 0
+    lost: int = 0  # samples missing by their SampleCounter
+    corrupt: int = 0  # frames with wrong CRC, length or content
+    late: int = 0  # samples older than the one before
+    resent: int = 0  # samples that came once more
+    repeated: int = 0  # frames with the alive counter of the one before
+    wrong_sequence: int = 0
+    invalid_displacements: int = 0
+    setpoints: int = 0  # let through
+    limited: int = 0  # of these, limited to the greatest current
+    derated: int = 0  # of these, limited further because the coil is warm
+    refused: int = 0
+    setpoint_timeouts: int = 0  # the answered sample became older than the timeout before the next answer
+    late_setpoints: int = 0  # refused for their age, and times that a watch went to 0 A without any
+    unsent: int = 0  # setpoint frames that the bus did not take
+    restarts: int = 0  # of the electronics' counters, see `Clock`
+    jumps: int = 0  # samples at which SampleCounter and Microseconds contradict each other, within a second
+    gaps: int = 0  # pauses of more than a second, see `Clock`
+    recoveries: int = 0  # of a lost bus
+    error_frames: int = 0
+    unreadable: int = 0  # frames and datagrams that no frame could be made of
+    setpoint_errors: int = 0  # statuses that report setpoint frames which failed their check
+
+
+class Fault(NamedTuple):
+    """Why the coil is to be off until the driver is activated again."""
+
+    sentence: str
+    needs_initialisation: bool = False
+    """Nothing else is needed: a graph may do it by itself."""
+    foreign_writer: bool = False
+    """Another node publishes setpoints: the graph goes on at 0 A, and records, until a user has ended it."""
+
+
+class Limits(NamedTuple):
+    """What the watches allow an answer."""
+
+    current: float = HIGHEST_CURRENT
+    """What the coil may carry at present, A."""
+    held: str = ''
+    """Why every answer is lowered to 0 A at present; empty while none is."""
+
+
+NO_LIMITS = Limits()
 
 
 class Stamped(NamedTuple):
@@ -72,59 +126,39 @@ class Link:
         sample_time_ns: int = SAMPLE_TIME_NS,
     ):
         self.clock = clock
-        self.samples = E2EReceiver(codec.decode_measurement, codec.measurement)
-        self.statuses = E2EReceiver(codec.decode_status, codec.status)
-        self.arrival = Arrival.NEW
-        self.arrivals = [0] * len(Arrival)
-        """Measurement frames by `Arrival`."""
-        self.lost = 0
-        """Samples missing by their SampleCounter."""
-        self.jumps = 0
-        """Samples at which SampleCounter and Microseconds contradict each other, within a second."""
+        self.samples = E2EReceiver(codec.measurement, codec.measurement_of)
+        self.statuses = E2EReceiver(codec.status, codec.status_of)
+        self.counts = Counts()
+        self.arrival = _NEW
+        """What the last measurement frame was."""
         self.contradictions = 0
         """Samples that came once more with another content."""
-        self.invalid_displacements = 0
         self.latest: Stamped | None = None
         """The newest sample."""
         self.status: Status | None = None
-        self.setpoint_errors = 0
-        """Statuses that report setpoint frames which failed their check."""
+        self.last_refusal: Refusal | None = None
+        self.rate_objection = ''
+        """Why the electronics do not fit the graph by their counters; empty while that is not certain."""
 
-        self.fault = ''
-        """Why the coil is off for as long as this link lasts; empty while it may be on."""
-        self.needs_initialisation = False
-        """Whether nothing but a new initialisation is needed to end the fault."""
-        self.foreign_writer = False
-        """Whether the fault is another node that publishes setpoints."""
-        self.held = ''
-        """Why every answer is lowered to 0 A at present; empty while none is."""
+        self.fault, self.needs_initialisation, self.foreign_writer = Fault('')
+        """Why the coil is off for as long as this link lasts, see `Fault`; empty while it may be on."""
         self.double_answer = ''
         """Which sample was answered differently by two senders; empty while none was for certain."""
-        self.current_limit = codec.current.high
-        """What the coil may carry at present, A."""
-        self.setpoints = 0
-        """Setpoints that were let through."""
-        self.limited = 0
-        """Of these, limited to the greatest current."""
-        self.derated = 0
-        """Of these, limited further because the coil is warm."""
-        self.refusals = dict.fromkeys(Refusal, 0)
-        self.last_refusal: Refusal | None = None
-        self.timeouts = 0
-        """Times that the answered sample became older than the timeout before the next answer."""
-        self.late_setpoints = 0
-        """Setpoints refused for their age, and times that one of the two watches went to 0 A without any."""
 
+        self._lockstep = clock.lockstep
         self._highest_current = codec.current.high
         self._timeout = setpoint_timeout_ns
-        self._sample_time_us = sample_time_ns // 1000
+        self._period = sample_time_ns // 1000  # us
+        self._slack = round(_RATE_TOLERANCE * self._period)  # us
+        self._shortest, self._longest = self._period - self._slack, self._period + self._slack
+        self._off_rate = 0  # samples in a row that came at another rate
         self._samples: dict[int, tuple[int, int]] = {}  # stamp -> SampleCounter and arrival, oldest first
         self._answered_stamp = -1
-        self._answered_current = 0.0  # A, as it was asked for
+        self._answered_current = 0.0  # A, before it was limited
         self._answered_twice: deque[int] = deque(maxlen=_DOUBLE_ANSWERS)  # stamps of such samples
         # No sample of the first minute bears this number: 0 A sent before any answer answers nothing.
         self._last_setpoint = Setpoint(0.0, _COUNTER_MASK, False)
-        self._off_at: int | None = None  # time after which 0 A is due; the watch begins with its first look
+        self._off_at: int | None = None  # time after which 0 A is due; the watch begins with its first call
 
     # From the electronics.
 
@@ -133,79 +167,106 @@ class Link:
 
         `received` is the time of the frame on the steady clock.
         """
-        sample = self.samples.receive(frame)
-        arrival = self._arrival_of_none() if sample is None else self._order(sample)
-        self.arrival = arrival
-        self.arrivals[arrival] += 1
-        if arrival is not Arrival.NEW or sample is None:
+        sample, before, counts = self.samples.receive(frame), self.latest, self.counts
+        if sample is None:
+            self.arrival = self._count_unused(self.samples.outcome)
             return None
+        self.arrival = _NEW
+        counter, microseconds = sample.sample_counter, sample.microseconds
+        if before is not None:
+            last = before.sample
+            step = (counter - last.sample_counter) & _COUNTER_MASK
+            step_us = (microseconds - last.microseconds) & _MICROSECOND_MASK
+            if step == 1 and self._shortest <= step_us <= self._longest:
+                self._off_rate = 0
+            else:
+                self.arrival = self._judge_order(sample, last, step, step_us)
+                if self.arrival is not _NEW:
+                    return None
+        counts.samples += 1
         if sample.displacement != sample.displacement:
-            self.invalid_displacements += 1
-        self._note_watch(sample)
-        stamp = self.clock.stamp(sample.microseconds, received)
-        if len(self._samples) == _REMEMBERED:
-            del self._samples[next(iter(self._samples))]
-        self._samples[stamp] = sample.sample_counter, self.clock.now(received)
-        self.latest = Stamped(stamp, sample)
-        return self.latest
+            counts.invalid_displacements += 1
+        if sample.setpoint_timeout and self._last_setpoint.enable:
+            # The electronics' own watch has gone to 0 A although setpoints leave.
+            counts.late_setpoints += before is None or not before.sample.setpoint_timeout
+        stamp = self.clock.stamp(microseconds, received)
+        samples = self._samples
+        if len(samples) == _REMEMBERED:
+            del samples[next(iter(samples))]
+        samples[stamp] = counter, stamp if self._lockstep else received
+        self.latest = stamped = _new(Stamped, (stamp, sample))
+        return stamped
 
     def take_status(self, data: bytes | bytearray) -> Status | None:
         """Keep the status of a frame if it is sound, and return it; else None."""
         status = self.statuses.receive(data)
-        if status is not None:
+        if status is None:
+            self._count_unused(self.statuses.outcome)
+        else:
             self.status = status
-            self.setpoint_errors += status.e2e_error
+            self.counts.setpoint_errors += status.e2e_error
         return status
 
     # To the electronics.
 
-    def answer(self, stamp: int, current: float, now: int) -> Setpoint | None:
+    def answer(self, stamp: int, current: float, now: int, limits: Limits = NO_LIMITS) -> Setpoint | None:
         """Return the setpoint that answers the sample of `stamp` (ns), or None: see `last_refusal`.
 
-        `current` in A; above the limit of 3 A it is limited.
+        `current` in A; above what it may be by the DBC and by the watches it is limited.
         """
-        sample = self._samples.get(stamp)
-        if sample is None:
+        known, answered, counts = self._samples.get(stamp), self._answered_stamp, self.counts
+        if known is None:
             self.refuse(Refusal.UNKNOWN_SAMPLE)
             return None
-        counter, arrival = sample
-        if stamp == self._answered_stamp:
+        counter, arrival = known
+        if stamp == answered:
             self._compare(stamp, current)
-        reason = self._objection(stamp, current, now - arrival)
-        if reason is not None:
-            self.refuse(reason)
+        refusal = None
+        if self.fault:
+            refusal = Refusal.SWITCHED_OFF
+        elif current != current:
+            refusal = Refusal.NOT_A_NUMBER
+        elif current < 0.0:
+            refusal = Refusal.NEGATIVE
+        elif now - arrival > self._timeout:
+            refusal = Refusal.STALE
+        elif stamp < answered:
+            refusal = Refusal.SUPERSEDED
+        # 0 A may be repeated: a node that ends sends it for the sample that it has answered.
+        elif stamp == answered and current > 0.0 and current >= self._last_setpoint.current:
+            refusal = Refusal.NOT_LOWER
+        if refusal is not None:
+            self.refuse(refusal)
             return None
         self._answered_stamp, self._answered_current = stamp, current
+        current_limit, held = limits
         if current > self._highest_current:
-            self.limited += 1
+            counts.limited += 1
             current = self._highest_current
-        if current > self.current_limit:
-            self.derated += 1
-            current = self.current_limit
-        if self.held:
+        if current > current_limit:
+            counts.derated += 1
+            current = current_limit
+        if held:
             current = 0.0
-        self.setpoints += 1
+        counts.setpoints += 1
         self._off_at = arrival + self._timeout
-        self._last_setpoint = Setpoint(current, counter, True)
-        return self._last_setpoint
+        self._last_setpoint = setpoint = _new(Setpoint, (current, counter, True))
+        return setpoint
 
     def refuse(self, reason: Refusal) -> None:
         """Count a setpoint that is not sent."""
-        self.refusals[reason] += 1
-        self.late_setpoints += reason in _LATE
+        self.counts.refused += 1
+        self.counts.late_setpoints += reason in (Refusal.STALE, Refusal.UNKNOWN_SAMPLE)
         self.last_refusal = reason
 
     @property
     def nameless(self) -> bool:
-        """Whether the fault tells of two answers to a sample, but not who gives the other."""
+        """Whether the fault is two answers to a sample, of which it is not known who gives the other."""
         return bool(self.fault) and self.fault == self.double_answer
 
-    def switch_off(
-        self, fault: str, needs_initialisation: bool = False, foreign_writer: bool = False
-    ) -> Setpoint:
+    def switch_off(self, fault: Fault) -> Setpoint:
         """Refuse all setpoints from now on; return the one that switches the coil off."""
-        self.fault, self.needs_initialisation = fault, needs_initialisation
-        self.foreign_writer = foreign_writer
+        self.fault, self.needs_initialisation, self.foreign_writer = fault
         return self.off()
 
     def answer_again(self, sample_counter: int, now: int) -> Setpoint | None:
@@ -233,8 +294,8 @@ class Link:
         if self.time_until_off(now) >= 0:
             return False
         if self._last_setpoint.enable:
-            self.timeouts += 1
-            self.late_setpoints += 1
+            self.counts.setpoint_timeouts += 1
+            self.counts.late_setpoints += 1
         self._off_at = now + self._timeout
         return True
 
@@ -242,27 +303,6 @@ class Link:
     def driving(self) -> bool:
         """Whether the last frame to the electronics was a setpoint and not 0 A from here."""
         return self._last_setpoint.enable
-
-    def _objection(self, stamp: int, current: float, age: int) -> Refusal | None:
-        if self.fault:
-            return Refusal.SWITCHED_OFF
-        if current != current:
-            return Refusal.NOT_A_NUMBER
-        if current < 0.0:
-            return Refusal.NEGATIVE
-        if age > self._timeout:
-            return Refusal.STALE
-        if stamp < self._answered_stamp:
-            return Refusal.SUPERSEDED
-        # 0 A may be repeated: a node that ends sends it for the sample that it has answered.
-        if stamp == self._answered_stamp and current > 0.0 and current >= self._last_setpoint.current:
-            return Refusal.NOT_LOWER
-        return None
-
-    def _note_watch(self, sample: Measurement) -> None:
-        """Count it when the electronics' own watch has gone to 0 A although setpoints leave."""
-        before = self.latest is not None and self.latest.sample.setpoint_timeout
-        self.late_setpoints += self._last_setpoint.enable and sample.setpoint_timeout and not before
 
     def _compare(self, stamp: int, current: float) -> None:
         """Note another answer to the sample of `stamp`; a node that ends adds one of 0 A, once."""
@@ -277,31 +317,45 @@ class Link:
                 'nodes that publish current_setpoint'
             )
 
-    def _arrival_of_none(self) -> Arrival:
-        return Arrival.CORRUPT if self.samples.outcome >= Outcome.WRONG_CRC else Arrival.DISORDERED
+    def _count_unused(self, outcome: Outcome) -> Arrival:
+        """Count a frame that is not used, of any message."""
+        self.counts.repeated += outcome is Outcome.REPEATED
+        self.counts.wrong_sequence += outcome is Outcome.WRONG_SEQUENCE
+        if outcome < Outcome.WRONG_CRC:
+            return Arrival.DISORDERED
+        self.counts.corrupt += 1
+        return Arrival.CORRUPT
 
-    def _order(self, sample: Measurement) -> Arrival:
-        if self.latest is None:
-            return Arrival.NEW
-        last = self.latest.sample
-        step = (sample.sample_counter - last.sample_counter) & _COUNTER_MASK
-        step_us = (sample.microseconds - last.microseconds) & _MICROSECOND_MASK
-        if step == 1 and 0 < step_us < _DISAGREEMENT_US:
-            return Arrival.NEW
+    def _judge_order(self, sample: Measurement, last: Measurement, step: int, step_us: int) -> Arrival:
+        """Return what a sample is that came `step` samples and `step_us` behind the last one."""
+        counts = self.counts
         if step == 0 and step_us == 0:
+            counts.resent += 1
             self.contradictions += sample[:_MEASURED] != last[:_MEASURED]
             return Arrival.RESENT
         back_us = _MICROSECOND_MASK + 1 - step_us
         if back_us < _LATE_US and _COUNTER_MASK + 1 - step <= _REMEMBERED:
+            counts.late += 1
             return Arrival.LATE
+        beside = abs(step_us - step * self._period)
         # Behind a restart or a pause the counters say nothing: the clock counts it, once.
-        if step_us < _LATE_US and not self._agree(step, step_us):
-            self.jumps += 1
+        if step_us < _LATE_US and not (step > 0 and step_us > 0 and beside < _DISAGREEMENT_US):
+            counts.jumps += 1
         # Nor were more samples taken than there was time for.
-        if step > 1 and (step - _SLACK) * self._sample_time_us <= step_us < _LATE_US:
-            self.lost += step - 1
-        return Arrival.NEW
+        if step > 1 and (step - _SLACK) * self._period <= step_us < _LATE_US:
+            counts.lost += step - 1
+        if beside <= step * self._slack:
+            self._off_rate = 0
+        elif 0 < step <= _FARTHEST:
+            self._off_rate += 1
+            if self._off_rate >= _OFF_RATE:
+                self._object_to_rate(step_us / step)
+        return _NEW
 
-    def _agree(self, step: int, step_us: int) -> bool:
-        """Whether so many samples fit into so many microseconds; neither counter may stand still alone."""
-        return step > 0 and step_us > 0 and abs(step_us - step * self._sample_time_us) < _DISAGREEMENT_US
+    def _object_to_rate(self, measured_us: float) -> None:
+        # Both counters come in the same frame, so neither load nor lost frames alter what is seen.
+        self.rate_objection = (
+            f'the electronics sample every {measured_us:.0f} us, but sample_rate ({1e6 / self._period:g} Hz) '
+            f'means {self._period} us (limit {self._slack} us beside it): start the whole graph with the '
+            'sample_rate of the electronics'
+        )

@@ -4,13 +4,11 @@ import math
 import time
 
 from mount_driver.clock import CounterClock, ElectronicsClock
-from mount_driver.codec import MountCodec
-from mount_driver.diagnosis import LinkWatch, judge
 from mount_driver.exchange import Exchange
-from mount_driver.link import Refusal, Stamped
+from mount_driver.health import Health
+from mount_driver.link import Fault, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.snapshot import snapshot
-from mount_driver.watches.guard import Fault
+from mount_driver.protocol import MountCodec
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_models.coil.heating import check_heating
@@ -42,9 +40,9 @@ class MountDriver(SafeLifecycleNode):
         self._settings, self._law = DriverParameters(), RippleLaw()
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
-        self._watch, self._nameless = LinkWatch(), UnnamedPublisher()
+        self._health: Health | None = None
+        self._nameless = UnnamedPublisher()
         self._heat: HeatWatch | None = None
-        self._started_ns = 0
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
         self._ripple_layout = ScalarsLayout(COIL_RIPPLE)
@@ -84,12 +82,12 @@ class MountDriver(SafeLifecycleNode):
             heat=self._heat,
             law=self._law,
         )
-        self._watch = LinkWatch()
-        self._started_ns = time.monotonic_ns()
+        started = time.monotonic_ns()
         # In lock-step on a bus within this process, frames only come while the data thread is free.
         attended = self.lockstep and self._settings.interface == 'virtual'
         exchange.start(threaded=not attended)
         self._exchange = exchange
+        self._health = Health(exchange, self._settings, started, lockstep=self.lockstep)
         self.report_publisher_conflict()
         if attended:
             self._path.add_poll(exchange.poll)
@@ -114,20 +112,22 @@ class MountDriver(SafeLifecycleNode):
             exchange.switch_off(Fault(confirmed, foreign_writer=True) if confirmed else None)
 
     def judge(self) -> Verdict:
-        exchange = self._exchange
-        if exchange is None:
+        exchange, health = self._exchange, self._health
+        if exchange is None or health is None:
             return Verdict(Level.OK, 'inactive')
-        now = snapshot(exchange, time.monotonic_ns(), self._started_ns)
-        awaited = self._nameless.is_awaited(now.nameless)
-        past = self._watch.past(now)
-        return judge(now, past, self._settings, lockstep=self.lockstep, name_awaited=awaited)
+        awaited = self._nameless.is_awaited(exchange.link.nameless)
+        return health.judge(time.monotonic_ns(), name_awaited=awaited)
 
     def _heat_of(self, settings: DriverParameters) -> HeatWatch:
         """Return what is known of the coil: a new configuration does not cool it."""
         before = self._heat
         if before is None:
             return HeatWatch(settings.heating, settings.coil_celsius_before)
-        return before if before.heating == settings.heating else HeatWatch(settings.heating, before.told)
+        return (
+            before
+            if before.heating == settings.heating
+            else HeatWatch(settings.heating, before.known_celsius)
+        )
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()

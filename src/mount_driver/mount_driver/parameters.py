@@ -5,9 +5,8 @@ from typing import Annotated, NamedTuple
 
 from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
 from mount_driver.watches.coil_watch import CoilWatchParameters
+from mount_driver.watches.message_watches import SenderLimits, StatusLimits
 from mount_driver.watches.ripple_watch import RippleWatchParameters
-from mount_driver.watches.sender_watch import SenderLimits
-from mount_driver.watches.status_watch import StatusLimits
 from mount_models.coil.heating import CoilHeating
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_RATE, SETPOINT_TIMEOUT, SampleRate

@@ -5,9 +5,9 @@ import itertools
 from far_end import CODEC, FarEnd, sample
 
 from mount_driver.clock import ElectronicsClock
-from mount_driver.codec import Setpoint, Status
 from mount_driver.exchange import Exchange
 from mount_driver.parameters import DriverParameters
+from mount_driver.protocol import Setpoint, Status
 
 MS = 1_000_000
 GOOD = 100  # samples that are answered as they should be, before something goes wrong

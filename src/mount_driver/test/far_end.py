@@ -5,8 +5,7 @@ import time
 
 from mount_driver.bus import open_bus
 from mount_driver.can_library import can
-from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
-from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.protocol import AliveCounter, Measurement, MountCodec, Setpoint, Status
 from mount_ros.testing import LIMIT, wait_until
 
 CODEC = MountCodec()

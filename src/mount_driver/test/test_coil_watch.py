@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mount_driver.codec import Measurement, Setpoint
+from mount_driver.protocol import Measurement, Setpoint
 from mount_driver.quantisation import quantised_coil_current
 from mount_driver.watches.coil_watch import CoilWatch, CoilWatchParameters
 
@@ -24,16 +24,15 @@ def watched(
     `carried(k, current, wanted)` follows each setpoint from `way` samples after it was due. The driver hears
     all samples but the `missing` ones, and answers those `answered`.
     """
-    watch, current = CoilWatch(limits), 0.0
+    watch, current, sent = CoilWatch(limits), 0.0, []
     wanted = [0.0] * (way + 1)
     for k, setpoint in enumerate(setpoints):
         heard = k not in missing
         if heard:
             measured = current if math.isnan(current) else quantised_coil_current(current)
-            if sentence := watch.judge(sampled(k, measured, enabled(k))):
+            if sentence := watch.judge(sampled(k, measured, enabled(k)), sent):
                 return k, sentence
-        if heard and answered(k):
-            watch.note_sent(Setpoint(setpoint, k % COUNTERS))
+            sent = [Setpoint(setpoint, k % COUNTERS)] if answered(k) else []
         wanted.append(setpoint if heard and answered(k) else wanted[-1])
         current = carried(k, current, wanted[-1 - way])
     return None
@@ -109,11 +108,8 @@ def test_electronics_that_had_gone_to_0_ampere_in_a_pause_may_rise_from_there(he
 
 def test_0_ampere_that_was_sent_by_a_watch_may_be_followed_late():
     watch = CoilWatch(LIMITS)
-    watch.note_sent(Setpoint(0.0, COUNTERS - 1, enable=False))
-    told = []
-    for k in range(SAMPLES):
-        told.append(watch.judge(sampled(k, 0.0)))
-        watch.note_sent(Setpoint(1.0, k))
+    sent = [Setpoint(0.0, COUNTERS - 1, enable=False), *(Setpoint(1.0, k) for k in range(SAMPLES - 1))]
+    told = [watch.judge(sampled(k, 0.0), [setpoint]) for k, setpoint in enumerate(sent)]
     assert not any(told[:500])
     assert told[540]
 
@@ -178,16 +174,14 @@ def test_a_current_stuck_where_the_setpoints_pass_is_found_by_where_they_do_not(
 def test_samples_are_counted_on_where_their_counter_wraps():
     watch, told = CoilWatch(LIMITS), []
     for k in range(COUNTERS - 1000, COUNTERS + 1000):
-        told.append(watch.judge(sampled(k, 1.0 if k < COUNTERS + 5 else 0.0)))
-        watch.note_sent(Setpoint(1.0, k % COUNTERS))
+        sent = [Setpoint(1.0, (k - 1) % COUNTERS)]
+        told.append(watch.judge(sampled(k, 1.0 if k < COUNTERS + 5 else 0.0), sent))
     assert not any(told[30:1025])
     assert all(told[1026:])
 
 
 @pytest.mark.parametrize('answered', [21, 30, 40_000, 65_534])
 def test_what_answers_a_sample_that_is_too_old_or_not_yet_taken_is_followed_by_no_one(answered):
-    watch, told = CoilWatch(LIMITS), []
-    for k in range(200):
-        told.append(watch.judge(sampled(k, 2.0)))
-        watch.note_sent(Setpoint(2.0, (k - 1 - answered) % COUNTERS))
+    watch = CoilWatch(LIMITS)
+    told = [watch.judge(sampled(k, 2.0), [Setpoint(2.0, (k - 2 - answered) % COUNTERS)]) for k in range(200)]
     assert all(told[90:])

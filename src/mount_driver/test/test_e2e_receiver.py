@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_driver.codec import Measurement, MountCodec, Setpoint
-from mount_driver.e2e_receiver import AliveCounter, E2EReceiver, Outcome
+from mount_driver.protocol import AliveCounter, E2EReceiver, Measurement, MountCodec, Outcome, Setpoint
 
 CODEC = MountCodec()
 OK, REPEATED, SYNCHRONISING = Outcome.OK, Outcome.REPEATED, Outcome.SYNCHRONISING
@@ -19,7 +18,7 @@ def frame(alive):
 
 @pytest.fixture
 def receiver():
-    return E2EReceiver(CODEC.decode_setpoint, CODEC.setpoint)
+    return E2EReceiver(CODEC.setpoint, CODEC.setpoint_of)
 
 
 def outcomes(receiver, counters):
@@ -100,7 +99,7 @@ def test_a_repeated_frame_does_not_help_to_be_believed(receiver):
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.integers(0, 255), max_size=60))
 def test_whatever_comes_only_a_step_of_one_to_five_is_used(counters):
-    receiver = E2EReceiver(CODEC.decode_setpoint, CODEC.setpoint)
+    receiver = E2EReceiver(CODEC.setpoint, CODEC.setpoint_of)
     last = 255
     for alive in counters:
         if receiver.receive(frame(alive)) is not None:
@@ -115,7 +114,7 @@ def test_damage_is_never_handed_on(receiver):
     assert receiver.outcome == Outcome.WRONG_CRC
     assert receiver.receive(bytes(7)) is None
     assert receiver.outcome == Outcome.WRONG_LENGTH
-    assert receiver.corrupt == 2
+    assert receiver.failed == 2
 
 
 def test_damage_does_not_disturb_the_order(receiver):
@@ -128,14 +127,14 @@ def test_damage_does_not_disturb_the_order(receiver):
 
 
 def test_a_content_that_is_not_allowed_is_not_used_but_its_counter_is_followed():
-    forbidding = E2EReceiver(lambda data: (data[2], None if data[2] == 1 else data), CODEC.setpoint)
+    forbidding = E2EReceiver(CODEC.setpoint, lambda raw: None if raw[1] == 1 else raw)
     assert [forbidding.receive(frame(alive)) is not None for alive in range(3)] == [True, False, True]
-    assert forbidding.counts[Outcome.OUT_OF_RANGE] == forbidding.corrupt == 1
+    assert forbidding.counts[Outcome.OUT_OF_RANGE] == forbidding.failed == 1
     assert forbidding.outcome == Outcome.OK
 
 
 def test_a_measurement_goes_through():
-    receiver = E2EReceiver(CODEC.decode_measurement, CODEC.measurement)
+    receiver = E2EReceiver(CODEC.measurement, CODEC.measurement_of)
     sample = Measurement(3, 5, 0.001, 0.5, 1.0, 2.0)
     assert receiver.receive(CODEC.encode_measurement(sample, 0)) == sample
 

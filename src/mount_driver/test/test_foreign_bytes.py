@@ -7,12 +7,12 @@ from far_end import CODEC, sample
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mount_driver.bus import Frame, _message
 from mount_driver.can_library import pack_message
 from mount_driver.clock import CounterClock
-from mount_driver.codec import Status, WrongCrcError, WrongLengthError
-from mount_driver.frame import Frame
+from mount_driver.layout import FrameError
 from mount_driver.link import Link
-from mount_driver.loopback import _message
+from mount_driver.protocol import Status
 from mount_ros.testing import mutated
 
 SEEDS = st.integers(0, 1 << 62)
@@ -48,7 +48,7 @@ def test_a_mutated_frame_is_used_only_if_it_is_the_one_that_was_sent(seed):
 @given(st.binary(max_size=64))
 def test_foreign_bytes_are_no_frame(data):
     for decode in (CODEC.decode_measurement, CODEC.decode_status, CODEC.decode_setpoint):
-        with contextlib.suppress(WrongCrcError, WrongLengthError):
+        with contextlib.suppress(FrameError):
             decode(data)
     used = link()
     used.take(data, 0)

@@ -1,6 +1,6 @@
 from copy import deepcopy
 
-from mount_driver.frame import Frame
+from mount_driver.bus import Frame
 
 
 def test_a_deep_copy_is_equal_and_shares_nothing():

@@ -7,18 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from car import MS, Car
+from far_end import sample
 
-from mount_driver.codec import Status
-from mount_driver.diagnosis import Past, judge
+from mount_driver.health import Health
+from mount_driver.link import Stamped
 from mount_driver.node import MountDriver
 from mount_driver.parameters import DriverParameters
-from mount_driver.snapshot import snapshot
+from mount_driver.protocol import Setpoint, Status
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_models.coil.heating import CoilHeating, warmed
 from mount_ros.nodes.diagnostics import Level
 
 QUICK = CoilHeating(time_constant=5.0)  # all of it 120 times as quick, the steps of the current too
-S = 1_000_000_000
 
 
 @pytest.fixture
@@ -30,8 +30,7 @@ def car():
 
 
 def verdict(car):
-    now = snapshot(car.exchange, car.now, 0)
-    return judge(now, Past(now, now), DriverParameters(heating=QUICK), lockstep=False)
+    return Health(car.exchange, DriverParameters(heating=QUICK), 0, lockstep=False).judge(car.now)
 
 
 def test_3_ampere_for_long_are_lowered_smoothly_before_the_limit_and_the_coil_is_not_doubted(car):
@@ -64,27 +63,36 @@ def test_it_gets_its_current_back_when_it_has_cooled(car):
     assert car.on_bus().current == 3.0
 
 
-def heated(measured, sent, seconds):
+def heated(current, seconds):
     watch = HeatWatch(CoilHeating())
     watch.take_reported(20.0)
-    for tick in range(100 * seconds + 1):
-        watch.take(tick * 10 * MS, measured, sent)
+    for _ in range(10 * seconds):
+        watch.warm(current * current, 0.1)
     return watch
 
 
 def test_an_hour_of_3_ampere_by_the_shipped_specimen():
-    assert heated(3.0, 3.0, 230).current_limit == 3.0
-    assert heated(3.0, 3.0, 240).current_limit < 3.0
-    assert heated(1.0, 1.0, 3600).current_limit == 3.0
+    assert heated(3.0, 230).current_limit == 3.0
+    assert heated(3.0, 240).current_limit < 3.0
+    assert heated(1.0, 3600).current_limit == 3.0
 
 
 @pytest.mark.parametrize(('measured', 'sent'), [(2.0, 0.0), (0.0, 2.0), (math.nan, 2.0), (-0.1, 2.0)])
-def test_the_greater_of_measured_and_sent_current_heats(measured, sent):
-    assert heated(measured, sent, 60).celsius == heated(2.0, 2.0, 60).celsius > 85.0
+def test_the_greater_of_measured_and_sent_current_heats(car, measured, sent):
+    guard = car.exchange.guard
+    guard.heat.take_reported(20.0)
+    for index in range(1001):
+        guard.sent.append(Setpoint(sent, index))
+        guard.unjudged = Stamped(index * MS, sample(index, coil_current=measured)), index * MS
+        guard.judge_sample()
+    expected = 80.0
+    for _ in range(10):
+        expected = warmed(QUICK, expected, 4.0, 0.1)
+    assert guard.heat.celsius == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_reported_temperature_may_raise_the_model_and_never_lower_it():
-    watch = heated(1.0, 1.0, 60)
+    watch = heated(1.0, 60)
     before = watch.celsius
     for celsius in (-40.0, 20.0, math.nan):
         watch.take_reported(celsius)
@@ -101,14 +109,13 @@ def test_a_status_raises_the_model_of_the_driver(car):
 
 
 def test_the_heat_outlives_an_activation_and_a_pause_cools_nothing():
-    watch = heated(3.0, 3.0, 200)
+    watch = heated(3.0, 200)
     hot = watch.celsius
-    watch.begin()  # the stamps of the next activation may be any
-    watch.take(3600 * S, 0.0, 0.0)
+    watch.begin()
     assert watch.celsius == hot
-    watch.take(7200 * S, 0.0, 0.0)  # an hour without a sample
+    watch.warm(0.0, 3600.0)  # an hour without a sample
     assert watch.celsius == hot
-    watch.take(7200 * S + S, 0.0, 0.0)
+    watch.warm(0.0, 1.0)
     assert hot - 1.0 < watch.celsius < hot
 
 
@@ -121,7 +128,7 @@ def restarted_driving(watch_of, reported=math.nan, seconds=3600, period=120):
             watch.begin()
         watch.take_reported(true if reported == 'true' else reported)
         current = watch.current_limit
-        watch.take(tick * 100 * MS, current, current)
+        watch.warm(current * current, 0.1)
         true = warmed(heating, true, current * current, 0.1)
         hottest = max(hottest, true)
     return hottest
@@ -132,7 +139,7 @@ def anew(watch):
 
 
 def told(watch):
-    return HeatWatch(CoilHeating(), 20.0 if watch is None else watch.told)
+    return HeatWatch(CoilHeating(), 20.0 if watch is None else watch.known_celsius)
 
 
 @pytest.mark.parametrize(
@@ -148,14 +155,14 @@ def test_a_coil_of_unknown_history_is_derated_until_its_temperature_is_reported_
     assert watch.celsius == pytest.approx(152.2, abs=0.1)
     for _ in range(5):  # what may be spared, and no more
         watch.take_reported(math.nan)
-    for tick in range(30):
-        watch.take(tick * 100 * MS, 3.0, 3.0)
+    for _ in range(30):
+        watch.warm(9.0, 0.1)
     assert watch.current_limit == pytest.approx(1.73, abs=0.02)
-    assert math.isnan(watch.told)
+    assert math.isnan(watch.known_celsius)
     watch.take_reported(30.0)
     assert (watch.celsius, watch.current_limit) == (80.0, 3.0)
     watch.take_reported(20.0)
-    assert watch.told == 80.0
+    assert watch.known_celsius == 80.0
 
 
 def test_a_ramp_fits_into_what_an_activation_has_to_spare_and_a_coil_at_its_limit_is_spared_nothing():
@@ -164,9 +171,9 @@ def test_a_ramp_fits_into_what_an_activation_has_to_spare_and_a_coil_at_its_limi
     ramp = [*np.full(350, 0.2), *rise, *np.full(20, 3.0), *rise[::-1], *np.full(350, 0.2)]  # as mount_init's
     watch = HeatWatch(CoilHeating(), 155.0)
     before = watch.celsius
-    for tick, current in enumerate(ramp):
+    for current in ramp:
         assert watch.current_limit == 3.0
-        watch.take(tick * MS, current, current)
+        watch.warm(current * current, 1e-3)
     assert watch.celsius - before < 1.0
     watch.take_reported(166.0)
     watch.begin()

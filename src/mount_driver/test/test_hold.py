@@ -8,13 +8,12 @@ from car import GOOD, MS, Car
 from far_end import CODEC, sample
 
 from mount_driver import exchange as exchange_module
+from mount_driver.bus import Frame
 from mount_driver.clock import ElectronicsClock
-from mount_driver.codec import Setpoint, Status
-from mount_driver.e2e_receiver import AliveCounter
 from mount_driver.exchange import Exchange
-from mount_driver.frame import Frame
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
+from mount_driver.protocol import AliveCounter, Setpoint, Status
 from mount_ros.testing import wait_until
 
 HOLD = 20 * MS
@@ -161,7 +160,7 @@ def test_without_a_status_for_1_s_there_are_0_ampere(car):
     assert car.on_bus().current == 3.0
     car.drive(3, car.answer, electronics=measuring_alone)
     assert car.on_bus().current == 0.0
-    assert 'no status' in car.exchange.link.held
+    assert 'no status' in car.exchange.guard.limits.held
 
 
 class SilentBus:
@@ -244,7 +243,7 @@ def test_a_sample_is_judged_before_an_answer_that_is_given_at_once(car):
 
 
 def test_late_setpoints_are_counted_whichever_watch_they_miss(car):
-    late = car.exchange.link
+    late = car.exchange.link.counts
     assert late.late_setpoints == 0
     car.drive(30, nothing)
     assert late.late_setpoints == 1  # the watch of the driver

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_driver.clock import CounterClock, ElectronicsClock
-from mount_driver.codec import Measurement, MountCodec, Setpoint, Status
 from mount_driver.link import Arrival, Link, Refusal
+from mount_driver.protocol import Measurement, MountCodec, Setpoint, Status
 
 CODEC = MountCodec()
 MS = 1_000_000
@@ -40,7 +40,7 @@ def feed(link, indices, first_alive=0):
 
 def test_samples_in_order_are_new_across_the_wrap_of_their_counter(link):
     assert set(feed(link, range(65_500, 65_600))) == {Arrival.NEW}
-    assert link.lost == 0
+    assert link.counts.lost == 0
 
 
 def test_a_new_sample_is_handed_on_with_the_stamp_that_a_setpoint_names(link):
@@ -62,22 +62,21 @@ def test_in_lock_step_the_stamps_alone_make_a_sample_old():
 @pytest.mark.parametrize('missing', [1, 3, 500])
 def test_missing_samples_are_counted_by_their_number(link, missing):
     feed(link, [10, 11, 12 + missing])
-    assert link.lost == missing
+    assert link.counts.lost == missing
 
 
 def test_the_alive_counter_alone_could_not_have_counted_300_missing_samples(link):
     feed(link, [10])
-    feed(link, range(311, 314), first_alive=301)
-    assert link.arrivals[Arrival.DISORDERED] == 3
+    assert feed(link, range(311, 314), first_alive=301) == [Arrival.DISORDERED] * 3
     feed(link, [314], first_alive=304)
-    assert (link.lost, link.samples.lost) == (303, 0)  # 300 and the three that were not believed
+    assert (link.counts.lost, link.samples.lost) == (303, 0)  # 300 and the three that were not believed
 
 
 def test_the_same_sample_again_is_resent_and_not_handed_on(link):
     feed(link, [10, 11])
     assert link.take(frame(11, alive=2), 12 * MS) is None
     assert link.take(frame(11, alive=3), 12 * MS) is None
-    assert link.arrivals[Arrival.RESENT] == 2
+    assert link.counts.resent == 2
 
 
 def test_the_same_sample_again_with_other_values_is_a_contradiction(link):
@@ -85,14 +84,14 @@ def test_the_same_sample_again_with_other_values_is_a_contradiction(link):
     link.take(frame(11, alive=2, setpoint_timeout=True), 12 * MS)  # which may come true meanwhile
     assert link.contradictions == 0
     link.take(frame(11, alive=3, displacement=0.002), 12 * MS)
-    assert (link.contradictions, link.arrivals[Arrival.RESENT]) == (1, 2)
+    assert (link.contradictions, link.counts.resent) == (1, 2)
 
 
 def test_the_same_frame_again_is_no_sample_at_all(link):
     feed(link, [10, 11])
     assert link.take(frame(11, alive=1), 12 * MS) is None
-    assert link.arrivals[Arrival.RESENT] == 0
-    assert link.arrivals[Arrival.DISORDERED] == 1
+    assert (link.counts.resent, link.counts.repeated) == (0, 1)
+    assert link.arrival is Arrival.DISORDERED
 
 
 def test_a_late_sample_is_not_handed_on(link):
@@ -102,7 +101,7 @@ def test_a_late_sample_is_not_handed_on(link):
 def test_a_restart_of_the_electronics_loses_nothing_and_goes_on(link):
     feed(link, range(30_000, 30_010))
     assert feed(link, range(10)) == [Arrival.DISORDERED] * 3 + [Arrival.NEW] * 7
-    assert link.lost == 0
+    assert link.counts.lost == 0
 
 
 @pytest.mark.parametrize(
@@ -119,7 +118,7 @@ def test_a_restart_or_a_pause_is_counted_once_and_not_as_lost_samples(link, befo
     for alive in range(10, 20):
         number = after + alive
         link.take(frame(number, alive, sample_counter=(counter + alive) % 65536), number * MS)
-    assert link.lost == 0
+    assert link.counts.lost == 0
     assert link.clock.restarts + link.clock.gaps == (after != 65_400)
 
 
@@ -127,14 +126,14 @@ def test_a_corrupt_frame_is_counted_and_not_handed_on(link):
     data = frame(0, 0)
     data[12] ^= 4
     assert link.take(data, 0) is None
-    assert link.arrivals[Arrival.CORRUPT] == 1
+    assert link.counts.corrupt == 1
     assert link.latest is None
 
 
 def test_displacements_that_are_not_valid_are_counted(link):
     stamped = link.take(frame(0, 0, displacement=math.nan), 0)
     assert math.isnan(stamped.sample.displacement)
-    assert link.invalid_displacements == 1
+    assert link.counts.invalid_displacements == 1
 
 
 def test_a_status_is_kept_and_a_corrupt_one_is_not(link):
@@ -143,13 +142,13 @@ def test_a_status_is_kept_and_a_corrupt_one_is_not(link):
     damaged[3] ^= 1
     link.take_status(damaged)
     assert link.status == Status(13.5, 40.0)
-    assert link.statuses.corrupt == 1
+    assert link.counts.corrupt == 1
 
 
 def test_statuses_that_tell_of_doubtful_setpoints_are_counted(link):
     for alive, e2e_error in enumerate([False, True, False, True]):
         link.take_status(CODEC.encode_status(Status(13.5, 40.0, e2e_error=e2e_error), alive))
-    assert link.setpoint_errors == 2
+    assert link.counts.setpoint_errors == 2
 
 
 def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
@@ -172,9 +171,8 @@ def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
 def test_a_doubtful_setpoint_is_refused_counted_and_the_reason_kept(link, stamp, current, reason):
     feed(link, range(100))
     assert link.answer(stamp, current, now=99 * MS) is None
-    assert link.refusals[reason] == 1
     assert link.last_refusal is reason
-    assert link.setpoints == 0
+    assert (link.counts.refused, link.counts.setpoints) == (1, 0)
 
 
 def test_a_setpoint_20_ms_old_is_still_sent(link):
@@ -186,7 +184,7 @@ def test_age_is_that_of_the_clock_and_not_that_of_the_newest_sample(link):
     feed(link, [0])
     assert link.answer(0, 1.0, now=20 * MS + 1) is None
     assert link.answer(0, 1.0, now=60_000 * MS) is None
-    assert link.refusals[Refusal.STALE] == 2
+    assert (link.counts.refused, link.last_refusal) == (2, Refusal.STALE)
 
 
 def test_a_setpoint_for_an_older_sample_than_the_last_answered_is_refused(link):
@@ -205,7 +203,7 @@ def test_before_the_first_sample_every_setpoint_is_refused(link):
 def test_more_than_3_ampere_is_limited_and_counted(link, current):
     feed(link, [0])
     assert link.answer(0, current, now=0).current == 3.0
-    assert link.limited == 1
+    assert link.counts.limited == 1
 
 
 @settings(max_examples=200, deadline=None)
@@ -229,7 +227,7 @@ def test_off_is_due_when_setpoints_stop_for_longer_than_the_timeout(link):
     assert not link.off_is_due(20 * MS)  # after the sample, however late its answer came
     assert link.off_is_due(20 * MS + 1)
     assert link.off() == Setpoint(0.0, 0, False)
-    assert link.timeouts == 1
+    assert link.counts.setpoint_timeouts == 1
     assert not link.driving
 
 
@@ -242,7 +240,7 @@ def test_off_is_repeated_once_per_timeout_and_counted_once(link):
             link.off()
             due.append(now // MS)
     assert due == [21, 42, 63, 84]
-    assert link.timeouts == 1
+    assert link.counts.setpoint_timeouts == 1
 
 
 def test_a_new_setpoint_ends_the_timeout(link):
@@ -262,7 +260,7 @@ def test_without_any_setpoint_off_is_sent_but_no_timeout_is_counted(link):
     assert not link.off_is_due(0)
     assert link.off_is_due(21 * MS)
     assert link.off().answered_counter != 0
-    assert link.timeouts == 0
+    assert link.counts.setpoint_timeouts == 0
 
 
 def test_a_refused_setpoint_does_not_feed_the_watch(link):
@@ -298,8 +296,7 @@ def test_one_sample_and_then_the_same_answer_for_10_s_holds_the_current_for_20_m
             off.append(now)
     assert accepted == [0]
     assert off[0] == 30 * MS  # the first look behind 20 ms
-    assert link.refusals[Refusal.NOT_LOWER] == 2
-    assert link.refusals[Refusal.STALE] == 997
+    assert (link.counts.refused, link.last_refusal) == (999, Refusal.STALE)
 
 
 def test_a_first_answer_60_s_behind_its_sample_is_refused(link):

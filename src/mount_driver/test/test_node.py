@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import replace
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -20,11 +19,11 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from mount_driver.codec import Setpoint, Status
-from mount_driver.link import Arrival, Refusal
+from mount_driver.link import Refusal
 from mount_driver.node import MountDriver
+from mount_driver.protocol import Setpoint, Status
 from mount_models.coil.heating import CoilHeating
-from mount_models.specimen import default_specimen, save_specimen
+from mount_models.specimen import DEFAULT_SPECIMEN
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
@@ -214,7 +213,7 @@ def test_when_setpoints_stop_the_0_ampere_frame_is_sent(active, controller, far)
 
     def accepted():
         controller.setpoint(controller.received[DISPLACEMENT][-1][0], 0.05)
-        return driver._exchange.link.setpoints > 0
+        return driver._exchange.link.counts.setpoints > 0
 
     wait_until(accepted, 'an accepted setpoint')
     assert far.setpoint_where(lambda setpoint: setpoint.enable).current == 0.05
@@ -235,7 +234,7 @@ def test_after_a_fault_of_the_coil_an_activation_leaves_the_hole_that_makes_the_
     assert verdict.level == Level.ERROR
     assert verdict.sentence.startswith('coil switched off: coil current (3.000 A)')
     controller.setpoint(119 * MS, 1.0)
-    wait_until(lambda: driver._exchange.link.refusals[Refusal.SWITCHED_OFF], 'a refusal')
+    wait_until(lambda: driver._exchange.link.last_refusal is Refusal.SWITCHED_OFF, 'a refusal')
     assert driver.trigger_deactivate() == SUCCESS
     ended = time.monotonic()
     assert driver.trigger_activate() == SUCCESS
@@ -345,7 +344,7 @@ def test_a_corrupt_frame_is_not_published_and_counted(active, controller, far):
     far.send(sample(2))
     controller.wait_for(2)
     assert [stamp for stamp, _, _ in controller.received[DISPLACEMENT]] == [0, 2 * MS]
-    assert driver._exchange.link.arrivals[Arrival.CORRUPT] == 1
+    assert driver._exchange.link.counts.corrupt == 1
     verdict = driver.judge()
     assert (verdict.figures['corrupt'], verdict.figures['lost']) == (1, 1)
 
@@ -372,7 +371,7 @@ def test_a_setpoint_message_without_the_coil_current_is_refused_and_the_path_liv
     controller.publish_raw(ScalarsLayout(DISPLACEMENT).pack(0, (1.0,)))
     controller.setpoint(0, 0.5)
     assert far.setpoint().current == 0.5
-    assert sum(driver._exchange.link.refusals.values()) == 1
+    assert driver._exchange.link.counts.refused == 1
 
 
 def test_deactivation_sends_0_ampere_and_setpoints_no_longer_leave(active, controller, far):
@@ -498,7 +497,7 @@ def test_the_codec_of_the_far_end_is_that_of_the_driver(make_driver):
 
 def test_the_driver_takes_the_heating_of_a_specimen_file(make_driver, tmp_path):
     file = tmp_path / 'left.yaml'
-    save_specimen(replace(default_specimen(), heating=CoilHeating(time_constant=100.0)), file)
+    file.write_text(DEFAULT_SPECIMEN.read_text().replace('time_constant: 600.0', 'time_constant: 100.0'))
     driver = make_driver(**{'parameters_file': str(file), 'heating.ambient_celsius': 60.0})
     assert driver.trigger_configure() == SUCCESS
     assert driver._settings.heating == CoilHeating(time_constant=100.0, ambient_celsius=60.0)

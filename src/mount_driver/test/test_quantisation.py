@@ -8,7 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mount_driver import quantisation
-from mount_driver.codec import Measurement, MountCodec, OutOfRangeError, Setpoint, Status
+from mount_driver.layout import OutOfRangeError
+from mount_driver.protocol import Measurement, MountCodec, Setpoint, Status
 from mount_models.sampling import HIGHEST_CURRENT
 
 CODEC = MountCodec()

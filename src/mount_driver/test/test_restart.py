@@ -6,10 +6,9 @@ import pytest
 from car import GOOD, MS, Car
 from far_end import CODEC, sample
 
-from mount_driver.codec import Setpoint, Status
-from mount_driver.e2e_receiver import AliveCounter
-from mount_driver.frame import Frame
+from mount_driver.bus import Frame
 from mount_driver.link import Refusal
+from mount_driver.protocol import AliveCounter, Setpoint, Status
 
 BEGIN = GOOD * MS
 
@@ -48,7 +47,7 @@ def test_a_restart_gives_0_ampere_for_good_and_needs_nothing_but_an_initialisati
     assert link.needs_initialisation
     told = r"the electronics' counters .* begun anew, as at a restart \(1 times, limit 0\): check their"
     assert re.match(told, link.fault)
-    assert (link.clock.restarts, link.jumps, link.lost) == (1, 0, 0)
+    assert (link.clock.restarts, link.counts.jumps, link.counts.lost) == (1, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +81,7 @@ def test_counters_that_contradict_each_other_do_so_too(car, number, microseconds
 def test_lost_samples_are_no_jump(car, missing):
     car.drive(missing, lambda: None, electronics=lambda index: None)
     car.drive(10, car.answer)
-    assert car.exchange.link.jumps == 0
+    assert car.exchange.link.counts.jumps == 0
     assert car.exchange.link.fault == ''
 
 

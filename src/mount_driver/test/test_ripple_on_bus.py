@@ -4,9 +4,8 @@ import pytest
 from car import Car
 from far_end import Status, ripple, sample
 
-from mount_driver.diagnosis import Past, judge
+from mount_driver.health import Health
 from mount_driver.parameters import DriverParameters
-from mount_driver.snapshot import snapshot
 from mount_ros.nodes.diagnostics import Level
 
 BEFORE = 500  # samples in which all is well
@@ -21,8 +20,7 @@ def car():
 
 
 def verdict(car):
-    now = snapshot(car.exchange, car.now, 0)
-    return judge(now, Past(now, now), DriverParameters(), lockstep=False)
+    return Health(car.exchange, DriverParameters(), 0, lockstep=False).judge(car.now)
 
 
 def drive(car, milliseconds, change):

@@ -7,11 +7,9 @@ import pytest
 from car import GOOD, MS, Car
 from far_end import CODEC, FarEnd, sample
 
-from mount_driver.bus import open_bus
-from mount_driver.codec import Setpoint, Status
-from mount_driver.e2e_receiver import AliveCounter
-from mount_driver.frame import Frame
-from mount_driver.watches.sender_watch import SenderLimits, SenderWatch
+from mount_driver.bus import Frame, open_bus
+from mount_driver.protocol import AliveCounter, Setpoint, Status
+from mount_driver.watches.message_watches import SenderLimits, SenderWatch
 
 BEGIN = GOOD * MS
 SECOND = {'limit 3', 'second sender', 'take every node but the electronics'}

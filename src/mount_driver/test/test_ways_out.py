@@ -128,7 +128,7 @@ def test_a_frame_that_the_bus_does_not_take_ends_neither_the_exchange_nor_its_ca
     far.send(sample(0))
     assert exchange.poll()
     assert not exchange.send_setpoint(exchange.link.latest.stamp, 1.0)
-    assert exchange.unsent == 2
+    assert exchange.link.counts.unsent == 2
     assert exchange.unsent_reason == f'{type(error).__name__}: {error}'
     assert exchange.failure == ''
     exchange.stop()

@@ -13,7 +13,8 @@ import pytest
 
 from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.domain import DomainError
-from mount_bringup.graph.errors import GraphError, Interrupted
+from mount_bringup.graph.nodes import GraphError
+from mount_bringup.graph.shutdown import Interrupted
 from mount_experiments.check import session, trial
 from mount_experiments.check.judgement import Judged, all_verdicts, passed, verdicts_of, worst_first
 from mount_experiments.check.measures import MEASURES

@@ -7,8 +7,7 @@ import pytest
 
 from mount_identification.actuator.fit import fit_force_law
 from mount_identification.specimen import with_force_law
-from mount_models.actuator.law import TABLE_1, ForceLaw, GapOutsideLaw, checked_force
-from mount_models.actuator.law_check import ForceLawRefusedError
+from mount_models.actuator.law import TABLE_1, ForceLaw, ForceLawRefusedError, GapOutsideLaw, checked_force
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator, force
 

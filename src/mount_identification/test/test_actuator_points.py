@@ -5,8 +5,7 @@ import pytest
 
 from mount_identification.actuator.fit import fit_force_law
 from mount_identification.actuator.points import gap_groups
-from mount_models.actuator.law import checked_force
-from mount_models.actuator.law_check import ForceLawRefusedError
+from mount_models.actuator.law import ForceLawRefusedError, checked_force
 from mount_models.quantity import with_values
 from mount_sim.plant.reluctance import ReluctanceActuator, force
 

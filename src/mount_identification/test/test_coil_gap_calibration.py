@@ -27,7 +27,6 @@ from mount_models.quantity import with_values
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil, incremental_inductance
-from mount_sim.rack.fixed_gaps import measure_actuator
 
 MAGNET, COIL = ReluctanceActuator(), RippleCoil()
 GAPS = np.linspace(270e-6, 550e-6, 15)
@@ -45,7 +44,10 @@ def coil_at(celsius, coefficient=0.0043):
 
 @functools.lru_cache
 def without_noise(celsius, gaps, coefficient):
-    return measure_actuator(MAGNET, coil_at(celsius, coefficient), gaps, CURRENTS).inductance
+    coil, currents = coil_at(celsius, coefficient), CURRENTS.tolist()
+    return np.array(
+        [[incremental_inductance(coil, MAGNET, current, gap) for current in currents] for gap in gaps]
+    )
 
 
 def recorded(celsius=20.0, seed=0, noise=0.01, gaps=GAPS, coefficient=0.0043):

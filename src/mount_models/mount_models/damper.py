@@ -5,12 +5,13 @@ the pads do not stick (Sec. 5). `damper_curve` turns a name, a law or points of 
 uniform grid; what a parameter says, it says as a text, and here alone texts are understood.
 """
 
+import csv
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,16 +20,8 @@ import yaml
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.interpolation import each_interpolated
-from mount_models.damper_points import (
-    COLUMNS,
-    FILE_ENDINGS,
-    HIGHEST_VELOCITY,
-    DamperError,
-    checked_points,
-    points_in,
-)
-from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_models.quantity import ParameterError, Quantity, checked
+from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
+from mount_models.quantity import Quantity, check_name, checked
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -38,7 +31,19 @@ LONGEST_VELOCITY_STEP = 0.0005
 """Grid of the table (m/s, chosen), so that bent laws are met within 0.01 N."""
 STEP_OF_POINTS = 0.0001
 """Grid of the table of an own characteristic (m/s, chosen), whose corners lie anywhere."""
+COLUMNS = ('velocity', 'force')
+"""Names of the columns, m/s and N, in a file and in a mapping."""
+FILE_ENDINGS = ('.csv', '.yaml', '.yml')
+HIGHEST_VELOCITY = 1.0
+"""A characteristic ends here (m/s, chosen): twenty times the peak velocity of 8 Hz with 1 mm."""
+HIGHEST_FORCE = 1e4
+"""N, chosen: far more than friction at the highest current."""
+MOST_POINTS = 10_000
 _VISCOUS = re.compile(r'viscous_(\d+(\.\d*)?([eE][+-]?\d+)?)')
+
+
+class DamperError(ValueError):
+    """A damper characteristic cannot be built; the text says why and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -49,18 +54,11 @@ class DamperCurve:
     table: FloatArray
     velocity_step: float
 
-    @property
-    def velocities(self) -> FloatArray:
-        """The velocity magnitudes of the table, (n,), m/s."""
-        return np.arange(self.table.size, dtype=np.float64) * self.velocity_step
-
     def force(self, velocity: npt.ArrayLike) -> FloatArray:
         """Return the force (N), of the sign of `velocity` (m/s, any shape)."""
         speeds = np.asarray(velocity, float)
-        forces: FloatArray = np.zeros(speeds.shape)
-        for place in np.ndindex(speeds.shape):
-            forces[place] = damper_force(self.table, self.velocity_step, speeds[place])
-        return forces
+        forces = [damper_force(self.table, self.velocity_step, speed) for speed in speeds.ravel()]
+        return np.array(forces).reshape(speeds.shape)
 
 
 @compiled
@@ -128,18 +126,6 @@ class ProgressiveDamper(NamedTuple):
         return self.damping_coefficient * excess_velocity * (1.0 + excess_velocity / self.doubling_velocity)
 
 
-class DamperLaw(Protocol):
-    """What a law must offer to become a table."""
-
-    @property
-    def dead_zone(self) -> float: ...
-
-    @property
-    def force_limit(self) -> float: ...
-
-    def magnitude(self, excess_velocity: FloatArray) -> FloatArray: ...
-
-
 DAMPER_LAWS: dict[str, Any] = {
     'viscous': ViscousDamper,
     'degressive': DegressiveDamper,
@@ -162,7 +148,7 @@ _KNOWN = (
 )
 
 
-def damper_curve(choice: str | Mapping[str, Any] | DamperLaw) -> DamperCurve:
+def damper_curve(choice: Any) -> DamperCurve:
     """Return the curve of a text, a law, or a mapping: of a law and its parameters, or of points.
 
     A text is a name in `DAMPERS`, `viscous_<N s/m>`, a mapping in YAML, or the path of a file of points.
@@ -182,16 +168,10 @@ def damper_curve(choice: str | Mapping[str, Any] | DamperLaw) -> DamperCurve:
 def damper_text(choice: str | Mapping[str, Any]) -> str:
     """Return a text that means what `choice` means, also where a file that it names is not there."""
     if isinstance(choice, str) and _is_file(choice):
-        choice = points_in(Path(choice).expanduser())
+        choice = _points_in(Path(choice).expanduser())
     if isinstance(choice, Mapping):
         return yaml.safe_dump(dict(choice), default_flow_style=True, sort_keys=False, width=1 << 30).strip()
     return choice
-
-
-def viscous(damping_coefficient: float, dead_zone: float = 0.004, force_limit: float = 300.0) -> DamperCurve:
-    """Return the curve c_d max(|v| - dead zone, 0), c_d in N s/m, dead zone in m/s, limited in N."""
-    law = ViscousDamper(damping_coefficient, dead_zone, force_limit)
-    return _tabulated(f'viscous_{damping_coefficient:g}', law)
 
 
 def _curve_of_text(text: str) -> DamperCurve:
@@ -201,7 +181,7 @@ def _curve_of_text(text: str) -> DamperCurve:
         return _tabulated(text, ViscousDamper(float(viscous_text[1])))
     if _is_file(text):
         path = Path(text).expanduser()
-        return _curve_of_points(path.stem, points_in(path))
+        return _curve_of_points(path.stem, _points_in(path))
     try:
         mapping = plain_yaml(text)
     except YamlError as error:
@@ -216,7 +196,7 @@ def _is_file(text: str) -> bool:
 
 
 def _curve_of_points(name: str, columns: Mapping[str, Any]) -> DamperCurve:
-    velocity, force = checked_points(columns)
+    velocity, force = _checked_points(columns)
     grid = np.arange(math.floor(velocity[-1] / STEP_OF_POINTS * (1.0 + 1e-12)) + 1) * STEP_OF_POINTS
     table = each_interpolated(grid, velocity, force)
     if not table.max() > 0.0:
@@ -231,11 +211,8 @@ def _law_of(values: Mapping[str, Any]) -> Any:
     if name not in DAMPER_LAWS:
         raise DamperError(f'no damper law is called {name!r}; known are {", ".join(DAMPER_LAWS)}')
     law = DAMPER_LAWS[name]
-    unknown = sorted(set(given) - set(law._fields))
-    if unknown:
-        raise ParameterError(
-            f'{unknown[0]} is no parameter of the {name} damper; known are {", ".join(law._fields)}'
-        )
+    for each in given:
+        check_name(f'the {name} damper', each, law._fields)
     return law(**given)
 
 
@@ -267,3 +244,74 @@ def _velocity_step(dead_zone: float) -> float:
     if dead_zone == 0.0:
         return LONGEST_VELOCITY_STEP
     return dead_zone / math.ceil(dead_zone / LONGEST_VELOCITY_STEP)
+
+
+def _points_in(path: Path) -> dict[str, list[float]]:
+    """Return {'velocity': m/s, 'force': N} of a file CSV or YAML with these columns; raises `DamperError`."""
+    try:
+        text = text_of_file(path)
+        columns = _columns_of_csv(text) if path.suffix == '.csv' else plain_yaml(text)
+        velocity, force = _checked_points(columns)
+    except YamlError as error:
+        raise DamperError(f'damper file {path} {error}') from None
+    except (DamperError, csv.Error) as error:
+        raise DamperError(f'damper file {path}: {error}') from None
+    return {'velocity': velocity.tolist(), 'force': force.tolist()}
+
+
+def _checked_points(columns: Any) -> tuple[FloatArray, FloatArray]:
+    """Return velocities (m/s) and forces (N), (n,), of a mapping with both columns, or raise `DamperError`.
+
+    The characteristic is odd, so both are magnitudes. It begins without force, else the pads would chatter.
+    """
+    if not isinstance(columns, Mapping) or sorted(map(str, columns)) != sorted(COLUMNS):
+        raise DamperError(f'the points of a damper must have the columns {" and ".join(COLUMNS)}, m/s and N')
+    velocity, force = (_numbers(name, columns[name]) for name in COLUMNS)
+    if velocity.size != force.size:
+        raise DamperError(
+            f'velocity ({velocity.size} numbers) and force ({force.size} numbers) must be equally long'
+        )
+    if not 2 <= velocity.size <= MOST_POINTS:
+        raise DamperError(f'a damper needs 2 to {MOST_POINTS} points; instead received {velocity.size}')
+    if velocity[0] < 0.0 or velocity[-1] > HIGHEST_VELOCITY or not (np.diff(velocity) > 0.0).all():
+        raise DamperError(
+            f'velocity ({velocity[0]:g} .. {velocity[-1]:g} m/s) must rise strictly within '
+            f'0 .. {HIGHEST_VELOCITY:g} m/s; give magnitudes, the characteristic is odd'
+        )
+    if force[0] != 0.0 or force.min() < 0.0 or force.max() > HIGHEST_FORCE:
+        raise DamperError(
+            f'force ({force[0]:g} N at first, {force.min():g} .. {force.max():g} N) must begin at 0 N and '
+            f'lie within 0 .. {HIGHEST_FORCE:g} N; friction only opposes motion'
+        )
+    if not force.max() > 0.0:
+        raise DamperError('force must be greater than 0 N somewhere; else choose no damping by its levels')
+    return velocity, force
+
+
+def _numbers(name: str, values: Any) -> FloatArray:
+    try:
+        if isinstance(values, (str, Mapping)) or not isinstance(values, Iterable):
+            raise TypeError
+        numbers = np.array([float(value) for value in values])
+    except (TypeError, ValueError):
+        raise DamperError(f'{name} must be a list of numbers; instead received {values!r:.60}') from None
+    if not np.isfinite(numbers).all():
+        place = int(np.flatnonzero(~np.isfinite(numbers))[0])
+        raise DamperError(f'{name} must be finite; number {place + 1} is {numbers[place]:g}')
+    return numbers
+
+
+def _columns_of_csv(text: str) -> dict[str, list[float]]:
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
+    rows = list(csv.reader(lines))
+    header = [name.strip() for name in rows[0]] if rows else []
+    if sorted(header) != sorted(COLUMNS):
+        raise DamperError(f'its first line must be {",".join(COLUMNS)}; instead it is {",".join(header)!r}')
+    columns: dict[str, list[float]] = {name: [] for name in header}
+    for row in rows[1:]:
+        try:
+            for name, value in zip(header, row, strict=True):
+                columns[name].append(float(value))
+        except ValueError:
+            raise DamperError(f'{",".join(row)!r} is not a line of two numbers') from None
+    return columns

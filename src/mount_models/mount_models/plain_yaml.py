@@ -72,6 +72,11 @@ def plain_yaml(text: str, *, words: bool = False) -> Any:
         raise YamlError(f'is not valid YAML: {error}') from error  # a character that cannot be encoded
 
 
+def excerpt(value: Any) -> str:
+    """Return a value as a refusal shows it: whole, or its kind and its beginning."""
+    return repr(value) if len(repr(value)) < 60 else f'{type(value).__name__} {repr(value)[:50]}...'
+
+
 class _Open:
     """A list or mapping whose end has not come."""
 
@@ -88,9 +93,9 @@ class _Open:
             self.content[self.key] = value
             self.key = None
         elif not isinstance(value, str):
-            raise _refused(event, f'the key {_told(value)} is no text; put it in quotes')
+            raise _refused(event, f'the key {excerpt(value)} is no text; put it in quotes')
         elif value in self.content:
-            raise _refused(event, f'the key {_told(value)} stands there twice; keep one of them')
+            raise _refused(event, f'the key {excerpt(value)} stands there twice; keep one of them')
         else:
             self.key = value
 
@@ -159,15 +164,15 @@ def _value(tag: str | None, text: str, implicit: tuple[bool, bool]) -> Any:
     if tag is None or tag == '!':
         tag = rules.resolve(yaml.ScalarNode, text, implicit)
     if tag not in _SCALARS:
-        raise ValueError(f'{_told(text)} ({tag!r}) is not known here; put it in quotes')
+        raise ValueError(f'{excerpt(text)} ({tag!r}) is not known here; put it in quotes')
     if tag in _NUMBERS and len(text) > _LONGEST_NUMBER:
         raise ValueError(f'a number of {len(text)} characters; at most {_LONGEST_NUMBER}')
     try:
         value = _LOADER.yaml_constructors[tag](rules, yaml.ScalarNode(tag, text))
     except (ValueError, LookupError) as error:  # a date that is none; `!!int x`, `!!int ''`
-        raise ValueError(f'{_told(text)} is no value ({error}); put it in quotes') from error
+        raise ValueError(f'{excerpt(text)} is no value ({error}); put it in quotes') from error
     if isinstance(value, int) and not -_WHOLE_NUMBERS <= value < _WHOLE_NUMBERS:
-        raise ValueError(f'{_told(text)} does not fit into 64 bits; write 1.0e+30 for 1e30')
+        raise ValueError(f'{excerpt(text)} does not fit into 64 bits; write 1.0e+30 for 1e30')
     return value
 
 
@@ -181,7 +186,3 @@ def _refused(event: Any, sentence: str) -> YamlError:
 
 def _place(mark: Any) -> str:
     return '' if mark is None else f' in line {mark.line + 1}'
-
-
-def _told(value: Any) -> str:
-    return repr(value) if len(repr(value)) < 60 else f'{type(value).__name__} {repr(value)[:50]}...'

@@ -73,10 +73,10 @@ def _quantities(kind: type) -> dict[str, Quantity]:
 def checked(parameters: P) -> P:
     """Return `parameters` with every field in its declared type, or raise `ParameterError`."""
     hints, notes = _plain_hints(type(parameters)), _quantities(type(parameters))
-    values = {}
-    for name, value in parameters._asdict().items():
-        values[name] = _checked_value(name, value, hints[name], notes.get(name))
-    return parameters._replace(**values)
+    values = parameters._asdict().items()
+    return parameters._replace(
+        **{name: _checked_value(name, value, hints[name], notes.get(name)) for name, value in values}
+    )
 
 
 @functools.cache
@@ -86,12 +86,8 @@ def _plain_hints(kind: type) -> dict[str, Any]:
 
 def with_values(parameters: P, **changes: Any) -> P:
     """Return a checked copy of `parameters` with some fields changed; an unknown name is refused."""
-    unknown = sorted(set(changes) - set(parameters._fields))
-    if unknown:
-        raise ParameterError(
-            f'{unknown[0]} is no parameter of {type(parameters).__name__}; '
-            f'known are {", ".join(parameters._fields)}'
-        )
+    for name in changes:
+        check_name(type(parameters).__name__, name, parameters._fields)
     return checked(parameters._replace(**changes))
 
 

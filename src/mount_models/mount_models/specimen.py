@@ -6,31 +6,23 @@ simulated plant; two mounts of one car have two specimens.
 
 import functools
 import math
-import os
-import tempfile
 import types
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-import yaml
-
-from mount_models.actuator.law import ForceLaw
-from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
+from mount_models.actuator.law import ForceLaw, check_force_law
 from mount_models.coil.duty import Bridge
-from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
+from mount_models.coil.gap import GapCurves, check_gap_curves
 from mount_models.coil.heating import CoilHeating, check_heating
-from mount_models.coil.temperature import CompensationError, TemperatureCompensation, check_compensation
+from mount_models.coil.temperature import TemperatureCompensation, check_compensation
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_coefficients
-from mount_models.friction.contact import FrictionContact
-from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
-from mount_models.provenance import ProvenanceError, check_provenance
-from mount_models.quantity import ParameterError, Quantity, quantities
+from mount_models.friction.contact import FrictionContact, check_coefficients
+from mount_models.plain_yaml import YamlError, excerpt, plain_yaml, text_of_file
+from mount_models.provenance import check_provenance
+from mount_models.quantity import Quantity, quantities
 from mount_models.sampling import HIGHEST_CURRENT
-
-T = TypeVar('T', bound=NamedTuple)
 
 SCHEMA_VERSION = 2
 """Number of the form of specimen files; 2 since they hold a temperature compensation."""
@@ -66,7 +58,9 @@ class Specimen:
     current_limit: Annotated[
         float, Quantity('A', 'largest current of the coil', 0.1, 20.0, 'section 3.2')
     ] = HIGHEST_CURRENT
-    coil_resistance: float | None = None  # ohm at 20 degC; None: not known, so not held against the ripple
+    coil_resistance: Annotated[
+        float | None, Quantity('ohm', 'resistance of the coil at 20 degC', 0.01, 100.0)
+    ] = None  # None: not known, so not held against the ripple
     temperature: TemperatureCompensation | None = None
     heating: CoilHeating = field(default_factory=CoilHeating)
     bridge: Bridge = field(default_factory=Bridge)
@@ -113,43 +107,12 @@ def chosen_specimen(parameters_file: str, name: str = '') -> Specimen:
 
 def friction_coefficients(friction: Mapping[str, float]) -> FrictionCoefficients:
     """Return the coefficients that a specimen's `friction` gives; what is not in it keeps its default."""
-    return FrictionCoefficients(
-        **{name: value for name, value in friction.items() if name in FrictionCoefficients._fields}
-    )
+    return _named_in(friction, FrictionCoefficients)
 
 
 def friction_contact(friction: Mapping[str, float]) -> FrictionContact:
     """Return the contact that a specimen's `friction` gives; what is not in it keeps its default."""
-    return FrictionContact(
-        **{name: value for name, value in friction.items() if name in FrictionContact._fields}
-    )
-
-
-def save_specimen(specimen: Specimen, path: str | Path) -> None:
-    """Write the checked `specimen` to `path` as YAML without loss of digits, whole or not at all."""
-    text = yaml.safe_dump(
-        specimen_to_mapping(checked_specimen(specimen)), sort_keys=False, default_flow_style=None, width=110
-    )
-    target = Path(path)
-    heading = '# Specimen of the engine mount. SI units; the coefficients of force_law: see Table 1.\n'
-    with tempfile.NamedTemporaryFile(
-        'w', encoding='utf-8', dir=target.parent, prefix=f'.{target.name}.', delete=False
-    ) as file:
-        try:
-            file.write(heading + text)
-            file.flush()
-            os.fsync(file.fileno())
-            os.chmod(file.name, _READABLE)
-            os.replace(file.name, target)
-        except BaseException:
-            Path(file.name).unlink(missing_ok=True)
-            raise
-
-
-def specimen_to_mapping(specimen: Specimen) -> dict[str, Any]:
-    """Return the specimen as plain dictionaries, lists, texts and numbers."""
-    content = {entry.name: _plain(getattr(specimen, entry.name)) for entry in fields(specimen)}
-    return {'schema_version': SCHEMA_VERSION, **content}
+    return _named_in(friction, FrictionContact)
 
 
 def specimen_from_mapping(content: Any) -> Specimen:
@@ -159,48 +122,43 @@ def specimen_from_mapping(content: Any) -> Specimen:
     if isinstance(content, Mapping):
         content = {**_OPTIONAL, **content}
     values = _complete(content, ['schema_version', *hints], 'specimen')
-    del values['schema_version']
-    for name, kind in hints.items():
-        values[name] = _converted(values[name], kind, name)
-    return checked_specimen(Specimen(**values))
+    return checked_specimen(
+        Specimen(**{name: _converted(values[name], kind, name) for name, kind in hints.items()})
+    )
 
 
 def checked_specimen(specimen: Specimen) -> Specimen:
     """Return `specimen` if all values agree with their limits and each other, or raise `SpecimenError`."""
-    for name, quantity in quantities(Specimen).items():
-        _check_limits(getattr(specimen, name), quantity, name)
-    for name, quantity in quantities(ForceLaw).items():
-        value = getattr(specimen.force_law, name)
-        if isinstance(value, float):
-            _check_limits(value, quantity, f'force_law.{name}')
-    try:
-        check_force_law(specimen.force_law)
-        check_gap_curves(specimen.gap_curves)
-        if specimen.temperature is not None:
-            for name, quantity in quantities(TemperatureCompensation).items():
-                _check_limits(getattr(specimen.temperature, name), quantity, f'temperature.{name}')
-            check_compensation(specimen.temperature, specimen.gap_curves)
-    except (ForceLawRefusedError, GapCurvesRefusedError, CompensationError) as error:
-        raise SpecimenError(f'{error}') from error
-    if specimen.coil_resistance is not None:
-        _check_limits(specimen.coil_resistance, _COIL_RESISTANCE, 'coil_resistance')
-    for name, quantity in quantities(CoilHeating).items():
-        _check_limits(getattr(specimen.heating, name), quantity, f'heating.{name}')
-    _check_bridge(specimen.bridge)
-    try:
-        check_heating(specimen.heating)
-    except ParameterError as error:
-        raise SpecimenError(f'heating: {error}') from error
+    parts = {'': specimen, **{name: getattr(specimen, name) for name in _PARTS}}
+    for where, part in parts.items():
+        for name, quantity in quantities(type(part)).items():
+            _check_limits(getattr(part, name), quantity, f'{where}.{name}' if where else name)
+    _check_friction(specimen.friction)
+    compensation: list[Any] = [('', check_compensation, specimen.temperature, specimen.gap_curves)]
+    checks: list[Any] = [
+        ('', check_force_law, specimen.force_law),
+        ('', check_gap_curves, specimen.gap_curves),
+        *(compensation if specimen.temperature is not None else []),
+        ('heating: ', check_heating, specimen.heating),
+        ('friction: ', check_coefficients, friction_coefficients(specimen.friction)),
+        ('', check_provenance, specimen.provenance),
+    ]
+    for where, check, *values in checks:
+        try:
+            check(*values)
+        except ValueError as error:
+            raise SpecimenError(f'{where}{error}') from error
+    bridge = specimen.bridge
+    if not bridge.lowest_voltage <= bridge.link_voltage <= bridge.highest_voltage:
+        raise SpecimenError(
+            f'bridge.link_voltage ({bridge.link_voltage:g} V) must lie within lowest_voltage .. '
+            f'highest_voltage ({bridge.lowest_voltage:g} .. {bridge.highest_voltage:g} V); correct the range'
+        )
     if specimen.coil_resistance not in (None, specimen.heating.resistance):
         raise SpecimenError(
             f'coil_resistance ({specimen.coil_resistance:g} ohm) and heating.resistance '
             f'({specimen.heating.resistance:g} ohm) are those of one coil at 20 degC: correct one of them'
         )
-    _check_friction(specimen.friction)
-    try:
-        check_provenance(specimen.provenance)
-    except ProvenanceError as error:
-        raise SpecimenError(f'{error}; correct it or calibrate again') from error
     if specimen.current_limit > specimen.force_law.current_high:
         raise SpecimenError(
             f'current_limit ({specimen.current_limit:.2f} A) must not exceed force_law.current_high '
@@ -209,8 +167,7 @@ def checked_specimen(specimen: Specimen) -> Specimen:
     return specimen
 
 
-_READABLE = 0o644
-_COIL_RESISTANCE = Quantity('ohm', 'resistance of the coil at 20 degC', 0.01, 100.0)
+_PARTS = ('force_law', 'temperature', 'heating', 'bridge')
 _OPTIONAL = {  # not in calibrations of before
     'coil_resistance': None,
     'heating': CoilHeating()._asdict(),
@@ -228,18 +185,8 @@ def _check_version(content: Any) -> None:
     version = content.get('schema_version') if isinstance(content, Mapping) else SCHEMA_VERSION
     if version != SCHEMA_VERSION or isinstance(version, bool):
         raise SpecimenError(
-            f'schema_version ({_told(version)}) must be {SCHEMA_VERSION}; the file is of another version of '
-            'this software, or none of its specimens: calibrate again'
-        )
-
-
-def _check_bridge(bridge: Bridge) -> None:
-    for name, quantity in quantities(Bridge).items():
-        _check_limits(getattr(bridge, name), quantity, f'bridge.{name}')
-    if not bridge.lowest_voltage <= bridge.link_voltage <= bridge.highest_voltage:
-        raise SpecimenError(
-            f'bridge.link_voltage ({bridge.link_voltage:g} V) must lie within lowest_voltage .. '
-            f'highest_voltage ({bridge.lowest_voltage:g} .. {bridge.highest_voltage:g} V); correct the range'
+            f'schema_version ({excerpt(version)}) must be {SCHEMA_VERSION}; the file is of another version '
+            'of this software, or none of its specimens: calibrate again'
         )
 
 
@@ -249,18 +196,15 @@ def _check_friction(friction: Mapping[str, float]) -> None:
         if name not in known:
             raise SpecimenError(f'friction.{name} is unknown; known are {", ".join(known)}')
         _check_limits(value, known[name], f'friction.{name}')
-    try:
-        check_coefficients(friction_coefficients(friction))
-    except CoefficientsRefusedError as error:
-        raise SpecimenError(f'friction: {error}') from error
+
+
+def _named_in(values: Mapping[str, float], kind: Any) -> Any:
+    return kind(**{name: value for name, value in values.items() if name in kind._fields})
 
 
 def _complete(content: Any, names: list[str], where: str) -> dict[str, Any]:
     """Return `content` if it is a mapping with exactly these names."""
-    if not isinstance(content, Mapping):
-        raise SpecimenError(
-            f'{where} must be a mapping of names to values; instead received {_told(content)}'
-        )
+    content = _mapping(content, where)
     missing = [name for name in names if name not in content]
     unknown = [str(name) for name in content if name not in names]
     if missing or unknown:
@@ -268,7 +212,15 @@ def _complete(content: Any, names: list[str], where: str) -> dict[str, Any]:
         raise SpecimenError(
             f'{where} must hold exactly {", ".join(names)}; {fault}: correct it or calibrate again'
         )
-    return dict(content)
+    return content
+
+
+def _mapping(value: Any, where: str) -> dict[str, Any]:
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise SpecimenError(
+            f'{where} must be a mapping of names to values; instead received {excerpt(value)}'
+        )
+    return dict(value)
 
 
 def _converted(value: Any, kind: Any, where: str) -> Any:
@@ -283,19 +235,16 @@ def _converted(value: Any, kind: Any, where: str) -> Any:
         )
     if get_origin(kind) is tuple:
         if not isinstance(value, (list, tuple)) or not value:
-            raise SpecimenError(f'{where} must be a list of numbers; instead received {_told(value)}')
+            raise SpecimenError(f'{where} must be a list of numbers; instead received {excerpt(value)}')
         return tuple(_number(part, f'{where}[{k}]') for k, part in enumerate(value))
     if get_origin(kind) is dict:
-        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-            raise SpecimenError(
-                f'{where} must be a mapping of names to values; instead received {_told(value)}'
-            )
+        value = _mapping(value, where)
         if get_args(kind)[1] is float:
             return {name: _number(part, f'{where}.{name}') for name, part in value.items()}
-        return dict(value)
+        return value
     if kind is str:
         if not isinstance(value, str) or not value:
-            raise SpecimenError(f'{where} must be a text; instead received {_told(value)}')
+            raise SpecimenError(f'{where} must be a text; instead received {excerpt(value)}')
         return value
     return _number(value, where)
 
@@ -303,27 +252,13 @@ def _converted(value: Any, kind: Any, where: str) -> Any:
 def _number(value: Any, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         remedy = ' (YAML reads 1e-6 as a text: write 1.0e-6)' if isinstance(value, str) else ''
-        raise SpecimenError(f'{where} must be a finite number; instead received {_told(value)}{remedy}')
+        raise SpecimenError(f'{where} must be a finite number; instead received {excerpt(value)}{remedy}')
     return float(value)
 
 
-def _told(value: Any) -> str:
-    return repr(value) if len(repr(value)) < 60 else type(value).__name__
-
-
-def _check_limits(value: float, quantity: Quantity, where: str) -> None:
-    if not quantity.low <= value <= quantity.high:
+def _check_limits(value: Any, quantity: Quantity, where: str) -> None:
+    if isinstance(value, (int, float)) and not quantity.low <= value <= quantity.high:
         raise SpecimenError(
             f'{where} ({value:g} {quantity.unit}) must lie within {quantity.low:g} .. {quantity.high:g} '
             f'{quantity.unit}: {quantity.meaning}'
         )
-
-
-def _plain(value: Any) -> Any:
-    if hasattr(value, '_asdict'):
-        return {name: _plain(part) for name, part in value._asdict().items()}
-    if isinstance(value, Mapping):
-        return {name: _plain(part) for name, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(part) for part in value]
-    return value

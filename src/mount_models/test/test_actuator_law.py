@@ -11,15 +11,16 @@ from scipy.optimize import brentq
 from mount_models.actuator.law import (
     TABLE_1,
     CurrentOutsideLaw,
+    ForceLawRefusedError,
     ForceOutsideLaw,
     GapOutsideLaw,
+    check_force_law,
     checked_current_for_force,
     checked_force,
     coefficients,
     current_for_force,
     force,
 )
-from mount_models.actuator.law_check import ForceLawRefusedError, check_force_law
 
 UNGUARDED = TABLE_1._replace(gap_low=50e-6, gap_high=900e-6)
 

@@ -5,8 +5,9 @@ import math
 import pytest
 
 from mount_models.coil.heating import CoilHeating, check_heating, highest_current, warmed
+from mount_models.plain_yaml import yaml_in_file
 from mount_models.quantity import ParameterError
-from mount_models.specimen import default_specimen, specimen_from_mapping, specimen_to_mapping
+from mount_models.specimen import DEFAULT_SPECIMEN, default_specimen, specimen_from_mapping
 
 HEATING = CoilHeating()
 WITHOUT_COPPER = HEATING._replace(copper=0.0)
@@ -77,6 +78,6 @@ def test_temperatures_out_of_order_are_refused(changes):
 
 def test_the_shipped_specimen_has_the_defaults_and_a_file_without_them_too():
     assert default_specimen().heating == HEATING
-    content = specimen_to_mapping(default_specimen())
+    content = yaml_in_file(DEFAULT_SPECIMEN)
     del content['heating']
     assert specimen_from_mapping(content).heating == HEATING

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mount_models.damper import damper_curve
-from mount_models.damper_points import DamperError
+from mount_models.damper import DamperError, damper_curve
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError
 from mount_models.specimen import DEFAULT_SPECIMEN, SpecimenError, specimen_from_mapping

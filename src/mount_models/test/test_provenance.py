@@ -14,7 +14,6 @@ from mount_models.specimen import (
     checked_specimen,
     default_specimen,
     load_specimen,
-    save_specimen,
 )
 
 GOOD = {
@@ -45,12 +44,6 @@ def with_entry(path, value):
         inside = inside[name]
     inside[last] = value
     return replace(default_specimen(), provenance=changed)
-
-
-def test_a_good_provenance_comes_back_from_its_file(tmp_path):
-    specimen = replace(default_specimen(), provenance=GOOD)
-    save_specimen(specimen, tmp_path / 'left.yaml')
-    assert load_specimen(tmp_path / 'left.yaml').provenance == GOOD
 
 
 NONSENSE = [
@@ -100,9 +93,3 @@ def test_nonsense_written_into_the_file_by_hand_is_refused_when_it_is_loaded(tmp
     sentence = r'edited\.yaml: provenance\.parts\.friction\.residuals\.a_rms must be a finite number'
     with pytest.raises(SpecimenError, match=sentence):
         load_specimen(file)
-
-
-def test_nothing_is_written_of_a_specimen_with_nonsense(tmp_path):
-    with pytest.raises(SpecimenError):
-        save_specimen(with_entry('temperature', math.nan), tmp_path / 'left.yaml')
-    assert not list(tmp_path.iterdir())

@@ -15,9 +15,7 @@ from mount_models.specimen import (
     chosen_specimen,
     default_specimen,
     load_specimen,
-    save_specimen,
     specimen_from_mapping,
-    specimen_to_mapping,
 )
 
 DEFAULT = default_specimen()
@@ -54,26 +52,6 @@ def test_the_default_specimen_covers_the_gaps_of_new_and_worn_pads():
     high = min(DEFAULT.force_law.gap_high, curves.inductance_of_gap.high, curves.crossing_current_of_gap.high)
     assert low <= 280e-6
     assert high >= 540e-6
-
-
-def test_saving_and_loading_changes_nothing(tmp_path):
-    specimen = replace(
-        DEFAULT, name='left', friction={'b_offset': 0.1 + 0.2}, provenance={'note': 'bench, May'}
-    )
-    save_specimen(specimen, tmp_path / 'left.yaml')
-    assert load_specimen(tmp_path / 'left.yaml') == specimen
-
-
-def test_a_specimen_and_its_mapping_lead_back_to_each_other():
-    assert specimen_from_mapping(specimen_to_mapping(DEFAULT)) == DEFAULT
-
-
-def test_a_file_that_was_written_anew_is_loaded_anew(tmp_path):
-    file = tmp_path / 'specimen.yaml'
-    save_specimen(DEFAULT, file)
-    assert load_specimen(file) is load_specimen(file)
-    save_specimen(replace(DEFAULT, name='other'), file)
-    assert load_specimen(file).name == 'other'
 
 
 def test_a_specimen_cannot_be_changed_by_accident():
@@ -150,7 +128,7 @@ def leaves(content, path=()):
             yield (*path, name)
 
 
-PLAIN = {**specimen_to_mapping(DEFAULT), 'provenance': {}}
+PLAIN = {**CONTENT, 'provenance': {}}
 
 
 def with_leaf(path, change):
@@ -209,60 +187,16 @@ def test_what_changes_the_meaning_of_a_file_is_refused_with_its_line(tmp_path, a
         load_specimen(file)
 
 
-def test_a_doubtful_specimen_is_not_saved(tmp_path):
-    with pytest.raises(SpecimenError, match='turns_area'):
-        save_specimen(replace(DEFAULT, turns_area=math.nan), tmp_path / 'bad.yaml')
-    assert not (tmp_path / 'bad.yaml').exists()
-
-
-def test_a_file_for_another_specimen_is_refused(tmp_path):
-    save_specimen(replace(DEFAULT, name='left'), tmp_path / 'left.yaml')
-    assert load_specimen(tmp_path / 'left.yaml', 'left').name == 'left'
-    with pytest.raises(SpecimenError, match="is for the specimen 'left', 'right' is asked for"):
-        load_specimen(tmp_path / 'left.yaml', 'right')
-
-
 def test_the_default_specimen_is_chosen_without_a_file():
     assert chosen_specimen('') == chosen_specimen('', 'default') == DEFAULT
     with pytest.raises(SpecimenError, match=r"specimen \('a/left.yaml'\) must be a name; .* parameters_file"):
         chosen_specimen('', 'a/left.yaml')
 
 
-def test_a_specimen_without_compensation_can_be_saved_too(tmp_path):
-    plain = replace(DEFAULT, temperature=None)
-    save_specimen(plain, tmp_path / 'plain.yaml')
-    assert load_specimen(tmp_path / 'plain.yaml') == plain
-
-
 def test_a_file_that_is_no_text_is_refused(tmp_path):
     (tmp_path / 'x.yaml').write_bytes(b'name: \xff\xfe')
     with pytest.raises(SpecimenError, match='is no text'):
         load_specimen(tmp_path / 'x.yaml')
-
-
-def test_a_refused_specimen_leaves_the_file_as_it_was(tmp_path):
-    file = tmp_path / 'left.yaml'
-    save_specimen(DEFAULT, file)
-    before = file.read_bytes()
-    with pytest.raises(SpecimenError):
-        save_specimen(replace(DEFAULT, turns_area=-1.0), file)
-    assert file.read_bytes() == before
-    assert [path.name for path in tmp_path.iterdir()] == ['left.yaml']
-
-
-def test_a_disk_that_fails_leaves_the_file_as_it_was(tmp_path, monkeypatch):
-    file = tmp_path / 'left.yaml'
-    save_specimen(DEFAULT, file)
-    before = file.read_bytes()
-
-    def fails(*_):
-        raise OSError('no space left')
-
-    monkeypatch.setattr('mount_models.specimen.os.replace', fails)
-    with pytest.raises(OSError, match='no space'):
-        save_specimen(replace(DEFAULT, name='right'), file)
-    assert file.read_bytes() == before
-    assert [path.name for path in tmp_path.iterdir()] == ['left.yaml']
 
 
 def test_a_whole_number_is_taken_as_a_number():

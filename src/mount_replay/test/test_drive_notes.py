@@ -10,7 +10,6 @@ from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.nodes import CONTROL, RECORDER
 from mount_replay.drive import drive
 from mount_replay.drive.drive import DriveOrder
-from mount_sim.diagnosis import FINISHED
 from mount_sim.excitation.excitation import Excitation, Seat
 
 SENTENCE = 'the run goes on without recording: no space left'
@@ -20,17 +19,14 @@ class Graph:
     """A graph whose recorder has failed, looked at a thousand times until the simulator has finished."""
 
     def __init__(self, *_):
-        self.notes, self.restarts, self.nodes = [], [], (CONTROL,)
-        self.verdicts = SimpleNamespace()
+        self.notes, self.nodes, self.finished = [], (CONTROL,), True
+        self.reports, self.recovery = SimpleNamespace(), SimpleNamespace(restarts=[])
 
     def start(self, session, status):
         pass
 
     def interrupt(self):
         pass
-
-    def mark_setter(self, tell):
-        return lambda: None
 
     def wait_until(self, condition, limit, what):
         for _ in range(1000):
@@ -43,7 +39,7 @@ class Graph:
             return {}
         figures = ('samples', 'excitation_start_s', 'real_time_factor', 'latency_median_s', 'latency_p99_s')
         unshaken = {'beyond_range': '0', 'first_beyond_range_s': 'nan'}
-        return {'sentence': FINISHED, **unshaken, **dict.fromkeys(figures, '1')}
+        return {**unshaken, **dict.fromkeys(figures, '1')}
 
     def stop(self):
         return []

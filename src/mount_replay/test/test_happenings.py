@@ -49,71 +49,71 @@ def test_the_states_of_the_nodes_are_told_before_any_of_them_is_there(happenings
 
 def test_the_states_fit_a_line_of_80_columns_on_the_way_of_every_node(happenings):
     for node in SIMULATED:
-        happenings.state(node, 'configured')
+        happenings.on_state(node, 'configured')
     for node in SIMULATED:
-        happenings.state(node, 'activating')
+        happenings.on_state(node, 'activating')
         assert node.name.removeprefix('mount_') in happenings.states
         assert len(happenings.states) <= 80
-        happenings.state(node, 'active')
+        happenings.on_state(node, 'active')
 
 
 def test_many_nodes_are_counted_but_those_that_are_being_activated_are_named():
     nodes = of_mounts(SIMULATED, ('left', 'right'))
     happenings = Happenings(nodes, lambda text: None)
-    happenings.state(nodes[1], 'activating')
+    happenings.on_state(nodes[1], 'activating')
     assert happenings.states == 'starting: 7; activating: left/driver'
 
 
 def test_all_nodes_active_are_told_once_with_the_time_since_the_start(happenings, told, clock):
     clock.now = 3.2
     for node in SIMULATED:
-        happenings.state(node, 'active')
-    happenings.state(CONTROL, 'activating')  # lost and started again
-    happenings.state(CONTROL, 'active')
+        happenings.on_state(node, 'active')
+    happenings.on_state(CONTROL, 'activating')  # lost and started again
+    happenings.on_state(CONTROL, 'active')
     assert told == ['active     all nodes, 3.2 s after the start']
 
 
 def test_the_gap_is_told_once(happenings, told):
     for _ in range(3):
-        happenings.told('mount_init', GAPS)
+        happenings.on_report('mount_init', GAPS)
     assert told == ['gap        rest 507.9 ± 0.6 µm, contact 349.6 ± 0.4 µm, offset current 0.49 A']
     assert len(told[0]) <= 80
 
 
 def test_damping_is_told_with_times_from_the_first_displacement_sample(happenings, told):
-    happenings.told('mount_driver', DRIVER)
-    happenings.mark('', Mark(8_000_000_000, 'switch_on', 'damping on at 0.9 mm in the band'))
-    happenings.told('mount_control', off_at(7_900_000_000))  # from before the mark
-    happenings.told('mount_control', off_at(8_460_000_000))
-    happenings.told('mount_control', off_at(9_460_000_000))
+    happenings.on_report('mount_driver', DRIVER)
+    happenings.on_mark('', Mark(8_000_000_000, 'switch_on', 'damping on at 0.9 mm in the band'))
+    happenings.on_report('mount_control', off_at(7_900_000_000))  # from before the mark
+    happenings.on_report('mount_control', off_at(8_460_000_000))
+    happenings.on_report('mount_control', off_at(9_460_000_000))
     assert told == ['    1.00 s damping on at 0.9 mm in the band', '    1.46 s damping off']
 
 
 def test_the_damping_of_several_mounts_is_told_from_the_marks_of_their_common_recorder(told):
     happenings = Happenings(of_mounts(SIMULATED, ('left', 'right')), told.append)
-    happenings.told('left/mount_driver', DRIVER)
-    happenings.mark('', Mark(8_000_000_000, 'switch_on', 'left: damping on'))
-    happenings.told('right/mount_control', off_at(8_460_000_000))
+    happenings.on_report('left/mount_driver', DRIVER)
+    happenings.on_mark('', Mark(8_000_000_000, 'switch_on', 'left: damping on'))
+    happenings.on_report('right/mount_control', off_at(8_460_000_000))
     assert happenings.present == 'damping on; nothing lost'
-    happenings.told('left/mount_control', off_at(8_460_000_000))
+    happenings.on_report('left/mount_control', off_at(8_460_000_000))
     assert told == ['    1.00 s left: damping on', '    1.46 s left: damping off']
 
 
 def test_damping_that_flutters_is_summed_up(happenings, told, clock):
-    happenings.told('mount_driver', DRIVER)
+    happenings.on_report('mount_driver', DRIVER)
     for switch in range(200):
         clock.now = 0.05 * switch
         stamp = 8_000_000_000 + 50_000_000 * switch
-        happenings.mark('', Mark(stamp, 'switch_on', 'damping on'))
-        happenings.told('mount_control', off_at(stamp + 20_000_000))
+        happenings.on_mark('', Mark(stamp, 'switch_on', 'damping on'))
+        happenings.on_report('mount_control', off_at(stamp + 20_000_000))
     assert 10 < len(told) < 17
     assert 'more since the line before' in told[-1]
     assert happenings.present == 'damping off, switched on 200 times; nothing lost'
 
 
 def test_losses_are_counted_over_the_nodes(happenings):
-    happenings.told('mount_driver', DRIVER | {'lost': '3'})
-    happenings.told('mount_recorder', {'level': '0', 'sentence': 'recording', 'lost': '4'})
+    happenings.on_report('mount_driver', DRIVER | {'lost': '3'})
+    happenings.on_report('mount_recorder', {'level': '0', 'sentence': 'recording', 'lost': '4'})
     assert happenings.present == 'no damping yet; 7 samples or messages lost'
 
 
@@ -121,28 +121,28 @@ def test_samples_that_are_missing_between_the_stamps_are_lost_and_counted_once(t
     happenings = Happenings(of_mounts(SIMULATED, ('left', 'right')), told.append)
     missing = {'missing./left/displacement': '5', 'missing./right/displacement': '0'}
     missing |= {'missing./left/coil_ripple': '5', 'missing./left/control_trace': '90'}
-    happenings.told('left/mount_driver', DRIVER | {'lost': '3'})
-    happenings.told('left/mount_control', off_at(7_500_000_000) | {'bridged': '4'})
-    happenings.told('mount_recorder', {'level': '1', 'sentence': 'missing', 'lost': '0'} | missing)
+    happenings.on_report('left/mount_driver', DRIVER | {'lost': '3'})
+    happenings.on_report('left/mount_control', off_at(7_500_000_000) | {'bridged': '4'})
+    happenings.on_report('mount_recorder', {'level': '1', 'sentence': 'missing', 'lost': '0'} | missing)
     assert happenings.present == 'no damping yet; 5 samples or messages lost'
 
 
 def test_a_warning_is_told_when_it_begins_and_not_with_each_count(happenings, told, clock):
-    happenings.told('mount_driver', DRIVER | {'level': '1', 'sentence': 'is mount_control active?'})
+    happenings.on_report('mount_driver', DRIVER | {'level': '1', 'sentence': 'is mount_control active?'})
     for node in SIMULATED:
-        happenings.state(node, 'active')
+        happenings.on_state(node, 'active')
     assert told == ['active     all nodes, 0.0 s after the start']  # before that it may rightly complain
     clock.now = 1.0
     told.clear()
     for lost in range(20):
-        happenings.told('mount_driver', DRIVER | {'level': '1', 'sentence': f'{lost} samples lost'})
-    happenings.told('mount_driver', DRIVER | {'level': '2', 'sentence': 'the coil is open'})
+        happenings.on_report('mount_driver', DRIVER | {'level': '1', 'sentence': f'{lost} samples lost'})
+    happenings.on_report('mount_driver', DRIVER | {'level': '2', 'sentence': 'the coil is open'})
     assert told == ['warning    driver: 0 samples lost', 'warning    driver: the coil is open']
 
 
 def test_marks_by_hand_are_left_to_the_answer_of_the_recorder(happenings, told):
-    happenings.mark('left', Mark(8_000_000_000, BY_HAND))
-    happenings.mark('left', Mark(8_000_000_000, 'lost_sample', '/displacement: 1 sample missing'))
+    happenings.on_mark('left', Mark(8_000_000_000, BY_HAND))
+    happenings.on_mark('left', Mark(8_000_000_000, 'lost_sample', '/displacement: 1 sample missing'))
     assert told == ['           left: /displacement: 1 sample missing']
 
 

@@ -12,11 +12,11 @@ from engine_mount.recordings.run.folder import RunFolder
 from engine_mount.recordings.run.place import open_run
 from engine_mount.recordings.run.session import session_parameters
 from engine_mount.recordings.run.told import duration_of, started_of, told_session
-from mount_bringup.recorded_mount import simulated_mounts
 from mount_recorder.metadata import METADATA_NAME
 from mount_signals.sources.local import local_path
 from mount_signals.sources.source import SourceError
 from mount_signals.sources.stores import is_local, outline
+from mount_sim.mount_choice import simulated_mounts
 
 _SOUND = 'nothing lost, no faults'
 _COUNTS = {

@@ -7,7 +7,6 @@ import numpy as np
 from engine_mount.recordings.container.scratch import kept
 from engine_mount.recordings.run.session import SessionError, session_content, session_parameters
 from mount_bringup.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
-from mount_bringup.mount_choice import seat_of
 from mount_control.policy.contract import Policy
 from mount_models.quantity import with_flattened
 from mount_report.drawing.style import COLOUR_OF
@@ -18,6 +17,7 @@ from mount_report.sections.charts import Levels
 from mount_report.sections.subject import RunFacts, Tracking, WithoutDamping
 from mount_report.signals import Signals
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
+from mount_sim.mount_choice import seat_of
 from mount_sim.plant.mounts import without_friction
 from mount_sim.plant.ripple import RippleCoil
 

@@ -1,6 +1,8 @@
 """Direct delivery within a process: in the sender's thread, once, published besides, never after the end."""
 
+import sys
 import threading
+import types
 
 import pytest
 from rclpy.node import Node
@@ -144,3 +146,22 @@ def test_a_sender_that_has_ended_leaves_the_topic_to_the_middleware(make_path, c
     send = stranger.sender(DISPLACEMENT)
     wait_until(lambda: not receiver.unmatched() and not stranger.unmatched(), 'connection')
     wait_until(lambda: (send(sample(9)), taken.stamps)[1], 'the message')
+
+
+def test_one_function_hands_a_message_over_and_a_lone_sender_publishes_without_any(make_path, context):
+    thread, calls = DataThread(context), []
+    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
+    send = sender.sender(DISPLACEMENT)
+
+    def take(raw):
+        sys.setprofile(None)
+
+    message = sample(1)
+    receiver.subscribe(DISPLACEMENT, take, directly=True)
+    sys.setprofile(lambda frame, event, _: event == 'call' and calls.append(frame.f_code.co_name))
+    try:
+        send(message)
+    finally:
+        sys.setprofile(None)
+    assert calls == ['send', 'receive', 'take']
+    assert not isinstance(make_path('lone', None).sender(DISPLACEMENT), types.FunctionType)

@@ -27,6 +27,7 @@ def say(node, what):
 class Probe(SafeLifecycleNode):
     def __init__(self):
         super().__init__(next(names))
+        {in_creation}
         self.create_timer(0.01, self._first_turn)
         self.trigger_configure()
         self.trigger_activate()
@@ -54,8 +55,12 @@ print('over', flush=True)
 class Process:
     """A process with some nodes; `lines` are what it has said."""
 
-    def __init__(self, domain, count, in_service='pass', at_the_end='pass', environment=None):
-        program = PROGRAM.format(count=count, in_service=in_service, at_the_end=at_the_end)
+    def __init__(
+        self, domain, count, in_service='pass', at_the_end='pass', in_creation='pass', environment=None
+    ):
+        program = PROGRAM.format(
+            count=count, in_service=in_service, at_the_end=at_the_end, in_creation=in_creation
+        )
         self._process = subprocess.Popen(
             [sys.executable, '-c', program],
             env={**os.environ, 'ROS_DOMAIN_ID': str(domain), **(environment or {})},
@@ -78,8 +83,11 @@ class Process:
             limit.cancel()
         pytest.fail(f'{wanted - set(self.lines)} not said; {self._process.stderr.read()}')
 
-    def end(self, number=None, times=1):
+    def end(self, number=None, times=1, until_the_end=False):
         """Return exit code and errors after a signal, or after nothing if it ends on its own."""
+        while until_the_end and self._process.poll() is None:
+            self._process.send_signal(number)
+            time.sleep(0.001)
         if number is not None:
             for _ in range(times):
                 self._process.send_signal(number)
@@ -153,6 +161,23 @@ def test_a_burst_of_signals_ends_the_process_as_one_does(start):
     process = start(1)
     process.wait_for('one served')
     code, errors = process.end(signal.SIGINT, times=300)
+    assert (code, errors) == (0, '')
+    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
+
+
+def test_signals_until_the_process_has_ended_change_nothing(start):
+    """Also those that come while the interpreter ends."""
+    process = start(1)
+    process.wait_for('one served')
+    code, errors = process.end(signal.SIGINT, until_the_end=True)
+    assert (code, errors) == (0, '')
+    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
+
+
+def test_a_signal_while_the_nodes_are_made_ends_them_in_order(start):
+    process = start(1, in_creation="say(self, 'is made'); import time; time.sleep(0.5)")
+    process.wait_for('one is made')
+    code, errors = process.end(signal.SIGINT)
     assert (code, errors) == (0, '')
     assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 from mount_sim.loop import LoopFigures
+from mount_sim.plant.places import ALONE
 from mount_sim.plant.simulated_mount import FARTHEST_DISPLACEMENT, Run
 
 DRIVING, FINISHED = 'driving', 'finished'
@@ -30,11 +31,41 @@ def counted(figures: LoopFigures) -> Counted:
 _NOTHING = Counted()
 
 
-def verdict(figures: LoopFigures, run: Run, earlier: Counted = _NOTHING, *, lockstep: bool) -> Verdict:
-    """Return level and sentence; the figures carry the progress of the run.
+def verdict(
+    figures: Mapping[str, LoopFigures], run: Run, earlier: Mapping[str, Counted], *, lockstep: bool
+) -> Verdict:
+    """Return level, sentence and figures, which carry the progress of the run.
 
-    `earlier` is what had been counted a window ago, or in the beginning.
+    `earlier` are the counts of a window ago, or of the beginning. Of several mounts the worst counts, with
+    its name, and each has figures such as `left.answered`; of common figures that of the mount with the
+    fewest samples or the greatest latency counts.
     """
+    verdicts = {
+        name: _mount_verdict(each, run, earlier.get(name, _NOTHING), lockstep=lockstep)
+        for name, each in figures.items()
+    }
+    if ALONE in verdicts:
+        return verdicts[ALONE]
+    last = min(verdicts.values(), key=lambda each: int(str(each.figures['samples'])))
+    values = dict(last.figures)
+    for name, each in verdicts.items():
+        values |= {f'{name}.{key}': each.figures[key] for key in _OF_EACH}
+    values['answered'] = sum(each.answered for each in figures.values())
+    for key in ('latency_median_s', 'latency_p99_s'):
+        values[key] = max(str(each.figures[key]) for each in verdicts.values())
+    beyond = [each.beyond_range for each in figures.values() if each.beyond_range.samples]
+    values['beyond_range'] = sum(each.samples for each in beyond)
+    values['first_beyond_range_s'] = f'{min((each.first for each in beyond), default=math.nan):.3f}'
+    name, worst = max(verdicts.items(), key=lambda item: item[1].level)
+    if worst.level is Level.OK or worst.figures['fatal']:
+        return Verdict(worst.level, worst.sentence if worst.figures['fatal'] else last.sentence, values)
+    named = [
+        Finding(each.level, f'{name}: {each.name}', f'{name}: {each.sentence}') for each in worst.findings
+    ]
+    return verdict_on(named, '', values)
+
+
+def _mount_verdict(figures: LoopFigures, run: Run, earlier: Counted, *, lockstep: bool) -> Verdict:
     samples = figures.samples  # goes on while this is written
     simulated = samples / run.sample_rate
     values = {
@@ -73,36 +104,6 @@ def _warnings(figures: LoopFigures, earlier: Counted, lockstep: bool) -> list[Fi
         )
         found.append(Finding(Level.WARN, 'late', sentence))
     return found
-
-
-def car_verdict(
-    figures: Mapping[str, LoopFigures], run: Run, earlier: Mapping[str, Counted], *, lockstep: bool
-) -> Verdict:
-    """Return the verdict on several mounts: the worst of them by name, and their figures as `left.answered`.
-
-    Of common figures that of the mount with the fewest samples or the greatest latency counts.
-    """
-    verdicts = {
-        name: verdict(each, run, earlier.get(name, _NOTHING), lockstep=lockstep)
-        for name, each in figures.items()
-    }
-    last = min(verdicts.values(), key=lambda each: int(str(each.figures['samples'])))
-    values = dict(last.figures)
-    for name, each in verdicts.items():
-        values |= {f'{name}.{key}': each.figures[key] for key in _OF_EACH}
-    values['answered'] = sum(each.answered for each in figures.values())
-    for key in ('latency_median_s', 'latency_p99_s'):
-        values[key] = max(str(each.figures[key]) for each in verdicts.values())
-    beyond = [each.beyond_range for each in figures.values() if each.beyond_range.samples]
-    values['beyond_range'] = sum(each.samples for each in beyond)
-    values['first_beyond_range_s'] = f'{min((each.first for each in beyond), default=math.nan):.3f}'
-    name, worst = max(verdicts.items(), key=lambda item: item[1].level)
-    if worst.level is Level.OK or worst.figures['fatal']:
-        return Verdict(worst.level, worst.sentence if worst.figures['fatal'] else last.sentence, values)
-    named = [
-        Finding(each.level, f'{name}: {each.name}', f'{name}: {each.sentence}') for each in worst.findings
-    ]
-    return verdict_on(named, '', values)
 
 
 def beyond_range_sentence(samples: int, first: float) -> str:

@@ -1,44 +1,23 @@
-"""The simulated electronics at work on the bus: in real time, or in lock-step with the answers."""
+"""The simulated electronics of one mount on its bus: samples out, setpoints in, the plant moved on."""
 
 import math
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from mount_driver.codec import Status
+from mount_driver.protocol import Status
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import ElectronicsParameters, status_every
-from mount_sim.plant.simulated_car import CarMount
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
-
-LOCKSTEP_WAIT = 0.1
-"""Seconds: how often a loop in lock-step looks whether it shall end."""
 
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
 _DISCHARGED = 0.01  # A, chosen: a coil with less carries no current
-_DISCHARGE_LIMIT = 0.1  # s, chosen: the setpoint timeout, then several times what a sound coil needs
-
-_FORGOTTEN = 0.01  # chosen: of the longest time that the work took, from one sample to the next
-_RESERVE = 1.5  # chosen: times the work's longest time are kept for it
 
 
 class NoAnswerError(RuntimeError):
     """In lock-step a sample was not answered in time."""
-
-
-def until_ending(ending: threading.Event, discharged: Callable[[], bool]) -> Iterator[None]:
-    """Yield for each sample until `ending` is set and the coils are `discharged`, or 0.1 s after `ending`.
-
-    Electronics outlive the graph: its last setpoint is followed, and the truth shows that the current goes.
-    """
-    while not ending.is_set():
-        yield
-    limit = time.monotonic() + _DISCHARGE_LIMIT
-    while not discharged() and time.monotonic() < limit:
-        yield
 
 
 @dataclass
@@ -54,35 +33,12 @@ class LoopFigures:
     beyond_range: BeyondRange = field(default_factory=BeyondRange)
 
 
-class OwnWork:
-    """How long the simulator's own work on a sample takes, which waits until the graph has answered.
-
-    Electronics have a processor of their own; with two of them the simulator would take one from the graph.
-    """
-
-    def __init__(self, longest: float):
-        """`longest` in s: what is to be expected at first."""
-        self._longest = longest
-        self._begin = 0.0
-
-    def latest_begin(self, end: float) -> float:
-        """Return when it must begin so that it is done at `end` (s)."""
-        return end - _RESERVE * self._longest
-
-    def __enter__(self) -> None:
-        self._begin = time.monotonic()
-
-    def __exit__(self, *_: object) -> None:
-        taken = time.monotonic() - self._begin
-        self._longest = max(taken, (1.0 - _FORGOTTEN) * self._longest)
-
-
 class ElectronicsLoop:
     """Measures, sends, lets the plant go on, takes setpoints over; `publish` shows each sample's truth."""
 
     def __init__(
         self,
-        mount: SimulatedMount | CarMount,
+        mount: SimulatedMount,
         can_end: CanEnd,
         electronics: ElectronicsParameters,
         publish: Callable[[int], None],
@@ -103,27 +59,6 @@ class ElectronicsLoop:
         self._beyond_told = 0  # samples beyond the sensor's range, when the last status was sent
         self.figures = LoopFigures(beyond_range=mount.beyond_range)
         self.last_latency = math.nan
-
-    def run_in_real_time(self, ending: threading.Event) -> None:
-        """Sample by the electronics' clock until `ending` is set and the coil is discharged.
-
-        So it goes on behind the end of the run: electronics do not fall silent when a drive is over; if they
-        did, the control would rightly report it.
-        """
-        period = 1.0 / self._mount.sample_rate / (1.0 + self._electronics.clock_drift)
-        own = OwnWork(period)
-        begin = time.monotonic()
-        for _ in until_ending(ending, self.discharged):
-            self.send_sample()
-            self.wait_for_answer(own.latest_begin(begin + (self._mount.sample + 1) * period))
-            with own:
-                self.go_on()
-            self.figures.wall_time = time.monotonic() - begin
-            remaining = begin + self._mount.sample * period - time.monotonic()
-            if remaining > 0.0:
-                time.sleep(remaining)
-            else:
-                self.figures.overruns += 1  # the next sample follows at once: none is skipped
 
     def step_in_real_time(self) -> None:
         """Take the next sample with the newest setpoint, whether or not one has come."""
@@ -147,11 +82,6 @@ class ElectronicsLoop:
         self._publish(self._mount.sample)
         self._mount.advance(*self._taken)
         self.figures.samples += 1
-
-    def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
-        """Sample as fast as the answers come; raise `NoAnswerError` after `patience` s without one."""
-        while not self.finished and not ending.is_set():
-            self.step_in_lockstep(patience, LOCKSTEP_WAIT)
 
     def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
         """Take the next sample if the last one is answered within `wait` s; return whether it was.

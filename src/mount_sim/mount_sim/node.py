@@ -27,20 +27,18 @@ from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import LoopTiming, RealTimeThreads
 from mount_ros.private_rclpy import given_at_start
 from mount_sim.car_loop import CarLoop
-from mount_sim.diagnosis import Counted, car_verdict, counted, verdict
+from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.faults.schedule import Faults, injected_faults, texts_of_mount
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.electronics.faults.schedule import injected_faults, texts_of_mount
+from mount_sim.excitation.building import build_excitation
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import NodeParameters, SimParameters
-from mount_sim.plant.places import general_name, mount_names, values_of_mount
-from mount_sim.plant.simulated_car import CarMount, SimulatedCar, mount_parameters
+from mount_sim.plant.places import ALONE, general_name, mount_names, values_of_mount
+from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
 
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
-
-_ALONE = ''  # name of the mount where there is one
 
 
 class MountSim(SafeLifecycleNode):
@@ -58,7 +56,7 @@ class MountSim(SafeLifecycleNode):
         self._own = _declare_own(self)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
-        self._loop: ElectronicsLoop | CarLoop | None = None
+        self._loop: CarLoop | None = None
         self._loops: dict[str, ElectronicsLoop] = {}
         self._can_ends: list[CanEnd] = []
         self._counted: SlidingWindow[dict[str, Counted]] = SlidingWindow({})
@@ -68,7 +66,7 @@ class MountSim(SafeLifecycleNode):
         self._values: dict[str, Any] = flattened(self._settings)
         for name in ('channel', 'port', *self._own):
             self._values[name] = self.get_parameter(name).value
-        self._names = mount_names(self._settings.mounts) or (_ALONE,)
+        self._names = mount_names(self._settings.mounts) or (ALONE,)
         with compilation_told(self.get_logger().info):
             self._excitation = build_excitation(self._settings)
             self._prepare_mounts()
@@ -92,7 +90,7 @@ class MountSim(SafeLifecycleNode):
                 partial(self._publish, name),
             )
         drift = self._settings.electronics.clock_drift
-        self._loop = self._loops.get(_ALONE) or CarLoop(self._loops, drift, self._settings.sample_rate)
+        self._loop = CarLoop(self._loops, drift, self._settings.sample_rate)
         self._counted = SlidingWindow({})
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
@@ -122,9 +120,7 @@ class MountSim(SafeLifecycleNode):
         run = next(iter(self._mounts.values())).run
         now = {name: counted(each) for name, each in figures.items()}
         earlier = self._counted.earlier(time.monotonic(), now)
-        if _ALONE in figures:
-            return verdict(figures[_ALONE], run, earlier.get(_ALONE, Counted()), lockstep=self.lockstep)
-        return car_verdict(figures, run, earlier, lockstep=self.lockstep)
+        return verdict(figures, run, earlier, lockstep=self.lockstep)
 
     def _injected(self, text: str) -> dict[str, str]:
         """Return the faults to inject by mount."""
@@ -139,7 +135,7 @@ class MountSim(SafeLifecycleNode):
             told = self._injected(str(self.get_parameter(INJECT).value))
             said = []
             for name, mount in self._mounts.items():
-                if told[name] or not request.data or name == _ALONE:
+                if told[name] or not request.data or name == ALONE:
                     what = mount.faults.inject(told[name]) if request.data else mount.faults.end_injected()
                     said.append(f'{name}: {what}' if name else what)
             response.message, response.success = '; '.join(said), True
@@ -172,15 +168,8 @@ class MountSim(SafeLifecycleNode):
             mount.measure()  # a rehearsal: loads the compiled plant before simulated time begins
             mount.advance(0.0)
 
-    def _simulated(self, faults: Sequence[str]) -> dict[str, SimulatedMount | CarMount]:
-        if _ALONE in self._names:
-            settings = self._settings
-            present = Faults(faults, settings.seed, settings.sample_rate)
-            mount = SimulatedMount(
-                settings.plant, self._excitation, settings.seed, present, settings.sample_rate
-            )
-            return {_ALONE: mount}
-        return {**SimulatedCar({**self._values, 'faults': faults}, self._excitation).mounts}
+    def _simulated(self, faults: Sequence[str]) -> dict[str, SimulatedMount]:
+        return SimulatedCar({**self._values, 'faults': faults}, self._excitation).mounts
 
     def _run(self) -> None:
         assert self._loop is not None

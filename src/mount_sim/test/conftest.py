@@ -1,18 +1,24 @@
 """What the tests share: simulated mounts by their parameters, and runs of them."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mount_models.arithmetic.series import series_of
-from mount_models.quantity import with_flattened
-from mount_sim.electronics.faults.schedule import Faults
-from mount_sim.excitation.scenario import build_excitation
+from mount_models.quantity import flattened, with_flattened
+from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.places import ALONE
+from mount_sim.plant.simulated_car import SimulatedCar
 from mount_sim.plant.simulated_mount import SimulatedMount
+
+# The tests are imported one by one (importmode importlib); what they share is found by this path.
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 def sim_parameters(**changes: Any) -> SimParameters:
@@ -42,8 +48,7 @@ def make_mount() -> Callable[..., SimulatedMount]:
             values = excitation.values[:]
             spoil(values)
             excitation = replace(excitation, values=series_of(values))
-        faults = Faults(chosen.faults, chosen.seed)
-        return SimulatedMount(chosen.plant, excitation, chosen.seed, faults)
+        return SimulatedCar(flattened(chosen), excitation).mounts[ALONE]
 
     return make
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from mount_models.quantity import ParameterError, with_flattened
-from mount_sim.excitation.scenario import build_excitation
+from mount_models.quantity import ParameterError
+from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.car_check import growth
-from mount_sim.plant.places import PLACES, general_name, mount_names, values_of_mount
+from mount_sim.plant.places import ALONE, PLACES, general_name, mount_names, values_of_mount
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
-from mount_sim.plant.simulated_mount import SimulatedMount
 
 STIFF = {
     'mounts': ','.join(PLACES),
@@ -47,8 +46,7 @@ def pulses(_, sample):
 def test_two_mounts_beside_the_engine_do_what_one_does_under_its_share(scenario):
     changes = {**SHORT, 'scenario': scenario}
     truths, _ = drive(car(scenario=scenario), pulses)
-    parameters = with_flattened(SimParameters(), changes)
-    alone = SimulatedMount(parameters.plant, build_excitation(parameters), parameters.seed)
+    alone = car(**changes, mounts='').mounts[ALONE]
     expected = []
     while not alone.finished:
         alone.measure()
@@ -125,7 +123,7 @@ def test_what_does_not_fit_together_is_refused(changes, words):
 
 def test_the_default_car_is_stable_and_the_step_is_the_limit():
     simulated = car()
-    memory, seat = simulated._car.memory, build_excitation(mount_parameters(SHORT)).seat
+    memory, seat = simulated._plant.memory, build_excitation(mount_parameters(SHORT)).seat
     assert growth(memory, seat, 5e-5) <= 1.0 + 1e-6
     assert growth(memory, seat, 2e-2) > 1.01
 

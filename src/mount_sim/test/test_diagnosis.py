@@ -3,8 +3,9 @@
 import pytest
 
 from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
-from mount_sim.diagnosis import DRIVING, FINISHED, Counted, car_verdict, counted, verdict
+from mount_sim.diagnosis import DRIVING, FINISHED, Counted, counted, verdict
 from mount_sim.loop import LoopFigures
+from mount_sim.plant.places import ALONE
 from mount_sim.plant.simulated_mount import BeyondRange, Run
 
 RUN = Run(samples=20_000, excitation_start=5000)
@@ -12,7 +13,7 @@ RUN = Run(samples=20_000, excitation_start=5000)
 
 def _judged(lockstep=False, **changes):
     figures = LoopFigures(**{'samples': 4000, 'answered': 3990, 'wall_time': 2.0, **changes})
-    return verdict(figures, RUN, lockstep=lockstep)
+    return verdict({ALONE: figures}, RUN, {}, lockstep=lockstep)
 
 
 def test_under_way_and_finished():
@@ -78,8 +79,9 @@ def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(
         value = found if count == 'overruns' else BeyondRange(found, 5.0)
         figures = {'left': LoopFigures(samples=100 * tenth, **{count: value}), 'right': LoopFigures()}
         earlier = window.earlier(tenth / 10, {name: counted(each) for name, each in figures.items()})
-        verdict_told = standing.keep(car_verdict(figures, run, earlier, lockstep=False))
-        alone = verdict(figures['left'], run, earlier.get('left', Counted()), lockstep=False)
+        verdict_told = standing.keep(verdict(figures, run, earlier, lockstep=False))
+        before = {ALONE: earlier.get('left', Counted())}
+        alone = verdict({ALONE: figures['left']}, run, before, lockstep=False)
         assert alone.level is verdict_told.level
         told.append((verdict_told.level, verdict_told.sentence))
     warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]

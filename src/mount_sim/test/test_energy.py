@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from energy import ACCOUNT, LOSSES, book_step, imbalance, new_account
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,7 +11,6 @@ from mount_models.arithmetic.record import record_type
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
-from mount_sim.plant.energy import ACCOUNT, LOSSES, book_step, imbalance, new_account
 from mount_sim.plant.friction import full_response, full_step
 from mount_sim.plant.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_sim.plant.vehicle import VEHICLE_STATE, Vehicle, vehicle_step

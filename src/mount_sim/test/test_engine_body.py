@@ -171,7 +171,7 @@ def test_a_motion_without_stiffness_has_no_frequency():
 
 
 def energy_and_losses(supports, road, forces):
-    """Return (work put in, energy stored, energy lost) at each step, J, as in `mount_sim.plant.energy`."""
+    """Return (work put in, energy stored, energy lost) at each step, J, as in `energy.py`."""
     vehicle, engine, records = record(VEHICLE)[0], record(ENGINE)[0], support_records(supports)
     body, states = resting_body(), resting_supports(len(supports))
     works, stored, lost = [0.0], [], [0.0]

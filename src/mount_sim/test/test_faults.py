@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mount_driver.can_library import can
-from mount_driver.codec import MountCodec, Status
+from mount_driver.protocol import MountCodec, Status
 from mount_models.quantity import ParameterError
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import Reading

@@ -8,8 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_friction
-from mount_models.friction.contact import FrictionContact
+from mount_models.friction.contact import CoefficientsRefusedError, FrictionContact, check_friction
 from mount_models.friction.simplified import simplified_response
 from mount_models.quantity import quantities, with_values
 from mount_sim.plant.friction import full_response, full_step

@@ -7,12 +7,11 @@ import itertools
 
 import pytest
 
-from mount_driver.bus import open_bus
+from mount_driver.bus import Frame, open_bus
 from mount_driver.clock import ElectronicsClock
-from mount_driver.codec import MountCodec, Setpoint
 from mount_driver.exchange import Exchange
-from mount_driver.frame import Frame
 from mount_driver.parameters import DriverParameters
+from mount_driver.protocol import MountCodec, Setpoint
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters
 from mount_sim.loop import ElectronicsLoop

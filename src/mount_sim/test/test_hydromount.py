@@ -2,19 +2,20 @@
 
 import numpy as np
 import pytest
+from energy import upper_energy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from stiffness import dynamic_stiffness
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.quantity import checked, quantities
-from mount_sim.plant.elastomer import Elastomer, dynamic_stiffness
+from mount_sim.plant.elastomer import Elastomer
 from mount_sim.plant.hydromount import (
     HYDROMOUNT_STATE,
     Hydromount,
     decoupler_overrun,
     hydromount_force,
     hydromount_step,
-    upper_energy,
     upper_pressure,
 )
 

@@ -10,11 +10,11 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from mount_driver.bus import Frame
 from mount_driver.clock import ElectronicsClock
-from mount_driver.codec import MountCodec
 from mount_driver.exchange import Exchange
-from mount_driver.frame import Frame
 from mount_driver.parameters import DriverParameters
+from mount_driver.protocol import MountCodec
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters

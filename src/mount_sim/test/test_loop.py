@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from mount_driver.can_library import can
-from mount_driver.codec import MountCodec, Setpoint
-from mount_driver.e2e_receiver import AliveCounter
+from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
 from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
+from mount_sim.car_loop import CarLoop, until_ending
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters, Reading
-from mount_sim.loop import ElectronicsLoop, NoAnswerError, until_ending
+from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.plant.simulated_mount import DivergedError
 
 CODEC = MountCodec()
@@ -85,6 +85,11 @@ def _loop(mount, end, published=None, **electronics):
     parameters = ElectronicsParameters(**electronics)
     publish = (published if published is not None else []).append
     return ElectronicsLoop(mount, end, parameters, publish)
+
+
+def _car(loop):
+    """Electronics of one mount alone."""
+    return CarLoop({'': loop}, 0.0, 1000.0)
 
 
 def _in_thread(target, *arguments):
@@ -199,7 +204,7 @@ def test_in_lock_step_each_sample_waits_for_its_answer(ends, make_mount):
     mount, published = make_mount(), []
     loop = _loop(mount, end, published=published)
     answering = _in_thread(host.answer_each, 300, lambda sample: 0.001 * sample.sample_counter)
-    loop.run_in_lockstep(threading.Event(), LIMIT)
+    _car(loop).run_in_lockstep(threading.Event(), LIMIT)
     answering.join()
     assert mount.finished
     assert published == list(range(300))
@@ -223,7 +228,7 @@ def test_lock_step_over_the_bus_equals_plain_function_calls(ends, make_mount):
         lambda number: truths.append(over_bus.truth_bytes),
     )
     answering = _in_thread(host.answer_each, 300, lambda sample: 1.0)
-    loop.run_in_lockstep(threading.Event(), LIMIT)
+    _car(loop).run_in_lockstep(threading.Event(), LIMIT)
     answering.join()
     plain, answer = make_mount(), None
     for number in range(300):
@@ -238,7 +243,7 @@ def test_an_answer_that_does_not_come_ends_the_run_and_names_the_sample(ends, ma
     loop = _loop(make_mount(), end)
     answering = _in_thread(host.answer_each, 20, lambda sample: 0.0)
     with pytest.raises(NoAnswerError, match=r'sample 20 \(0\.020 s\) was not answered within 0\.5 s'):
-        loop.run_in_lockstep(threading.Event(), 0.5)
+        _car(loop).run_in_lockstep(threading.Event(), 0.5)
     answering.join()
     assert loop.figures.samples == 21
 
@@ -246,7 +251,7 @@ def test_an_answer_that_does_not_come_ends_the_run_and_names_the_sample(ends, ma
 def test_the_first_sample_waits_for_whoever_answers_it(ends, make_mount):
     end, host = ends
     loop, ending = _loop(make_mount(), end), threading.Event()
-    running = _in_thread(loop.run_in_lockstep, ending, 0.0)  # no patience at all
+    running = _in_thread(_car(loop).run_in_lockstep, ending, 0.0)  # no patience at all
     assert host.receive() is not None
     running.join(0.7)
     assert running.is_alive()
@@ -278,7 +283,7 @@ def test_a_mount_beyond_the_range_of_its_sensor_goes_on_and_is_told(ends, make_m
     mount = make_mount(lambda values: np.multiply(values, 80.0, out=values))  # to 80 mm
     loop = _loop(mount, end)
     answering = _in_thread(host.answer_each, 300, lambda sample: 0.0)
-    loop.run_in_lockstep(threading.Event(), LIMIT)
+    _car(loop).run_in_lockstep(threading.Event(), LIMIT)
     answering.join()
     assert loop.figures.samples == 300
     invalid = [sample.sample_counter for sample in host.samples if math.isnan(sample.displacement)]
@@ -295,7 +300,7 @@ def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(ends, make_mount
     loop = _loop(mount, end)
     answering = _in_thread(host.answer_each, 21, lambda sample: 0.0)
     with pytest.raises(DivergedError, match=r'has diverged: at 0\.021 s not all of its state is a finite'):
-        loop.run_in_lockstep(threading.Event(), LIMIT)
+        _car(loop).run_in_lockstep(threading.Event(), LIMIT)
     answering.join()
 
 
@@ -387,7 +392,7 @@ def test_a_deaf_end_switches_off_on_its_own_and_says_so(ends, make_mount):
     mount = make_mount(faults=('deaf@0',))
     answering = _in_thread(host.answer_each, 300, lambda sample: 1.0)
     loop = _loop(mount, end)
-    loop.run_in_lockstep(threading.Event(), LIMIT)
+    _car(loop).run_in_lockstep(threading.Event(), LIMIT)
     answering.join()
     assert mount.truth['coil_current'] == 0.0
     assert [sample.enabled for sample in host.samples] == [True] * 20 + [False] * 280
@@ -400,7 +405,7 @@ def test_a_frame_that_switches_off_brings_0_ampere_in_real_time(ends, make_mount
     end, host = ends
     mount, ending = make_mount(timeline__duration=20.0), threading.Event()
     loop = _loop(mount, end)
-    running = _in_thread(loop.run_in_real_time, ending)
+    running = _in_thread(_car(loop).run_in_real_time, ending)
     try:
         sample = _next_sample(host)
         while mount.truth['coil_current'] < 0.5:
@@ -418,7 +423,7 @@ def test_a_frame_that_switches_off_brings_0_ampere_in_real_time(ends, make_mount
 def test_electronics_that_are_asked_to_end_in_real_time_go_on_until_the_coil_is_discharged(ends, make_mount):
     end, host = ends
     mount, ending = make_mount(timeline__duration=20.0), threading.Event()
-    running = _in_thread(_loop(mount, end).run_in_real_time, ending)
+    running = _in_thread(_car(_loop(mount, end)).run_in_real_time, ending)
     try:
         sample = _next_sample(host)
         while mount.truth['coil_current'] < 0.5:
@@ -449,7 +454,7 @@ def test_in_real_time_the_electronics_sample_by_their_clock_behind_the_end_of_th
     end, host = ends
     mount, ending = make_mount(timeline__duration=0.2), threading.Event()
     loop = _loop(mount, end)
-    running = _in_thread(loop.run_in_real_time, ending)
+    running = _in_thread(_car(loop).run_in_real_time, ending)
     try:
         while len(host.samples) < 300:
             assert running.is_alive()

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from energy import LOSSES, Books, imbalance
+from stiffness import dynamic_stiffness
 
 from mount_models.quantity import ParameterError
 from mount_sim.electronics.electronics import Noise
-from mount_sim.excitation.excitation import Seat
-from mount_sim.excitation.scenario import build_excitation
-from mount_sim.plant.elastomer import Elastomer, dynamic_stiffness
-from mount_sim.plant.energy import LOSSES, imbalance
+from mount_sim.excitation.building import build_excitation
+from mount_sim.plant.elastomer import Elastomer
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.plant import PlantSimulation
 from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
@@ -134,11 +134,11 @@ def test_an_unknown_mount_is_refused_with_the_known_ones(parameters):
 
 
 def damped_ride(parameters, mount, **chosen):
-    """The plant after a ride, its current following the speed as a damper would ask it to."""
+    """The account of a ride, its current following the speed as a damper would ask it to."""
     settings = parameters(mount=mount, **chosen)
     excitation = build_excitation(settings)
     plant, plain = (PlantSimulation(settings.plant, excitation.seat, excitation.step_time) for _ in range(2))
-    forces = excitation.engine_forces
+    books, forces = Books(plant), excitation.engine_forces
     forces = np.zeros(len(excitation.values)) if forces is None else forces
     for first in range(0, len(excitation.values), 20):
         step = slice(first, first + 20)
@@ -146,9 +146,9 @@ def damped_ride(parameters, mount, **chosen):
         plain.read(np.zeros(Noise.NUMBERS))
         assert plain.truth_bytes == plant.truth_bytes
         current = min(0.48 + 8.0 * abs(plant.truth['velocity']), 3.0)
-        plant.advance_with_books(excitation.values[step], forces[step], current)
+        books.advance(excitation.values[step], forces[step], current)
         plain.advance(excitation.values[step], forces[step], current)
-    return plant
+    return books.account
 
 
 @pytest.mark.parametrize('idle', [0.0, 200.0])
@@ -162,7 +162,7 @@ def damped_ride(parameters, mount, **chosen):
 @pytest.mark.parametrize('mount', ['friction', 'hydro', 'elastomer'])
 def test_what_the_road_puts_in_is_stored_or_dissipated(parameters, mount, chosen, idle):
     """To a thousandth of what the mount takes, which is a small share of what the suspension does."""
-    account = damped_ride(parameters, mount, idle__amplitude=idle, **chosen).account
+    account = damped_ride(parameters, mount, idle__amplitude=idle, **chosen)
     assert account['road_work'] > 20.0
     in_the_mount = sum(account[name] for name in LOSSES if name not in ('suspension_loss', 'chassis_loss'))
     assert in_the_mount > 0.5
@@ -170,9 +170,3 @@ def test_what_the_road_puts_in_is_stored_or_dissipated(parameters, mount, chosen
     assert all(account[name] >= 0.0 for name in LOSSES)
     sliding, track = account['sliding_loss'] > 0.0, account['track_loss'] > 0.0
     assert (sliding, track) == (mount == 'friction', mount == 'hydro')
-
-
-def test_books_are_kept_in_a_vehicle_only(parameters):
-    plant = PlantSimulation(parameters().plant, Seat.BENCH, 5e-5)
-    with pytest.raises(ValueError, match='energy is accounted for in a vehicle only'):
-        plant.advance_with_books(np.zeros(20), np.zeros(20), 0.0)

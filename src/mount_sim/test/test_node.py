@@ -89,7 +89,7 @@ def ask(context):
 
 
 def _kinds(sim):
-    return [type(fault).__name__ for fault in sim._mounts[''].faults.present]
+    return [fault.name for fault in sim._mounts[''].faults.present]
 
 
 def test_faults_are_told_as_a_list_of_texts_that_may_be_empty(make_sim):
@@ -97,7 +97,7 @@ def test_faults_are_told_as_a_list_of_texts_that_may_be_empty(make_sim):
     sim = make_sim(faults=['coil_open@0', 'over_current@0:100'])
     assert sim.trigger_configure() == SUCCESS
     assert sim.trigger_activate() == SUCCESS
-    wait_until(lambda: _kinds(sim) == ['CoilOpen', 'OverCurrent'], 'the faults')
+    wait_until(lambda: _kinds(sim) == ['coil_open', 'over_current'], 'the faults')
 
 
 def test_an_unknown_fault_is_refused_when_configured(make_sim):
@@ -122,7 +122,7 @@ def test_faults_are_begun_and_ended_by_a_service(make_sim, ask):
     assert set_.successful
     begun = ask(sim, begin=True)
     assert (begun.success, begun.message) == (True, 'begun: coil_open, lost_5')
-    wait_until(lambda: _kinds(sim) == ['CoilOpen', 'Lost5'], 'the faults')
+    wait_until(lambda: _kinds(sim) == ['coil_open', 'lost_5'], 'the faults')
     ended = ask(sim, begin=False)
     assert (ended.success, ended.message) == (True, 'ended: coil_open, lost_5')
     wait_until(lambda: _kinds(sim) == [], 'their end')

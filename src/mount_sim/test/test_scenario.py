@@ -5,8 +5,9 @@ import pytest
 
 from engine_mount.recordings.signals.signal import SignalError
 from mount_models.quantity import ParameterError
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Seat
-from mount_sim.excitation.scenario import STEP_TIME, build_excitation
+from mount_sim.excitation.scenario import STEP_TIME
 
 
 def _refusal(chosen):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_sim.excitation.scenario import build_excitation
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.shaking import LONG_BLOCK, SHORT_BLOCK, Shaking
 
 SECONDS = 1.5

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stiffness import dynamic_stiffness, modes
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import checked, quantities
 from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
-from mount_sim.plant.elastomer import dynamic_stiffness
 from mount_sim.plant.friction import full_step
 from mount_sim.plant.vehicle import (
     ENGINE_STATE,
@@ -18,7 +18,6 @@ from mount_sim.plant.vehicle import (
     Engine,
     Vehicle,
     engine_step,
-    modes,
     resting_vehicle,
     ride_without_friction,
     vehicle_step,

@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mount_bringup.graph.ending_signals import ending_signals
+from mount_bringup.graph.shutdown import ending_signals
 from mount_view.feed.feed import Feed, FeedError, Message, Receive
 from mount_view.window.model import Model
 

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import socket
-import struct
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -18,7 +17,6 @@ _PLACES = 119  # namespaces told apart by their ports
 
 _PLACE = '\0engine_mount_port'  # the zero: a name of its own, no file
 _SOCKETS = Path('/proc/net/unix')
-_CREDENTIALS = struct.Struct('3i')  # struct ucred: process, user, group
 
 
 class DomainError(ValueError):
@@ -51,13 +49,12 @@ def domain_lock(domain: int, namespace: str) -> Iterator[None]:
     the process.
     """
     port, name = can_port(domain, namespace), f'/{namespace.strip("/")}'
-    with socket.socket(socket.AF_UNIX) as place, socket.socket(socket.AF_UNIX) as told:
+    with socket.socket(socket.AF_UNIX) as place, socket.socket(socket.AF_UNIX) as holder:
         try:
             place.bind(f'{_PLACE}_{port}')
-            place.listen()
         except OSError:
             raise DomainError(_occupied(domain, name, port)) from None
-        told.bind(f'{_PLACE}_{port} {name}')
+        holder.bind(f'{_PLACE}_{port} {os.getpid()} {name}')
         yield
 
 
@@ -71,25 +68,10 @@ def domain_locks(domain: int, namespace: str, mounts: Sequence[str]) -> Iterator
 
 
 def _occupied(domain: int, name: str, port: int) -> str:
-    other = _namespace_on(port)
-    running = f'a graph already runs in ROS domain {domain}, namespace {other} (process {_process_on(port)})'
+    begin = f'@{_PLACE[1:]}_{port} '  # so Linux lists such names
+    names = (line.partition(begin)[2] for line in _SOCKETS.read_text().splitlines() if begin in line)
+    process, _, other = next(names, 'unknown unknown').partition(' ')  # it has just ended
+    running = f'a graph already runs in ROS domain {domain}, namespace {other} (process {process})'
     if other == name:
         return f'{running}; end it, or choose another domain with --domain or ROS_DOMAIN_ID'
     return f'{running}, whose CAN bus would have port {port} as that of {name}; choose another namespace'
-
-
-def _namespace_on(port: int) -> str:
-    """Return the namespace of the graph that holds a port."""
-    begin = f'@{_PLACE[1:]}_{port} '  # so Linux lists such names
-    names = (line.partition(begin)[2] for line in _SOCKETS.read_text().splitlines() if begin in line)
-    return next(names, 'unknown')
-
-
-def _process_on(port: int) -> str:
-    with socket.socket(socket.AF_UNIX) as asking:
-        try:
-            asking.connect(f'{_PLACE}_{port}')
-            credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-        except OSError:
-            return 'unknown'  # it has just ended
-    return str(_CREDENTIALS.unpack(credentials)[0])

@@ -1,22 +1,19 @@
-"""The arguments of the launch files: what `ros2 launch ... --show-args` tells."""
+"""The arguments of the launch files, as `ros2 launch ... --show-args` lists them."""
 
 import difflib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
-from mount_bringup.graph.nodes import RESTART_LIMIT, SIMULATED, VEHICLE, GraphNode
+from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RESTART_LIMIT, SIMULATED
 from mount_bringup.settings import SettingError
 from mount_control.policy.registry import POLICIES
-from mount_sim.electronics.faults.schedule import FORM
-from mount_sim.plant.mounts import MOUNTS
-
-_OF_SPECIMEN = ('mount_driver', 'mount_init', 'mount_control')
-"""The nodes that load the specimen file."""
 
 
 class LaunchArgument(NamedTuple):
-    """An argument of a launch file, and NODE.NAME of the parameters that it sets if it is not empty."""
+    """An argument of a launch file, and NODE.NAME of the parameters that it sets if it is not empty.
+
+    A parameter of a node that is not in the graph is left out.
+    """
 
     name: str
     meaning: str
@@ -27,30 +24,26 @@ class LaunchArgument(NamedTuple):
     @property
     def description(self) -> str:
         """The meaning, and what an empty text stands for."""
-        told = self.default or not self.sets or 'empty:' in self.meaning
-        return self.meaning if told else f'{self.meaning}; empty: as in the config file'
+        complete = self.default or not self.sets or 'empty:' in self.meaning
+        return self.meaning if complete else f'{self.meaning}; empty: as in the config file'
 
 
-_FILES = ('sim.launch.py', 'vehicle.launch.py', 'replay.launch.py')
-
-
-def check_arguments(command: Sequence[str], arguments: Sequence[LaunchArgument]) -> None:
-    """Raise `SettingError` for a NAME:=TEXT in the `command` that is no argument of its launch file.
-
-    Where another launch file includes ours, the arguments are for both, and nothing is told of them.
-    """
-    if not any(Path(word).name in _FILES for word in command):
-        return
-    known = [argument.name for argument in arguments]
-    for name in (word.partition(':=')[0] for word in command if ':=' in word):
-        if name not in known:
-            close = difflib.get_close_matches(name, known, 1)
-            meant = f'did you mean {close[0]}:=?' if close else '--show-args tells which there are'
-            raise SettingError(f'{name}:= is no argument of this launch file; {meant}')
+def texts_of(words: Sequence[str], arguments: Sequence[LaunchArgument]) -> dict[str, str]:
+    """Return {argument: text} of words NAME:=TEXT, the rest at their defaults; refuse other words."""
+    given = {argument.name: argument.default for argument in arguments}
+    for word in words:
+        name, assigned, text = word.partition(':=')
+        if not assigned or name not in given:
+            close = difflib.get_close_matches(name, given, 1)
+            hint = f'did you mean {close[0]}:=?' if close else f'known are {", ".join(given)}'
+            raise SettingError(f'{word} is no argument of this launch file; {hint}')
+        given[name] = text
+    return given
 
 
 POLICY_OF_DAMPER = 'switched_viscous'  # the others compute their force without a given damper
-_ANY = (
+COMMON_ARGUMENTS = (
+    LaunchArgument('config', 'parameter file of all nodes; empty: none'),
     LaunchArgument('namespace', 'where the graph lives, such as mount_right; empty: /'),
     LaunchArgument('mounts', 'mounts with electronics, such as left,right; empty: one, in this namespace'),
     LaunchArgument('record', 'whether the graph records', default='true', choices=('true', 'false')),
@@ -66,12 +59,12 @@ _ANY = (
     LaunchArgument(
         'parameters_file',
         'specimen file of this actuator; empty: as in the config file, else the shipped one',
-        tuple(f'{node}.parameters_file' for node in _OF_SPECIMEN),
+        tuple(f'{node.name}.parameters_file' for node in (DRIVER, INIT, CONTROL)),
     ),
     LaunchArgument(
         'specimen',
         'name that the specimen file must bear; empty: as in the config file, else any',
-        tuple(f'{node}.specimen' for node in _OF_SPECIMEN),
+        tuple(f'{node.name}.specimen' for node in (DRIVER, INIT, CONTROL)),
     ),
     LaunchArgument(
         'priority',
@@ -95,35 +88,16 @@ _ANY = (
         default='info',
         choices=('debug', 'info', 'warn', 'error', 'fatal'),
     ),
-)
-
-
-def _sample_rate(nodes: Sequence[GraphNode]) -> LaunchArgument:
-    return LaunchArgument(
+    LaunchArgument(
         'sample_rate',
         'Hz: how often the electronics measure and are answered',
-        tuple(f'{node.name}.sample_rate' for node in nodes),
-    )
-
-
-_PORT = 'UDP port of the simulated CAN bus; empty: one for each ROS domain and namespace'
-
-SIM_ARGUMENTS = (
-    *_ANY,
-    _sample_rate(SIMULATED),
-    LaunchArgument('scenario', 'what is driven: motorway, bench, sweep, recorded', ('mount_sim.scenario',)),
-    LaunchArgument('mount', f'what is between engine and chassis: {", ".join(MOUNTS)}', ('mount_sim.mount',)),
-    LaunchArgument(
-        'duration', 's of excitation, after which the graph ends', ('mount_sim.timeline.duration',)
+        tuple(f'{node.name}.sample_rate' for node in SIMULATED),
     ),
-    LaunchArgument('port', _PORT, ('mount_driver.port', 'mount_sim.port')),
-    LaunchArgument('fault', f'faults as {FORM}, with commas between them', ('mount_sim.faults',)),
 )
-"""The arguments of the graph with the simulated car, besides `config`."""
+PORT = 'UDP port of the simulated CAN bus; empty: one for each ROS domain and namespace'
 
 VEHICLE_ARGUMENTS = (
-    *_ANY,
-    _sample_rate(VEHICLE),
+    *COMMON_ARGUMENTS,
     LaunchArgument(
         'interface',
         'interface of python-can; empty: as in the config file, else socketcan',
@@ -137,29 +111,7 @@ VEHICLE_ARGUMENTS = (
     LaunchArgument(
         'channels', 'channel of each of several mounts, such as can0,can1; empty: as in the config file'
     ),
-    LaunchArgument('port', f'{_PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
+    LaunchArgument('port', f'{PORT}; for interface udp_multicast alone', ('mount_driver.port',)),
     LaunchArgument('duration', 's after which the graph ends; empty: when it is told to end'),
 )
-"""The arguments of the graph in the car, besides `config`."""
-
-_OF_RECORDED = ('policy', 'damper', 'parameters_file', 'specimen')
-_OF_REPLAY = ('record', 'recording', 'priority', 'log_level')
-
-REPLAY_ARGUMENTS = (
-    LaunchArgument('bag', 'recorded drive that is played to the control: its folder; must be given'),
-    LaunchArgument(
-        'config', 'parameter file; what neither it nor an argument sets is as recorded; empty: none'
-    ),
-    LaunchArgument(
-        'namespace',
-        'mount of the recorded drive, and where it is replayed, such as mount_right; empty: its only one',
-    ),
-    LaunchArgument('rate', 'how fast it is played; 1: as fast as it was recorded', default='1'),
-    *(
-        argument._replace(meaning=f'{argument.meaning.partition("; empty:")[0]}; empty: as recorded')
-        for argument in _ANY
-        if argument.name in _OF_RECORDED
-    ),
-    *(argument for argument in _ANY if argument.name in _OF_REPLAY),
-)
-"""The arguments of a replay."""
+"""The arguments of the graph in the car."""

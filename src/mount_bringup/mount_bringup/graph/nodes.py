@@ -5,6 +5,19 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 
+class GraphError(RuntimeError):
+    """The graph could not be started or broke down; the text names the node and its reason."""
+
+
+def name_in(mount: str, name: str) -> str:
+    """Return the name of a node or topic of a mount within the namespace of the graph."""
+    return f'{mount}/{name}' if mount else name
+
+
+Figures = Mapping[str, str]
+"""The figures of a report on `/diagnostics`, its `level` and `sentence`; empty where there is no report."""
+
+
 @dataclass(frozen=True)
 class GraphNode:
     """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without.
@@ -24,7 +37,7 @@ class GraphNode:
     @property
     def full_name(self) -> str:
         """The name within the graph's namespace, such as `left/mount_driver`."""
-        return f'{self.mount}/{self.name}' if self.mount else self.name
+        return name_in(self.mount, self.name)
 
     def is_a(self, *others: 'GraphNode') -> bool:
         """Whether it is one of these nodes, of whichever mount."""
@@ -116,7 +129,8 @@ class GraphSettings:
     others wait for it anyway, and handing over to another thread or process costs more than the work. Where
     the system permits it the processes run at the real-time `priority` (SCHED_FIFO; 0: off), the recorder's
     behind those of the 1 kHz loop. In real time a node may be lost `restart_limit` times within a minute
-    before the graph is given up; 0: the first loss ends it.
+    before the graph is given up; 0: the first loss ends it. They log from `log_level` on, to files, or to
+    the screen.
     """
 
     namespace: str = ''
@@ -125,3 +139,5 @@ class GraphSettings:
     grouping: Grouping = Grouping.APART
     priority: int = 0
     restart_limit: int = RESTART_LIMIT
+    log_level: str = 'info'
+    log_to_screen: bool = False

@@ -1,29 +1,30 @@
 """The graph that the arguments of a launch file order; `ros2 launch` is not needed here."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
-from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, LaunchArgument
+from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, VEHICLE_ARGUMENTS, LaunchArgument
 from mount_bringup.graph.nodes import (
     CONTROL,
     DRIVER,
     INIT,
     RECORDER,
     SIM,
+    VEHICLE,
     GraphNode,
     GraphSettings,
     Grouping,
+    name_in,
     of_mounts,
 )
-from mount_bringup.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_bringup.mounts import settings_of_mount
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.sample_rate import NODES, check_sample_rate
-from mount_bringup.settings import OF_EACH, SettingError, checked_settings, defaults_of_nodes
+from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
@@ -31,14 +32,13 @@ from mount_models.quantity import with_flattened
 from mount_recorder.parameters import RecorderParameters
 from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
-from mount_sim.electronics.faults.schedule import told_faults
-from mount_sim.excitation.scenario import build_excitation
-from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import seated_mount
-from mount_sim.plant.places import mount_names
-from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
 _CAN_OF_VEHICLE = {'interface': 'socketcan', 'channel': 'can0'}
+
+Texts = Mapping[str, str]
+"""{launch argument: text}."""
+Settings = dict[str, dict[str, Any]]
+"""{node: {parameter: value}}."""
 
 
 class LaunchOrder(NamedTuple):
@@ -50,156 +50,166 @@ class LaunchOrder(NamedTuple):
     nodes: tuple[GraphNode, ...]
     settings: GraphSettings
     scenario: str
-    duration: float
-    log_level: str
+    duration: float = float('inf')
     bag: Path | None = None
     rate: float = 1.0
 
 
+def vehicle_order(given: Texts) -> LaunchOrder:
+    """Return the graph in the car; a `ValueError` says what cannot be."""
+    order = launch_order(VEHICLE, VEHICLE_ARGUMENTS, given, 'car')
+    return order._replace(duration=number_of('duration', given['duration'] or 'inf', float('inf')))
+
+
 def launch_order(
-    nodes: Sequence[GraphNode], arguments: Sequence[LaunchArgument], given: Mapping[str, str]
+    nodes: Sequence[GraphNode],
+    arguments: Sequence[LaunchArgument],
+    given: Texts,
+    scenario: str,
+    checked_mount: Callable[[Settings], Settings] = lambda settings: settings,
 ) -> LaunchOrder:
-    """Return the graph for the texts `given`, {argument: text}; a `ValueError` says what cannot be."""
-    records = given['record'] == 'true'
-    if records and not given['recording']:
-        raise SettingError('a recording needs a folder: recording:=bags/first; or record:=false')
-    mounts = mount_names(given['mounts'])
-    chosen = of_mounts([node for node in nodes if records or node is not RECORDER], mounts)
+    """Return the graph of `nodes`; `checked_mount` checks and completes the settings of each mount."""
+    records = is_recorded(given)
+    mounts = _mount_names(given['mounts'])
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
-    known = {
-        name: values for name, values in known_parameters().items() if name in {node.name for node in nodes}
-    }
-    given_to = partial(_given_to, arguments, given, known, domain)
+    known = known_parameters(nodes)
+    settings: Settings = {}
+    for node in of_mounts(nodes, mounts):
+        space = name_in(namespace, node.mount)
+        layers = of_file_and_arguments(arguments, given, known, space)
+        settings[node.full_name] = {**_bus(node, can_port(domain, space), known), **layers.get(node.name, {})}
     if mounts:
-        settings = _of_mounts(mounts, given, partial(given_to, namespace))
-    else:
-        settings = with_control_of_mount(checked_settings(given_to(namespace, ''), known))
-        check_damper(given['damper'], settings)
-        _check(settings)
-    sim = settings.get(SIM.name, {}) if SIM in nodes else {'scenario': 'car'}
+        _tell_buses_apart(mounts, settings, given)
+    settings = checked_settings(settings, known)
+    for mount in mounts or ('',):
+        own = checked_mount(settings_of_mount(settings, mount))
+        settings[name_in(mount, CONTROL.name)] = own[CONTROL.name]
+        check_damper(given['damper'], own)
+        _check(own, known)
+    chosen = of_mounts([node for node in nodes if records or node is not RECORDER], mounts)
     return LaunchOrder(
         nodes=chosen,
         settings=GraphSettings(
             namespace=namespace,
             domain=domain,
-            parameters={node.full_name: settings.get(node.full_name, {}) for node in chosen},
+            parameters={node.full_name: settings[node.full_name] for node in chosen},
             grouping=Grouping.COMPOSED if given['composed'] == 'true' else Grouping.APART,
-            priority=number_of('priority', given['priority'], HIGHEST, int),
             restart_limit=number_of('restarts', given['restarts'], 1000, int),
+            **process_settings(given),
         ),
-        scenario=sim.get('scenario', SimParameters().scenario),
-        duration=_duration(nodes, given),
-        log_level=given['log_level'],
+        scenario=scenario,
     )
 
 
-def check_folder(order: LaunchOrder) -> None:
-    """Raise `SettingError` if the folder of the recording exists, before anything is started for it."""
-    uri = order.settings.parameters.get(RECORDER.name, {}).get('uri')
-    if uri and Path(str(uri)).expanduser().exists():
+def process_settings(given: Texts) -> dict[str, Any]:
+    """Return priority and log of the processes of a graph."""
+    return {
+        'priority': number_of('priority', given['priority'], HIGHEST, int),
+        'log_level': given['log_level'],
+        'log_to_screen': True,
+    }
+
+
+def is_recorded(given: Texts) -> bool:
+    """Return whether the graph records; refuse a recording without a folder or into one that exists."""
+    recording = given['recording']
+    if given['record'] != 'true':
+        return False
+    if not recording:
+        raise SettingError('a recording needs a folder: recording:=bags/first; or record:=false')
+    if Path(recording).expanduser().exists():
         raise SettingError(
-            f'recording:={uri} exists already; a recording is never written over: name another folder or '
-            'remove it'
+            f'recording:={recording} exists already; a recording is never written over: name another folder '
+            'or remove it'
+        )
+    return True
+
+
+def known_parameters(nodes: Sequence[GraphNode]) -> Settings:
+    """Return {node: {parameter: default}} of all that a parameter file can set."""
+    known, driver = defaults_of_nodes([node.name for node in nodes]), DriverParameters()
+    bus = {'interface': 'udp_multicast', 'channel': driver.channel, 'port': driver.port}
+    added = {SIM.name: bus, RECORDER.name: {'uri': '', 'mounts': '', 'topics': [t.name for t in TOPICS]}}
+    return {name: values | added.get(name, {}) for name, values in known.items()}
+
+
+def of_file_and_arguments(
+    arguments: Sequence[LaunchArgument], given: Texts, known: Settings, space: str
+) -> Settings:
+    """Return the settings that the parameter file gives the nodes in `space`, and the arguments above it."""
+    settings = settings_of_file(Path(given['config']), space, known) if given['config'] else {}
+    for argument in arguments:
+        text = given[argument.name]
+        for target in argument.sets if text else ():
+            node, _, name = target.partition('.')
+            if node in known:
+                value = _value(argument.name, text, known[node][name])
+                settings.setdefault(node, {})[name] = value
+    return settings
+
+
+def check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> None:
+    """Raise `SettingError` where the policy takes no damper."""
+    policy = control_parameters(settings).policy
+    if damper and policy != POLICY_OF_DAMPER:
+        raise SettingError(
+            f'damper:={damper} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
+            f'add policy:={POLICY_OF_DAMPER}'
         )
 
 
-def _given_to(
-    arguments: Sequence[LaunchArgument],
-    given: Mapping[str, str],
-    known: Mapping[str, Mapping[str, Any]],
-    domain: int,
-    namespace: str,
-    mount: str,
-) -> dict[str, dict[str, Any]]:
-    """Return what file and arguments give the nodes of a mount, or of the graph."""
-    space = f'{namespace}/{mount}'.strip('/')
-    port = {'port': can_port(domain, space)}
-    settings: dict[str, dict[str, Any]] = {DRIVER.name: port | ({} if SIM.name in known else _CAN_OF_VEHICLE)}
-    if SIM.name in known:
-        settings[SIM.name] = dict(port)
-    for layer in (settings_of_file(Path(given['config']), space, known), of_arguments(arguments, given)):
-        for name, values in layer.items():
-            settings.setdefault(name, {}).update(values)
-    return settings
+def number_of(name: str, text: str, highest: float, kind: type = float) -> Any:
+    """Return the number in the text of an argument, within 0 .. `highest`."""
+    try:
+        number = kind(text)
+    except ValueError:
+        number = -1
+    if not 0 <= number <= highest:
+        raise SettingError(f'{name}:={text} must be a number within 0 .. {highest:g}')
+    return number
 
 
-def _of_mounts(
-    mounts: Sequence[str], given: Mapping[str, str], given_to: Callable[[str], dict[str, dict[str, Any]]]
-) -> dict[str, dict[str, Any]]:
-    """Return the checked settings of a graph of several mounts."""
+def _bus(node: GraphNode, port: int, known: Settings) -> dict[str, Any]:
+    """Return the CAN bus of a node where neither file nor argument names one."""
+    if node.is_a(DRIVER):
+        return {'port': port} | ({} if SIM.name in known else _CAN_OF_VEHICLE)
+    return {'port': port} if node.is_a(SIM) else {}
+
+
+def _mount_names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(',')] if text else []
+    if len(set(names)) < len(names) or not all(re.fullmatch('[a-z][a-z0-9_]*', name) for name in names):
+        raise SettingError(f'mounts:={text} must name each mount once, in small letters, as in left,right')
+    return names
+
+
+def _tell_buses_apart(mounts: Sequence[str], settings: Settings, given: Texts) -> None:
+    """Give each mount its bus, and name the mounts to the nodes that all share."""
     if given['port']:
         raise SettingError(f'port:={given["port"]} is for one mount; each of several has a port of its own')
-    shared = given_to('')
-    channels = _channels(mounts, given)
-    shared.setdefault(RECORDER.name, {})['mounts'] = ','.join(mounts)
-    settings = {name: values for name, values in shared.items() if name in (RECORDER.name, SIM.name)}
+    for name in {RECORDER.name, SIM.name} & settings.keys():
+        settings[name]['mounts'] = ','.join(mounts)
+    drivers = {mount: settings[name_in(mount, DRIVER.name)] for mount in mounts}
     if SIM.name in settings:
-        settings[SIM.name]['mounts'] = ','.join(mounts)
-    for mount in mounts:
-        own = given_to(mount)
-        own[DRIVER.name] |= channels.get(mount, {})
-        if SIM.name in settings:
-            settings[SIM.name][f'mount_{mount}.port'] = own[DRIVER.name]['port']
-        settings |= {f'{mount}/{name}': own.get(name, {}) for name in OF_EACH}
-    if SIM.name not in settings:
-        _check_channels(mounts, settings)
-    known = known_parameters()
-    settings = checked_settings(settings, known)
-    for mount in mounts:
-        whole = with_control_of_mount(settings_of_mount(settings, mount))
-        check_damper(given['damper'], whole)
-        _check(whole)
-        settings[f'{mount}/{CONTROL.name}'] = whole.get(CONTROL.name, {})
-    if SIM.name in settings:
-        values = settings[SIM.name]
-        SimulatedCar(values, build_excitation(mount_parameters(values)))
-    return settings
-
-
-def _channels(mounts: Sequence[str], given: Mapping[str, str]) -> dict[str, dict[str, Any]]:
-    """Return the channel that the arguments give each mount in the car."""
-    if not given.get('channels'):
-        return {}
-    names = [name.strip() for name in given['channels'].split(',') if name.strip()]
-    if len(names) != len(mounts) or len(set(names)) < len(names):
+        settings[SIM.name] |= {f'mount_{mount}.port': driver['port'] for mount, driver in drivers.items()}
+        return
+    channels = [name.strip() for name in given['channels'].split(',') if name.strip()]
+    if channels and len(set(channels)) != len(mounts):
         raise SettingError(
             f'channels:={given["channels"]} must name a channel for each of the mounts {", ".join(mounts)}, '
             'as in channels:=can0,can1'
         )
-    return {mount: {'channel': name} for mount, name in zip(mounts, names, strict=True)}
-
-
-def _check_channels(mounts: Sequence[str], settings: Mapping[str, Mapping[str, Any]]) -> None:
-    """Raise `SettingError` where two mounts have one CAN bus."""
+    for driver, channel in zip(drivers.values(), channels, strict=False):
+        driver['channel'] = channel
     buses: dict[Any, str] = {}
-    for mount in mounts:
-        driver = settings[f'{mount}/{DRIVER.name}']
-        multicast = driver['interface'] == 'udp_multicast'  # there a port of its own tells a bus from another
-        other = buses.setdefault((driver['channel'], driver['port'] if multicast else 0), mount)
+    for mount, driver in drivers.items():
+        multicast = driver['interface'] == 'udp_multicast'  # there each bus has a port of its own
+        other = buses.setdefault((driver['channel'], multicast and driver['port']), mount)
         if other != mount:
             raise SettingError(
                 f'the mounts {other} and {mount} have one CAN bus, {driver["channel"]}: give each its own, '
                 'as in channels:=can0,can1, or as channel of its mount_driver in the config file'
             )
-
-
-def known_parameters() -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: default}} of all that a parameter file can set."""
-    known, driver = defaults_of_nodes(), DriverParameters()
-    known[SIM.name] |= {'interface': 'udp_multicast', 'channel': driver.channel, 'port': driver.port}
-    known[RECORDER.name] |= {'uri': '', 'mounts': '', 'topics': [topic.name for topic in TOPICS]}
-    return known
-
-
-def of_arguments(arguments: Sequence[LaunchArgument], given: Mapping[str, str]) -> dict[str, dict[str, Any]]:
-    settings: dict[str, dict[str, Any]] = {}
-    for argument in arguments:
-        text = given[argument.name]
-        for target in argument.sets if text else ():
-            node, _, name = target.partition('.')
-            value = _value(argument.name, text, known_parameters()[node][name])
-            settings.setdefault(node, {})[name] = value
-    return settings
 
 
 def _value(name: str, text: str, default: Any) -> Any:
@@ -213,40 +223,10 @@ def _value(name: str, text: str, default: Any) -> Any:
         raise SettingError(f'{name}:={text} {error}') from None
 
 
-def check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> None:
-    policy = control_parameters(settings).policy
-    if damper and policy != POLICY_OF_DAMPER:
-        raise SettingError(
-            f'damper:={damper} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
-            f'add policy:={POLICY_OF_DAMPER}'
-        )
-
-
-def _check(settings: Mapping[str, Mapping[str, Any]]) -> None:
-    """Raise the `ValueError` of the first parameter outside its range, before a node has it."""
+def _check(settings: Settings, known: Settings) -> None:
+    """Raise the `ValueError` of the first parameter of a mount outside its range, before a node has it."""
     sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (INIT, InitParameters()))
     for node, defaults in sets:
         with_flattened(defaults, settings.get(node.name, {}))
-    sim = with_flattened(SimParameters(), settings.get(SIM.name, {}))
-    seated_mount(sim.mount)
-    told_faults(sim.faults)
-    build_excitation(sim)
-    check_sample_rate(settings, [name for name in NODES if name != SIM.name or name in settings])
-    check_control_of_mount(settings)
+    check_sample_rate(settings, [name for name in NODES if name in known])
     chosen_control(settings)
-
-
-def _duration(nodes: Sequence[GraphNode], given: Mapping[str, str]) -> float:
-    if SIM in nodes or not given['duration']:
-        return float('inf')  # the simulator tells its end
-    return number_of('duration', given['duration'], 1e9, float)
-
-
-def number_of(name: str, text: str, highest: float, kind: type) -> Any:
-    try:
-        number = kind(text)
-    except ValueError:
-        number = -1
-    if not 0 <= number <= highest:
-        raise SettingError(f'{name}:={text} must be a number within 0 .. {highest:g}')
-    return number

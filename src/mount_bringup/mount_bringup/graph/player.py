@@ -1,6 +1,6 @@
 """The process of `ros2 bag play` beside a launched control: it publishes recorded inputs by the wall clock.
 
-The stamps in the messages are the recorded ones, and the control goes by them alone: `/clock` and
+The stamps in the messages are the recorded ones, and the control uses no other time: `/clock` and
 `use_sim_time` are not needed.
 """
 
@@ -12,21 +12,21 @@ from pathlib import Path
 
 import yaml
 
-from mount_bringup.graph.errors import GraphError
+from mount_bringup.graph.nodes import GraphError
 from mount_ros.nodes.process import tied
 from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE, DISPLACEMENT, Delivery, Topic
 
 PLAYED = (DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE)
-"""What is played: what the control hears. Its setpoints are its own, for a topic has one writer."""
+"""The inputs of the control. Recorded setpoints are not played: the control publishes its own."""
 
 _DISCOVERY = 2.0  # s, chosen: until the first message, so that publishers are found before it
-_END_LIMIT = 5.0  # s, chosen: until a player that was told to end is killed
+_END_LIMIT = 5.0  # s, chosen: until an interrupted player is killed
 
 
 class Player:
     """Plays the inputs of the mount in `namespace` from a recording; `rate` 1: as fast as recorded.
 
-    It ends when this process does, whatever ends that, and leaves no file behind.
+    The player ends with this process, whatever ends that, and leaves no file behind.
     """
 
     def __init__(self, bag: Path, namespace: str, rate: float):
@@ -41,7 +41,7 @@ class Player:
         with tempfile.TemporaryFile('w+') as offers:
             offers.write(self._offers)
             offers.seek(0)
-            # a session of its own: Ctrl-C is the supervisor's, which ends it
+            # a session of its own: Ctrl-C goes to the supervisor alone
             self._process = subprocess.Popen(tied(self._command), stdin=offers, start_new_session=True)
 
     @property
@@ -51,7 +51,7 @@ class Player:
         if code:
             raise GraphError(
                 f'`{" ".join(self._command)}` ended with code {code}: it needs the packages ros2bag and '
-                'rosbag2_storage_mcap; its own words are above'
+                'rosbag2_storage_mcap; its output is above'
             )
         return code == 0
 
@@ -68,7 +68,7 @@ class Player:
 
 
 def play_command(bag: Path, namespace: str, rate: float) -> list[str]:
-    """Return the command that plays what a control in `namespace` hears; it reads `offers_text` as input."""
+    """Return the command that plays the inputs of a control in `namespace`; it reads `offers_text`."""
     return ['ros2', 'bag', 'play', str(bag), '--rate', f'{rate:g}', '--delay', f'{_DISCOVERY:g}',
             '--disable-keyboard-controls', '--qos-profile-overrides-path', '/dev/stdin',
             '--topics', *(_full_name(topic, namespace) for topic in PLAYED)]  # fmt: skip

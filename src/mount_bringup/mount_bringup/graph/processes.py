@@ -11,47 +11,47 @@ from pathlib import Path
 
 import yaml
 
-from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups
+from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups, name_in
 from mount_ros.nodes.process import environment_of_children
 
-NODES_OF_PROCESS = 'ENGINE_MOUNT_NODES'
-"""The environment variable by which who did not start a process knows its nodes."""
+QUIET_START = 'import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); '
+"""The begin of a program: until it takes signals, SIGINT ends it at once and without a traceback."""
 
-_INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that was asked to end is terminated
+_INTERRUPT_LIMIT = 10.0  # s, chosen: until a node that does not end is terminated
 _TERMINATE_LIMIT = 3.0  # s, chosen: until it is killed
 _RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for what it misses is gone
 
 
 class NodeProcess:
-    """One process of the graph with the nodes that live in it; its output goes to a log file.
+    """One process of the graph with the nodes that live in it.
 
-    It loads what it needs at once, and makes its nodes when it is told to `begin`.
+    It loads what it needs at once, and makes its nodes after `begin`.
     """
 
     def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
         self.nodes = tuple(nodes)
         self.name = ' + '.join(node.full_name for node in nodes)
-        stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
         self.reported = False
-        """Whether its end has been told."""
-        self._settings = settings
-        self._recording = recording_of(self.nodes, settings)
+        """Whether the user knows of its end."""
+        stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
         self.log_file = folder / f'{stem}.log'
+        self._settings = settings
         parameter_file = folder / f'{stem}.yaml'
-        parameter_file.write_text(parameter_text(self.nodes, settings))
-        self._command = [sys.executable, '-c', _program(self.nodes, settings.namespace), '--ros-args']
-        self._command += ['--params-file', str(parameter_file)]
-        if settings.namespace and not any(node.mount for node in nodes):
-            self._command += ['-r', f'__ns:=/{settings.namespace.strip("/")}']
+        parameter_file.write_text(parameter_text(nodes, settings))
+        self._command = [
+            *(sys.executable, '-c', _program(nodes, settings.namespace), '--ros-args'),
+            *('--params-file', str(parameter_file), '--log-level', settings.log_level),
+        ]
         self._process = self._start()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        with self.log_file.open('ab') as log:
+        with contextlib.ExitStack() as files:
+            log = None if self._settings.log_to_screen else files.enter_context(self.log_file.open('ab'))
             return subprocess.Popen(
                 self._command,
                 stdin=subprocess.PIPE,
                 stdout=log,
-                stderr=subprocess.STDOUT,
+                stderr=log,
                 env={**os.environ, **_environment(self.nodes, self._settings)},
                 start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
             )
@@ -63,7 +63,7 @@ class NodeProcess:
 
     @property
     def begun(self) -> bool:
-        """Whether it was told to."""
+        """Whether it makes or has made its nodes."""
         return self._process.stdin is None or self._process.stdin.closed
 
     def start_again(self) -> None:
@@ -80,12 +80,14 @@ class NodeProcess:
 
     def last_words(self) -> str:
         """Return the last error line of the log, or its last line."""
+        if self._settings.log_to_screen:
+            return '(see its log above)'
         lines = [line for line in self.log_file.read_text(errors='replace').splitlines() if line.strip()]
         errors = [line for line in lines if '[ERROR]' in line or '[FATAL]' in line or 'Error: ' in line]
-        return (errors or lines or ['(it said nothing)'])[-1]
+        return (errors or lines or ['(its log is empty)'])[-1]
 
-    def ask_to_end(self) -> None:
-        """Send SIGINT, to which a node answers by going to 0 A and ending with code 0."""
+    def interrupt(self) -> None:
+        """Send SIGINT: a node goes to 0 A and ends with code 0."""
         if self.exit_code is None:
             self._process.send_signal(signal.SIGINT if self.begun else signal.SIGKILL)
 
@@ -104,70 +106,83 @@ class NodeProcess:
 
     def _written(self) -> int:
         """Return how many bytes of recordings there are, 0 where it records none."""
-        folder = self._recording
-        files = folder.parent.glob(f'{folder.name}*/*') if folder is not None else ()
+        uri = self._settings.parameters.get(RECORDER.name, {}).get('uri') if RECORDER in self.nodes else None
+        folder = Path(str(uri))
+        files = folder.parent.glob(f'{folder.name}*/*') if uri else ()
         return sum(file.stat().st_size for file in files)
 
 
-def end_all(processes: list[NodeProcess], at_once: bool = False) -> list[str]:
-    """End the nodes, last started first; return a sentence per unclean end.
+class NodeProcesses:
+    """All processes of a graph, in start order."""
 
-    One after the other, so that none drives the coil without those that watch it, or `at_once`.
-    """
-    complaints = []
-    told = [process for process in processes if process.reported or not process.begun]
-    died = [process for process in processes if process.exit_code is not None]
-    if at_once:
-        for process in reversed(processes):
-            process.ask_to_end()
-    for process in reversed(processes):
-        if not at_once:
-            process.ask_to_end()
-        begin = time.monotonic()
-        code = process.wait()
-        if code == 0 or process in told:
-            continue
-        when = 'before it was told to end' if process in died else f'after {time.monotonic() - begin:.1f} s'
-        complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
-    return complaints
+    def __init__(self) -> None:
+        self._processes: list[NodeProcess] = []
 
+    def start(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> None:
+        """Start the processes of `nodes`; parameter files and logs are in `folder`."""
+        for group in groups(nodes, settings.grouping):
+            self._processes.append(NodeProcess(group, settings, folder))
 
-def recording_of(nodes: Sequence[GraphNode], settings: GraphSettings) -> Path | None:
-    """Return the folder of the recording that one of `nodes` makes, None where none does."""
-    uri = settings.parameters.get(RECORDER.name, {}).get('uri') if RECORDER in nodes else None
-    return Path(str(uri)) if uri else None
+    def begin(self) -> None:
+        """Let them make their nodes."""
+        for process in self._processes:
+            process.begin()
 
+    def ended(self) -> NodeProcess | None:
+        """Return the first process that has ended, which counts as reported from now on."""
+        for process in self._processes:
+            if process.exit_code is not None:
+                process.reported = True
+                return process
+        return None
 
-def start_processes(nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> list[NodeProcess]:
-    """Start the processes of `nodes` in order."""
-    return [NodeProcess(group, settings, folder) for group in groups(nodes, settings.grouping)]
+    def start_again(self, nodes: Sequence[GraphNode]) -> None:
+        """End what is left of the processes of `nodes`, and start them again."""
+        for process in self._processes:
+            if {*process.nodes} & {*nodes}:
+                process.start_again()
 
+    def end(self, *, at_once: bool = False) -> list[str]:
+        """End all, last started first; return a sentence per unclean end.
 
-def node_environment(nodes: Sequence[GraphNode], priority: int) -> dict[str, str]:
-    """Return what a process is told: its `nodes`, its starter, which is this process, and its priority."""
-    share = _RECORDER_SHARE if RECORDER in nodes else 1.0
-    given = environment_of_children(max(1, round(share * priority)) if priority else 0)
-    return {**given, NODES_OF_PROCESS: ' '.join(node.full_name for node in nodes)}
+        One after the other, so that none drives the coil without those that watch it, or `at_once`.
+        """
+        processes = self._processes[::-1]
+        known = [process for process in processes if process.reported or not process.begun]
+        died = [process for process in processes if process.exit_code is not None]
+        complaints = []
+        for process in processes if at_once else ():
+            process.interrupt()
+        for process in processes:
+            if not at_once:
+                process.interrupt()
+            begin = time.monotonic()
+            code = process.wait()
+            if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
+                after = f'after {time.monotonic() - begin:.1f} s'
+                when = 'before it was told to end' if process in died else after
+                complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
+        return complaints
 
 
 def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
-    own = node_environment(nodes, settings.priority)
-    python = {'PYTHONUNBUFFERED': '1', 'PYTHONSAFEPATH': '1'}  # modules in the working directory are foreign
-    return {**own, **python, 'ROS_DOMAIN_ID': str(settings.domain)}
+    share = _RECORDER_SHARE if RECORDER in nodes else 1.0
+    priority = max(1, round(share * settings.priority)) if settings.priority else 0
+    # Modules in the working directory are foreign: an empty part of the path means it too.
+    path = os.pathsep.join(filter(None, os.environ.get('PYTHONPATH', '').split(os.pathsep)))
+    python = {'PYTHONUNBUFFERED': '1', 'PYTHONSAFEPATH': '1', 'PYTHONPATH': path}
+    return {**environment_of_children(priority), **python, 'ROS_DOMAIN_ID': str(settings.domain)}
 
 
 def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
-    imports = '; '.join(f'from {node.package}.node import {node.class_name}' for node in dict.fromkeys(nodes))
-    if any(node.mount for node in nodes):  # a namespace for each, which no remapping of ROS could tell apart
-        creates = []
-        for node in nodes:
-            space = f'/{namespace.strip("/")}/{node.mount}'.replace('//', '/')
-            creates.append(f'partial({node.class_name}, namespace={space!r})')
-        classes, imports = ', '.join(creates), f'from functools import partial; {imports}'
-    else:
-        classes = ', '.join(node.class_name for node in nodes)
-    run = 'from mount_ros.nodes.process import run_nodes'
-    return f'{imports}; {run}; import sys; sys.stdin.read(); run_nodes([{classes}])'
+    """Return a program of Python; each node has a namespace, which no remapping of ROS could tell apart."""
+    imports = ''.join(f'from {node.package}.node import {node.class_name}; ' for node in dict.fromkeys(nodes))
+    creates = []
+    for node in nodes:
+        space = '/' + name_in(namespace.strip('/'), node.mount).rstrip('/')
+        creates.append(f'partial({node.class_name}, namespace={space!r})')
+    run = 'from functools import partial; from mount_ros.nodes.process import run_nodes; import sys; '
+    return f'{QUIET_START}{imports}{run}sys.stdin.read(); run_nodes([{", ".join(creates)}])'
 
 
 def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:

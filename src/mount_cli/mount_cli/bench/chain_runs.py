@@ -13,8 +13,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mount_bringup.graph.domain import can_port, domain_lock
-from mount_bringup.graph.errors import GraphError
-from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, SIMULATED, GraphSettings, Grouping
+from mount_bringup.graph.nodes import (
+    CONTROL,
+    DRIVER,
+    INIT,
+    RECORDER,
+    SIM,
+    SIMULATED,
+    GraphError,
+    GraphSettings,
+    Grouping,
+)
 from mount_bringup.graph.supervisor import Supervisor
 from mount_bringup.sample_rate import with_sample_rate
 from mount_cli.bench.processes import children, memory, processor_time

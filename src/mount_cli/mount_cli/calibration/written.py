@@ -16,7 +16,7 @@ def write_results(
 ) -> None:
     """Write figures and specimen where they are wanted, and say which parts are of other specimens."""
     from mount_identification.specimen import foreign_parts
-    from mount_models.specimen import save_specimen
+    from mount_identification.specimen_file import save_specimen
     from mount_report.json_file import write_json
 
     if json_file is not None:

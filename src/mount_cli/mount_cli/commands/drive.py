@@ -178,7 +178,6 @@ def drive(
 ) -> None:
     """Drive the simulated car through the whole graph, record it and print what happened."""
     from mount_bringup.graph.domain import chosen_domain
-    from mount_bringup.mount_choice import with_control_of_mount
     from mount_bringup.sample_rate import with_sample_rate
     from mount_bringup.settings import SettingError, checked_settings, settings_of_options
     from mount_cli.screen import TerminalScreen
@@ -186,6 +185,7 @@ def drive(
     from mount_replay.drive.recorder_options import recorder_options
     from mount_report.drive.telling import tell_drive, tell_snapshots
     from mount_report.json_file import write_json
+    from mount_sim.mount_choice import with_control_of_mount
 
     if 'list' in (fault or []):
         _list_faults()

@@ -114,7 +114,8 @@ def friction(
     from mount_identification.friction.found import IdentifyOrder
     from mount_identification.friction.identify import identify
     from mount_identification.specimen import check_targets, foreign_parts, with_friction
-    from mount_models.specimen import chosen_specimen, friction_contact, save_specimen
+    from mount_identification.specimen_file import save_specimen
+    from mount_models.specimen import chosen_specimen, friction_contact
     from mount_report.json_file import write_json
     from mount_signals.units.mapping import with_options
 

@@ -56,11 +56,11 @@ def record(
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
     from engine_mount.recordings.run.folder import new_place
     from mount_bringup.graph.domain import chosen_domain
-    from mount_bringup.graph.record import RecordOrder
-    from mount_bringup.graph.record import record as run_record
     from mount_cli.screen import TerminalScreen
     from mount_recorder.parameters import RecorderParameters
     from mount_replay.drive.recorder_options import checked_recorder, recorder_options
+    from mount_replay.record import RecordOrder
+    from mount_replay.record import record as run_record
 
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')

@@ -82,7 +82,7 @@ def status(
     from rich.live import Live
 
     from mount_bringup.graph.domain import chosen_domain
-    from mount_bringup.graph.ending_signals import ending_signals
+    from mount_bringup.graph.shutdown import ending_signals
     from mount_report.json_file import write_json
     from mount_view.screen import status_screen
     from mount_view.view import ViewOrder, model_of, wait_for_state

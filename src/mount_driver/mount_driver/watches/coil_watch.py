@@ -1,7 +1,7 @@
 """Whether the measured coil current follows the setpoints that were sent: bounds from a model of the loop.
 
 No bus and no clock here: time is counted in samples of the electronics, so neither a late frame nor a driver
-that stood still and then takes many samples at once looks like a coil at fault.
+that stood still and then takes many samples at once is a deviation of the coil.
 
 Which setpoint the electronics follow at a sample is known only by their contract (`mount.dbc`): one that
 answers a sample of the last 20 ms, or none. So two bounds are kept. The upper one rises at once to the
@@ -12,9 +12,10 @@ damping; a current that is too high stays in sight at any load of the machine.
 """
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, NamedTuple
 
-from mount_driver.codec import Measurement, Setpoint
+from mount_driver.protocol import Measurement, Setpoint
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
@@ -62,81 +63,61 @@ class CoilWatch:
         self._lows, self._highs = [0.0] * self._followed, [HIGHEST_CURRENT] * self._followed
         self._low, self._high = 0.0, HIGHEST_CURRENT
         self._number = -1  # of the last sample: its counter, unwrapped
-        self._off_sent = False
         self._sure_from = 0
         self._deviating = 0  # samples, less one for each `_FORGIVEN` that fitted
         self._fitting = 0
 
-    def note_sent(self, setpoint: Setpoint) -> None:
-        """Take a setpoint that leaves; one thread at a time, which need not be that of `judge`."""
-        if not setpoint.enable:
-            self._off_sent = True
-            return
-        newest = self._number  # once: the other thread counts on
-        age = (newest - setpoint.answered_counter) & _COUNTER_MASK
-        if age >= self._followed:
-            return  # nor do the electronics use it
-        place = (newest - age) % self._followed
-        current = setpoint.current
-        if current < self._lows[place]:
-            self._lows[place] = current
-        if current > self._highs[place]:
-            self._highs[place] = current
-
-    def judge(self, sample: Measurement) -> str:
+    def judge(self, sample: Measurement, sent: Iterable[Setpoint] = ()) -> str:
         """Return why the coil is not under control, empty while it is or while that is not certain.
 
-        Each sample comes once, in order. Electronics that say to be off must carry no current. A current that
-        is not valid (NaN) is a deviation as soon as one is wanted.
+        Each sample comes once, in order, with the setpoints `sent` since the one before. Electronics that say
+        to be off must carry no current. A current that is not valid (NaN) is a deviation as soon as one is
+        wanted.
         """
-        lost = self._count(sample.sample_counter)
+        # In one piece, as it runs for every sample. First what the setpoints lie between, sample by sample.
         off = sample.setpoint_timeout or not sample.enabled
-        if off or self._off_sent:
-            self._off_sent = False
-            self._sure_from = self._number + self._unsure
-        wanted = max(self._highs)
-        self._follow(0.0 if off else wanted, lost)
+        unsure, lows, highs, last, followed = off, self._lows, self._highs, self._number, self._followed
+        for setpoint in sent:
+            unsure = unsure or not setpoint.enable
+            age = (last - setpoint.answered_counter) & _COUNTER_MASK
+            if setpoint.enable and age < followed:  # else the electronics do not use it
+                place = (last - age) % followed
+                lows[place] = min(lows[place], setpoint.current)
+                highs[place] = max(highs[place], setpoint.current)
+        # What answered the oldest samples is forgotten, and nothing answers the new ones yet.
+        counter = sample.sample_counter
+        self._number = number = last + ((counter - last) & _COUNTER_MASK) if last >= 0 else counter
+        lost = number - last - 1 if last >= 0 else 0
+        for each in range(number - min(lost, followed), number + 1):
+            lows[each % followed], highs[each % followed] = math.inf, 0.0
+        if unsure:
+            self._sure_from = number + self._unsure
+        # The upper bound, then the lower one, which begins at 0 A where samples were lost.
+        wanted, low = max(highs), min(lows)
+        high = 0.0 if off else wanted
+        fall = self._share * (self._high - high)  # negative where the bound lies below: then it goes there
+        self._high = high if fall <= 0.0 else self._high - (fall if fall < self._fall else self._fall)
+        before = 0.0 if lost else self._low
+        rise = self._share * (low - before)
+        if low > high or number < self._sure_from:
+            self._low = 0.0
+        else:
+            self._low = low if rise <= 0.0 else before + (rise if rise < self._rise else self._rise)
         current = sample.coil_current
         within = self._low - self._limit <= current <= self._high + self._limit  # not so for NaN
         if within or (current != current and wanted == 0.0):
-            self._forgive()
+            if self._deviating:
+                self._forgive()
             return ''
         self._deviating += 1
         return self._sentence(current) if self._deviating > self._duration else ''
 
     def _forgive(self) -> None:
         """Forget a sample that deviated for many that fit: a coil that is stuck fits now and then too."""
-        if self._deviating:
-            self._fitting += 1
-            if self._fitting == _FORGIVEN:
-                self._fitting = 0
-                self._deviating -= 1
-
-    def _count(self, counter: int) -> int:
-        """Return how many samples were lost; forget what answered the oldest, nothing answers the new yet."""
-        last = self._number
-        self._number = number = last + ((counter - last) & _COUNTER_MASK) if last >= 0 else counter
-        lost = number - last - 1 if last >= 0 else 0
-        for each in range(number - min(lost, self._followed), number + 1):
-            place = each % self._followed
-            self._lows[place], self._highs[place] = math.inf, 0.0
-        return lost
-
-    def _follow(self, high: float, lost: int) -> None:
-        """Move the bounds on by a sample, the lower one from 0 A where samples were `lost`."""
-        gap = self._high - high
-        if gap > 0.0:
-            fall = self._share * gap
-            self._high -= fall if fall < self._fall else self._fall
-        else:
-            self._high = high
-        low = min(self._lows)
-        if low > high or self._number < self._sure_from:
-            self._low = 0.0
-            return
-        before = 0.0 if lost else self._low
-        rise = self._share * (low - before)  # negative where the bound lies above: then it goes there at once
-        self._low = low if rise <= 0.0 else before + (rise if rise < self._rise else self._rise)
+        self._fitting += 1
+        if self._fitting == _FORGIVEN:
+            self._fitting = 0
+            self._deviating -= 1
 
     def _sentence(self, current: float) -> str:
         measured = f'{current:.3f} A' if current == current else 'not valid'

@@ -1,39 +1,30 @@
 """All watches of the link in one place: what they say of a sample, a status, a frame of another sender.
 
-No bus here. Each judgement returns the `Fault` that takes the coil to 0 A, or None.
+No bus here, and nothing is written to the link: each judgement is returned.
 """
 
-from typing import NamedTuple
+from collections import deque
 
 from mount_driver.clock import Clock
-from mount_driver.codec import MountCodec, Setpoint, Status
 from mount_driver.layout import MessageLayout
-from mount_driver.link import Link, Stamped
+from mount_driver.link import NO_LIMITS, Fault, Limits, Link, Stamped
 from mount_driver.parameters import DriverParameters
+from mount_driver.protocol import MountCodec, Setpoint, Status
 from mount_driver.watches.coil_watch import CoilWatch
 from mount_driver.watches.heat_watch import HeatWatch
-from mount_driver.watches.rate_watch import RateWatch
+from mount_driver.watches.message_watches import SenderWatch, StatusWatch
 from mount_driver.watches.ripple_law import RippleLaw
 from mount_driver.watches.ripple_watch import RippleWatch
-from mount_driver.watches.sender_watch import SenderWatch
-from mount_driver.watches.status_watch import StatusWatch
 from mount_models.sampling import sample_time_ns
 
 _ALONE = 'take every node but the electronics that sends it off the bus'
-
-
-class Fault(NamedTuple):
-    """Why the coil is to be off until the driver is activated again."""
-
-    sentence: str
-    needs_initialisation: bool = False
-    """Nothing else is needed: a graph may do it by itself."""
-    foreign_writer: bool = False
-    """Another node publishes setpoints: the graph goes on at 0 A, and records, until a user has ended it."""
+_HEATING_STEP = 100_000_000  # ns, chosen: 10 times a second the model of the coil's temperature goes on
+_NOTED = 256  # setpoints, chosen: between two samples there are a few; of more the oldest are forgotten
+_new = tuple.__new__  # makes a named tuple without the call of a Python function
 
 
 class Guard:
-    """Judges what comes and remembers what was sent; lives as long as an activation."""
+    """Judges what comes by what was sent; lives as long as an activation."""
 
     def __init__(
         self,
@@ -48,60 +39,79 @@ class Guard:
         """Sound setpoint frames of another sender."""
         self.writer_doubt = ''
         """Why another node may publish setpoints, so that answers are 0 A; empty where none may."""
+        self.limits = NO_LIMITS
+        """What the watches allow since the last sample that they judged."""
+        self.unjudged: tuple[Stamped, int] | None = None
+        """The newest sample and when it came (ns), until it is judged."""
+        self.sent: deque[Setpoint] = deque(maxlen=_NOTED)
+        """The setpoints that have left since the last sample was judged."""
         self.heat = heat
         self.ripple = RippleWatch(parameters.ripple, law, parameters.heating)
         self._link, self._clock = link, clock
         self._coil = CoilWatch(parameters.coil, sample_time_ns(parameters.sample_rate))
-        self._rate = RateWatch(parameters.sample_rate)
         self._health = StatusWatch(parameters.status)
         self._samples = SenderWatch(parameters.senders, codec.measurement.name, _ALONE)
         self._statuses = SenderWatch(parameters.senders, codec.status.name, _ALONE)
         self._setpoints: MessageLayout = codec.setpoint
         self._foreign_at: int | None = None
-        self._sent = 0.0
+        self._sent_last = 0.0  # A
+        self._heating_since: int | None = None  # stamp from which the squares of the current are summed
+        self._squares, self._summed = 0.0, 0
         self._breaks = 0
         heat.begin()
 
     @property
     def other_senders(self) -> int:
-        """Return how many frames came that our electronics and we did not send."""
+        """How many frames came that neither our electronics nor we sent."""
         link = self._link
         return self.foreign_setpoints + _strangers(link) + link.statuses.strangers
 
     @property
     def other_sender_at(self) -> int | None:
-        """Return when the last of them came (ns), None where none has."""
+        """When the last of them came (ns), None where none has."""
         times = (self._foreign_at, self._samples.last, self._statuses.last)
         return max((time for time in times if time is not None), default=None)
 
-    def note_sent(self, setpoint: Setpoint) -> None:
-        """Take a setpoint that leaves; one thread at a time."""
-        self._sent = setpoint.current
-        self._coil.note_sent(setpoint)
-
-    def judge_sample(self, stamped: Stamped, received: int) -> Fault | None:
-        """Take a new sample and lower the link's limits as the watches say."""
-        (stamp, sample), link, heat = stamped, self._link, self.heat
-        now = self._clock.now(received)
-        link.held = self._health.hold(now) or self.writer_doubt
-        heat.take(stamp, sample.coil_current, self._sent)
-        link.current_limit = heat.current_limit
-        if link.jumps + self._clock.restarts != self._breaks:
-            self._breaks = link.jumps + self._clock.restarts
-            return Fault(self._restarted(), needs_initialisation=True)
-        sentence = self._rate.judge(sample) or self._coil.judge(sample)
+    def judge_sample(self) -> Fault | None:
+        """Return what follows from the newest sample, which is then judged; `limits` change with it."""
+        assert self.unjudged is not None
+        ((stamp, sample), now), self.unjudged = self.unjudged, None
+        heat, health, sent = self.heat, self._health, self.sent
+        if sent:
+            self._sent_last = sent[-1].current
+        # The greater of measured and sent current heats, the sent one where the other is not valid (NaN).
+        current, since = sample.coil_current, self._heating_since
+        if not current > self._sent_last:
+            current = self._sent_last
+        self._squares += current * current
+        self._summed += 1
+        if since is None:
+            self._heating_since = stamp
+        elif stamp - since >= _HEATING_STEP:
+            heat.warm(self._squares / self._summed, 1e-9 * (stamp - since))
+            self._heating_since, self._squares, self._summed = stamp, 0.0, 0
+        held = self.writer_doubt
+        if health.valid_until is None or now > health.valid_until or health.sensor_fault:
+            held = health.hold(now) or held
+        self.limits = _new(Limits, (heat.current_limit, held))
+        breaks = self._link.counts.jumps + self._clock.restarts
+        if breaks != self._breaks:
+            self._breaks = breaks
+            return Fault(self._restart_sentence(), needs_initialisation=True)
+        sentence = self._link.rate_objection or self._coil.judge(sample, sent)
+        sent.clear()
         sentence = sentence or self.ripple.judge(
             sample.coil_current, sample.current_rate, sample.flux_rate, sample.enabled, now
         )
         return Fault(sentence) if sentence else None
 
     def judge_frame(self, received: int) -> Fault | None:
-        """Look at who sent a measurement frame that was not used, or a sample that came once more."""
+        """Return what follows from a measurement frame that was not used, or a sample that came once more."""
         sentence = self._samples.judge(_strangers(self._link), self._clock.now(received))
         return Fault(sentence) if sentence else None
 
     def judge_status(self, status: Status | None, now: int) -> Fault | None:
-        """Take a status, None where the frame was not used."""
+        """Return what follows from a status; None: the frame was not used."""
         sentence = self._statuses.judge(self._link.statuses.strangers, now)
         if status is not None:
             self.heat.take_reported(status.coil_temperature_celsius)
@@ -110,7 +120,7 @@ class Guard:
         return Fault(sentence) if sentence else None
 
     def judge_foreign(self, setpoint: Setpoint | None, now: int) -> Fault:
-        """Take a sound setpoint frame that we have not sent; None where its current is beyond the limit."""
+        """Return what follows from a sound setpoint frame of another sender; None: it exceeds the limit."""
         self.foreign_setpoints += 1
         self._foreign_at = now
         wanted = 'a current beyond the limit' if setpoint is None else f'{setpoint.current:.3f} A'
@@ -119,8 +129,9 @@ class Guard:
             f'take it off the bus, only mount_driver may send it'
         )
 
-    def _restarted(self) -> str:
-        kind = 'contradict each other' if self._link.jumps else 'have jumped or begun anew, as at a restart'
+    def _restart_sentence(self) -> str:
+        jumped = self._link.counts.jumps
+        kind = 'contradict each other' if jumped else 'have jumped or begun anew, as at a restart'
         return f"the electronics' counters {kind} ({self._breaks} times, limit 0): check their supply"
 
 

@@ -14,9 +14,8 @@ to spare from its begin on: the ramp warms the coil by less than 1 K.
 from mount_models.coil.heating import CoilHeating, highest_current, hottest_by_current, warmed
 from mount_models.sampling import HIGHEST_CURRENT
 
-_STEP = 100_000_000  # ns, chosen: the model goes on 10 times a second, the square of the current each sample
-_LONGEST_STEP = 2_000_000_000  # ns, chosen: of a longer pause nothing is known, so the coil has not cooled
-_AGE = 10.0  # s, chosen: a temperature told from before is no older; 3 A may have flowed since it was told
+_LONGEST_STEP = 2.0  # s, chosen: of a longer pause nothing is known, so the coil has not cooled
+_AGE = 10.0  # s, chosen: a temperature from before is no older; 3 A may have flowed since
 _SPARE = 12.0  # A^2 s, chosen: a ramp takes 7.2; 12 warm the shipped coil by 0.5 K
 _NEAR = 5.0  # K, chosen: so near to its limit nothing is spared
 
@@ -29,8 +28,6 @@ class HeatWatch:
         self.known = celsius == celsius
         """Whether the temperature rests on what was measured, and not on the worst that may be."""
         self.heating = heating
-        self._begin: int | None = None  # stamp of the sample from which the squares are summed
-        self._squares, self._samples = 0.0, 0
         self._spare = _SPARE  # A^2 s
         if self.known:
             begin = max(celsius, heating.ambient_celsius)
@@ -39,25 +36,20 @@ class HeatWatch:
             self._set(hottest_by_current(heating, HIGHEST_CURRENT))
 
     @property
-    def told(self) -> float:
+    def known_celsius(self) -> float:
         """The temperature for a watch that follows this one, degC; NaN where it is not known."""
         return self.celsius if self.known else float('nan')
 
     def begin(self) -> None:
-        """Start with stamps of another clock: what lies between is not known and cools nothing."""
-        self._begin = None
+        """Let another activation begin: it has its own current to spare."""
         self._spare = _SPARE
         self._set(self.celsius)
 
-    def take(self, stamp: int, measured: float, sent: float) -> None:
-        """Take the current that was measured at `stamp` (ns) and the one that was sent last, both A."""
-        if self._begin is None:
-            self._begin, self._squares, self._samples = stamp, 0.0, 0
-        current = measured if measured > sent else sent  # `sent` where `measured` is not valid (NaN)
-        self._squares += current * current
-        self._samples += 1
-        if stamp - self._begin >= _STEP:
-            self._go_on(stamp)
+    def warm(self, mean_square: float, seconds: float) -> None:
+        """Go on by a time in which the current had this mean square, A^2."""
+        if seconds <= _LONGEST_STEP:
+            self._spare -= mean_square * seconds
+            self._set(warmed(self.heating, self.celsius, mean_square, seconds))
 
     def take_reported(self, celsius: float) -> None:
         """Take the temperature that the electronics report, degC; NaN where they know none."""
@@ -66,15 +58,6 @@ class HeatWatch:
         elif not self.known and celsius == celsius:
             self._set(max(celsius, self.heating.ambient_celsius))
         self.known = self.known or celsius == celsius
-
-    def _go_on(self, stamp: int) -> None:
-        assert self._begin is not None
-        elapsed = stamp - self._begin
-        if elapsed <= _LONGEST_STEP:
-            mean_square, seconds = self._squares / self._samples, 1e-9 * elapsed
-            self._spare -= mean_square * seconds
-            self._set(warmed(self.heating, self.celsius, mean_square, seconds))
-        self._begin, self._squares, self._samples = stamp, 0.0, 0
 
     def _set(self, celsius: float) -> None:
         self.celsius = celsius

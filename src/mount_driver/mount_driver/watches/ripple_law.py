@@ -13,6 +13,9 @@ if TYPE_CHECKING:  # to load it takes a second
     from mount_models.specimen import Specimen
 
 
+DUTY_STEP = 1.0 / 256.0
+
+
 class RippleLaw(NamedTuple):
     """Inductance at rest and crossing current at the calibrated gaps, and what the temperature does; SI.
 
@@ -38,7 +41,7 @@ class RippleLaw(NamedTuple):
 
 
 def ripple_law(specimen: 'Specimen') -> RippleLaw:
-    """Return what a specimen says of the ripple; without a temperature compensation it holds at any."""
+    """Return the law of the ripple of a specimen; without a temperature compensation it holds at any."""
     curves, temperature = specimen.gap_curves, specimen.temperature
     low, high = curves.crossing_current_of_gap.low, curves.crossing_current_of_gap.high
     middle = 0.5 * (low + high)
@@ -86,29 +89,9 @@ def warmth(law: RippleLaw, celsius: float) -> float:
     return 1.0 / (1.0 + shift * _skin_change(law, celsius) / _skin_change(law, law.reference_celsius))
 
 
-class SupplyCarrier:
-    """Carries inductances to the voltage of the gap curves, as `mount_models.coil.duty` does, by a table."""
-
-    def __init__(self, law: RippleLaw):
-        self._voltage, self._gap = law.bridge.link_voltage, law.gap_reluctance
-        self._shapes: list[float] = skin_shape(
-            law.bridge, [0.5 + k * _DUTY_STEP for k in range(_DUTIES)]
-        ).tolist()
-
-    def carried(self, inductance: float, held: float, voltage: float) -> float:
-        """Return an inductance (H) at a `voltage` (V), of which the coil holds R i = `held` (V), carried."""
-        if not 0.0 <= held < voltage or held >= self._voltage:
-            return inductance
-        ratio = self._shape(held / self._voltage) / self._shape(held / voltage)
-        return inductance / (1.0 + (1.0 - inductance * self._gap) * (ratio - 1.0))
-
-    def _shape(self, share: float) -> float:
-        place = 0.5 * share / _DUTY_STEP
-        below = int(place)
-        if below > _DUTIES - 2:
-            below = _DUTIES - 2
-        shapes = self._shapes
-        return shapes[below] + (place - below) * (shapes[below + 1] - shapes[below])
+def skin_table(law: RippleLaw) -> list[float]:
+    """Return `mount_models.coil.duty.skin_shape` from a duty of 0.5 on, in steps of `DUTY_STEP`."""
+    return skin_shape(law.bridge, [0.5 + k * DUTY_STEP for k in range(_DUTIES)]).tolist()
 
 
 def gap_of_crossing(law: RippleLaw, current: float) -> float:
@@ -130,7 +113,6 @@ def crossing_per_gap(law: RippleLaw) -> float:
 _HALF = (
     0.5  # 1, chosen: without a second temperature, of the reluctance at rest; 0.49 of the shipped actuator
 )
-_DUTY_STEP = 1.0 / 256.0
 _DUTIES = 128  # from 0.5 on: the table ends before 1
 
 

@@ -1,7 +1,7 @@
 """The inductance over the current as the driver itself saw it in the ramp of the initialisation.
 
 No bus and no clock here. The driver knows nothing of mount_init: the first sweep of the current beyond 2 A
-and back to 0 A after its activation is the reference, whoever asked for it.
+and back to 0 A after its activation is the reference, whichever node commanded it.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ NODE = 0.05
 _NODES = round(HIGHEST_CURRENT / NODE) + 1
 _PEAK = 2.0  # A: the lowest peak that mount_init may have, and beyond every crossing
 _BEGUN, _ENDED = 0.3, 0.5 * NODE  # A, chosen: a sweep has begun above the one and is over below the other
-_FEWEST = 3  # readings, chosen: of fewer a node says nothing
+_FEWEST = 3  # readings, chosen: of fewer a node of the curve is not known
 _SATURATED = (
     0.5  # share of the crossing inductance, chosen: below it the core is full and the gap hardly shows
 )

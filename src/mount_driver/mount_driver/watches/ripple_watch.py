@@ -3,9 +3,9 @@
 No bus and no clock here: times are ns by the clock that judges ages (`Clock.now`).
 
 Two questions. Does the voltage that drives the ripple, N A dB/dt + R(T) i, agree with the supply that the
-status tells? Other turns, another scale of dB/dt or none show at any current. And is the incremental
+status reports? Other turns, another scale of dB/dt or none show at any current. And is the incremental
 inductance L_i = N A (dB/dt) / (di/dt), Eq (5), at this current the one of the ramp (`ripple_sweep`)? There
-the gap of every current passed by once; the means of the deviation, one for each 0.1 A, tell a gap that has
+the gap of every current passed by once; the means of the deviation, one for each 0.1 A, show a gap that has
 changed.
 
 What the gap does to L_i at a given current, with the shipped actuator: at 0.5 A a blocked gap lowers it by
@@ -16,17 +16,17 @@ below 0.7 A; above 1.8 A, where the core is full, only missing pads show.
 Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that of the reference. The limit of
 5 % lies 16 sigma away, and 8 behind an error of temperature and supply of 2.5 %: 6e-16 for each mean, and so
 less than one false alarm in 1e5 years. The mean shows a missing pad after 5 readings within 0.1 A and a
-blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Told is what lasts for `duration`:
+blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Reported is what lasts for `duration`:
 three statuses, as supply and temperature are that late.
 
 Worn pads show between 0.75 A and the crossing, where an engine that is damped once for 0.1 s may come by only
 once, with a few readings in each zone. There a mean over all currents joins them; after 48 readings it is
-told also if none comes again.
+reported also if none comes again.
 """
 
 from typing import Annotated, NamedTuple
 
-from mount_driver.watches.ripple_law import RippleLaw, SupplyCarrier, crossing_per_gap, warmth
+from mount_driver.watches.ripple_law import DUTY_STEP, RippleLaw, crossing_per_gap, skin_table, warmth
 from mount_driver.watches.ripple_sweep import NODE, Reference, Sweep, objection
 from mount_models.coil.heating import COPPER_CELSIUS, CoilHeating
 from mount_models.quantity import Quantity
@@ -40,10 +40,10 @@ _TO_STD = 0.886  # sqrt(pi) / 2: from the mean difference of two readings to the
 _UNKNOWN_CELSIUS = 0.1  # 1, chosen: what 100 K do
 _UNKNOWN_RESISTANCE = 0.4  # 1, chosen: likewise
 _BLIND = 0.75  # A, chosen: up to here worn pads change L_i by less than 1 % for each 10 um
-_NEAR = 0.2  # A, chosen: so near to the crossing a deviation is told as a gap
+_NEAR = 0.2  # A, chosen: so near to the crossing a deviation is reported as a gap
 _PAUSE = 50_000_000  # ns, chosen: of a longer time without samples nothing is known
 _SURE = 24  # readings: so many sound ones bring a mean of `_FARTHEST` back below 1
-_CERTAIN = 48  # readings over the zones, chosen: told though none comes again, for an engine is damped once
+_CERTAIN = 48  # readings over the zones, chosen: enough without a later one, as an engine may be damped once
 _JOINT = _ZONES = 32
 _JUMP = 0.03  # 1, chosen: another 35 K from one status to the next; a coil takes a minute for it
 _NOTHING_KNOWN = ('missing', 'voltage')  # findings with which no reading is compared
@@ -88,8 +88,8 @@ class RippleWatch:
     def __init__(self, parameters: RippleWatchParameters, law: RippleLaw, heating: CoilHeating):
         self._parameters, self._law, self._heating = parameters, law, heating
         self._duration = round(1e9 * parameters.duration)
-        self._turns_area = law.turns_area
-        self._carrier = SupplyCarrier(law)
+        self._turns_area, self._crossing_per_gap = law.turns_area, crossing_per_gap(law)
+        self._link_voltage, self._skin = law.bridge.link_voltage, skin_table(law)
         self._sweep = Sweep()
         self._reference: Reference | None = None
         self._means = [0.0] * (_ZONES + 1)  # of the deviations in tolerances, each of 0.1 A, and over zones
@@ -149,36 +149,36 @@ class RippleWatch:
             volts = flux_volts + self._resistance * current
             mean = self._volts
             self._volts = mean + _SHARE * (volts - mean) if mean == mean else volts
-        finding = self._find(current)
+        # What is wrong with the readings at present, empty where nothing is.
+        p, supply = self._parameters, self._supply
+        finding = 'noise' if self._noise > p.noise_limit else ''
+        limit = p.voltage_limit * supply + self._unknown_resistance * current
+        if self._missing > 0.5:
+            finding = 'missing'
+        elif self._volts - supply > limit or supply - self._volts > limit:  # not so for an unknown supply
+            finding = 'voltage'
         if finding or self._finding:
             sentence = self._lasting(finding, now)
             if sentence:
                 return sentence
         if not valid or finding in _NOTHING_KNOWN:
             return ''
-        held = self._resistance * current
-        inductance = self._carrier.carried(flux_volts / current_rate, held, self._volts) * self._cold
-        if self._reference is None:
-            return self._learn(current, inductance) if self._sweep.take(current, inductance) else ''
-        return self._compare(self._reference, current, inductance, now)
+        return self._judge_inductance(current, flux_volts / current_rate, now)
 
-    def _find(self, current: float) -> str:
-        """Return what is wrong with the readings at present, empty where nothing is."""
-        p = self._parameters
-        if self._missing > 0.5:
-            return 'missing'
-        deviation = self._volts - self._supply
-        limit = p.voltage_limit * self._supply + self._unknown_resistance * current
-        if deviation > limit or -deviation > limit:  # not so where the supply is not known
-            return 'voltage'
-        return 'noise' if self._noise > p.noise_limit else ''
-
-    def _learn(self, current: float, inductance: float) -> str:
-        p = self._parameters
-        self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
-        return '' if self._reference is None else objection(self._reference, self._law, self._wider)
-
-    def _compare(self, reference: Reference, current: float, inductance: float, now: int) -> str:
+    def _judge_inductance(self, current: float, inductance: float, now: int) -> str:
+        # Carried to voltage and temperature of the gap curves, as `mount_models.coil.duty` does.
+        held, volts, skin = self._resistance * current, self._link_voltage, []
+        if 0.0 <= held < self._volts and held < volts:
+            for supply in (volts, self._volts):
+                place = 0.5 * (held / supply) / DUTY_STEP
+                below = min(int(place), len(self._skin) - 2)
+                skin.append(self._skin[below] + (place - below) * (self._skin[below + 1] - self._skin[below]))
+            share = 1.0 - inductance * self._law.gap_reluctance
+            inductance /= 1.0 + share * (skin[0] / skin[1] - 1.0)
+        inductance *= self._cold
+        reference = self._reference
+        if reference is None:
+            return self._learn() if self._sweep.take(current, inductance) else ''
         place = int(current / NODE + 0.5)
         if place >= len(reference.inductance):
             return ''
@@ -190,29 +190,32 @@ class RippleWatch:
         self._last = deviation
         step = step if step >= 0.0 else -step
         self._noise += _NOISE_SHARE * (_TO_STD * (step if step < _ODD else _ODD) - self._noise)
-        if self._noise > self._parameters.noise_limit:  # such readings tell nothing of the gap
+        if self._noise > self._parameters.noise_limit:  # such readings show no gap
             return ''
-        tolerance = reference.tolerance[place] + self._wider
+        sentence, tolerance = '', reference.tolerance[place] + self._wider
         excess = deviation / tolerance
         excess = _FARTHEST if excess > _FARTHEST else -_FARTHEST if excess < -_FARTHEST else excess
         if -_NEAR < current - reference.crossing_current < _NEAR:
             self._note_gap(deviation * expected / -reference.slope[place])
-        at = current, expected, tolerance
-        mean = self._beyond_mean(place >> 1, excess, now)
-        if _BLIND < current < reference.crossing_current + _NEAR:
-            self._joint_at = at
-            self._beyond_mean(_JOINT, excess, now)
-        if not mean and self._beyond[_JOINT] >= _CERTAIN and self._has_lasted(_JOINT, now):
-            at, mean = self._joint_at, self._means[_JOINT]
-        return self._gap_sentence(*at, mean) if mean else ''
+        # A mean for each 0.1 A, and one over all currents at which worn pads show.
+        joint = _BLIND < current < reference.crossing_current + _NEAR
+        if joint:
+            self._joint_at = current, expected, tolerance
+        for zone in (place >> 1, _JOINT) if joint else (place >> 1,):
+            self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
+            if -1.0 <= mean <= 1.0:
+                self._beyond[zone] = 0
+            elif self._lasts_beyond(zone, now) and zone != _JOINT:
+                sentence = self._gap_sentence(current, expected, tolerance, mean)
+        if not sentence and self._beyond[_JOINT] >= _CERTAIN and self._has_lasted(_JOINT, now):
+            return self._gap_sentence(*self._joint_at, self._means[_JOINT])
+        return sentence
 
-    def _beyond_mean(self, zone: int, excess: float, now: int) -> float:
-        """Take a deviation (tolerances) into a zone's mean; return it if it has long been beyond, else 0."""
-        self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
-        if -1.0 <= mean <= 1.0:
-            self._beyond[zone] = 0
-            return 0.0
-        return mean if self._lasts_beyond(zone, now) else 0.0
+    def _learn(self) -> str:
+        """Take the sweep that has ended for the reference; return why it cannot be right, empty if it may."""
+        p = self._parameters
+        self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
+        return '' if self._reference is None else objection(self._reference, self._law, self._wider)
 
     def _lasts_beyond(self, zone: int, now: int) -> bool:
         """Whether the mean of a zone, now beyond its limit, has stayed there for long enough."""
@@ -227,7 +230,7 @@ class RippleWatch:
 
     def _note_gap(self, current: float) -> None:
         """Take by how much (A) the crossing has moved by the last reading."""
-        change = current / crossing_per_gap(self._law)
+        change = current / self._crossing_per_gap
         before = self._change if self._change == self._change else 0.0
         self._change = before + _SLOW_SHARE * (change - before)
 
@@ -236,7 +239,7 @@ class RippleWatch:
         """Return what is to be warned of, empty where nothing is."""
         p = self._parameters
         change = self._change
-        slow = self._judged - self._beyond_last > 2 * self._duration  # else a fault is about to be told
+        slow = self._judged - self._beyond_last > 2 * self._duration  # else a fault is about to be reported
         if slow and (change > p.gap_warning or -change > p.gap_warning):
             return (
                 f'closed gap has changed by {1e6 * change:+.0f} um since the initialisation (limit '

@@ -10,7 +10,6 @@ import numpy as np
 
 from engine_mount.recordings.events.switching_changes import Switching
 from mount_bringup.chosen import policy_of
-from mount_bringup.mount_choice import seat_of
 from mount_experiments.check.measures import BANDS, RACK
 from mount_experiments.check.suite import Manoeuvre
 from mount_experiments.policy.runs import first_extremum
@@ -20,6 +19,7 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.evaluation import switching, tracking_error
 from mount_report.drive.signals import DriveSignals, FloatArray, Truth
 from mount_report.sections.periodic import cycle_work, distortion, harmonics, whole_periods
+from mount_sim.mount_choice import seat_of
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import without_friction
 

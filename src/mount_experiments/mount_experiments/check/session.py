@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from engine_mount.recordings.run.screen import Bar, Screen
-from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.mounts import mounts_of
 from mount_bringup.settings import checked_settings
 from mount_experiments.check.suite import Manoeuvre
@@ -18,6 +17,7 @@ from mount_models.quantity import ParameterError
 from mount_models.sampling import SAMPLE_RATE
 from mount_replay.drive.preflight import preflight
 from mount_replay.fleet.runner import run_tasks
+from mount_sim.mount_choice import with_control_of_mount
 
 Settings = Mapping[str, Mapping[str, Any]]
 Told = Callable[[str, Result, float], None]

@@ -13,7 +13,7 @@ from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import Losses, losses
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.run.screen import Screen
-from mount_bringup.graph.errors import GraphError
+from mount_bringup.graph.nodes import GraphError
 from mount_experiments.check.evaluation import Beside, Driven, figures_of
 from mount_experiments.check.suite import Manoeuvre
 from mount_experiments.sensitivity.grid import TruthOnly

@@ -8,11 +8,11 @@ from typing import Any
 from engine_mount.recordings.bag.recording import open_recording
 from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.domain import chosen_domain
-from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.settings import defaults_of_nodes
 from mount_experiments.harness.contract import ExperimentError, Order
 from mount_replay.drive.drive import DriveOrder, record_drive
 from mount_report.drive.signals import DriveSignals, load_drive
+from mount_sim.mount_choice import with_control_of_mount
 
 PAPER = 'switched_viscous'
 """The policy of the paper, with which its scenes are driven."""

@@ -19,6 +19,7 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_experiments.harness.drawing import BLUE, RED, family, finish, new_figure
+from mount_experiments.harness.fixed_gaps import RIG_CURRENTS, RigMeasurements, RigNoise, measure_actuator
 from mount_experiments.inductance_map import REFERENCE, TITLE
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import (
@@ -35,7 +36,6 @@ from mount_replay.loop.recording import record_core
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil
-from mount_sim.rack.fixed_gaps import RIG_CURRENTS, RigMeasurements, RigNoise, measure_actuator
 
 FloatArray = npt.NDArray[np.float64]
 

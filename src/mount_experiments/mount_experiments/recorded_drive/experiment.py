@@ -36,7 +36,8 @@ from mount_models.quantity import Quantity, with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_report.drive.evaluation import switching
 from mount_report.drive.signals import DriveSignals, FloatArray, Truth
-from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario, recorded_signal
+from mount_sim.excitation.building import recorded_signal
+from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario
 
 NAME = 'recorded_drive'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', ELASTOMER: 'elastomer'}

@@ -21,8 +21,14 @@ from mount_identification.actuator.points import (
     gap_groups,
 )
 from mount_identification.single_threaded import single_threaded
-from mount_models.actuator.law import ForceLaw, checked_force, coefficients
-from mount_models.actuator.law_check import LOWEST_SHARE, ForceLawRefusedError, check_force_law
+from mount_models.actuator.law import (
+    LOWEST_SHARE,
+    ForceLaw,
+    ForceLawRefusedError,
+    check_force_law,
+    checked_force,
+    coefficients,
+)
 from mount_models.arithmetic.compiled import compiled
 
 FloatArray = npt.NDArray[np.float64]

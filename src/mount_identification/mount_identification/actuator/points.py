@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.actuator.law_check import ForceLawRefusedError
+from mount_models.actuator.law import ForceLawRefusedError
 
 FloatArray = npt.NDArray[np.float64]
 Orders = tuple[int, int, int, int, int]

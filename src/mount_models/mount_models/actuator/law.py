@@ -1,4 +1,4 @@
-"""The current-force law of the actuator as the controller knows it, and its inverse (Eqs 3, 4, Table 1)."""
+"""The current-force law as the controller knows it, its inverse and its check (Eqs 3, 4, Table 1)."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -9,6 +9,11 @@ import numpy.typing as npt
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import atan
 from mount_models.quantity import Quantity
+
+FloatArray = npt.NDArray[np.float64]
+
+LOWEST_SHARE = 1.0 / 60.0
+"""Of the highest current, chosen: 0.05 A of 3 A."""
 
 _POLYNOMIAL = 'polynomial coefficients in powers of the gap in micrometres, lowest power first'
 
@@ -27,6 +32,10 @@ class CurrentOutsideLaw(OutsideLawError):  # noqa: N818
 
 class ForceOutsideLaw(OutsideLawError):  # noqa: N818
     """No current within the guarded range gives this force at this air gap."""
+
+
+class ForceLawRefusedError(ValueError):
+    """A force law is not usable, or measurements lead to none; the text says why and the remedy."""
 
 
 class ForceLaw(NamedTuple):
@@ -111,7 +120,7 @@ def coefficients(law, gap):
     )
 
 
-def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
     """Return the magnetic force (N) for currents (A) and gaps (m) of any shapes that broadcast, Eq (3).
 
     Raises `GapOutsideLaw` or `CurrentOutsideLaw`; nothing is ever extrapolated.
@@ -122,9 +131,7 @@ def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> 
     return _each_force(law, current.ravel(), gap.ravel()).reshape(gap.shape)[()]
 
 
-def checked_current_for_force(
-    law: ForceLaw, force: npt.ArrayLike, gap: npt.ArrayLike
-) -> npt.NDArray[np.float64]:
+def checked_current_for_force(law: ForceLaw, force: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
     """Return the current (A) for forces (N) and gaps (m) of any shapes that broadcast, inverse of Eq (3).
 
     Raises `GapOutsideLaw`, or `ForceOutsideLaw` for a force that is negative or beyond `current_high`.
@@ -134,7 +141,13 @@ def checked_current_for_force(
     current = _each_current(law, force.ravel(), gap.ravel()).reshape(gap.shape)
     unreachable = np.isnan(current)
     if unreachable.any():
-        _refuse_force(law, float(force[unreachable][0]), float(gap[unreachable][0]))
+        value, place = float(force[unreachable][0]), float(gap[unreachable][0])
+        raise ForceOutsideLaw(
+            f'magnetic force ({value:.2f} N) must lie within 0.00 .. '
+            f'{_force_and_slope(coefficients(law, place), law.current_high)[0]:.2f} N, which '
+            f'{law.current_high:.2f} A reach at an air gap of {place * 1e6:.1f} um; demand less force, '
+            f'or make the gap smaller'
+        )
     return current[()]
 
 
@@ -149,6 +162,27 @@ def check_gap(law: ForceLaw, gap: npt.ArrayLike) -> None:
             f'{law.gap_high * 1e6:.1f} um; beyond it the force law is not valid: check the gap measurement, '
             f'or calibrate the actuator over a wider range of gaps'
         )
+
+
+def check_force_law(law: ForceLaw, lowest_current: float = 0.0) -> None:
+    """Raise `ForceLawRefusedError` unless `law` can be inverted everywhere within its guarded range.
+
+    Looked at on 61 gaps and 119 currents from 1/60 of the highest up; below, the force is next to nothing.
+    With a `lowest_current` (A) above that, from there up only.
+    """
+    if not (0.0 < law.gap_low < law.gap_high and law.current_high > 0.0):
+        raise ForceLawRefusedError(
+            f'guarded range ({law.gap_low * 1e6:.1f} .. {law.gap_high * 1e6:.1f} um, '
+            f'0 .. {law.current_high:.2f} A) must hold gaps above 0 in rising order '
+            'and currents above 0 A'
+        )
+    gaps = np.linspace(law.gap_low, law.gap_high, 61)
+    currents = np.linspace(max(LOWEST_SHARE * law.current_high, lowest_current), law.current_high, 119)
+    forces = checked_force(law, currents, gaps[:, np.newaxis])
+    # written so that NaN fails each of them
+    _refuse_where(~(forces > 0.0), gaps, currents, 'be positive')
+    _refuse_where(~(np.diff(forces, axis=1) > 0.0), gaps, currents, 'rise with current')
+    _refuse_where(~(np.diff(forces, axis=0) < 0.0), gaps, currents, 'fall with the air gap')
 
 
 _ROUNDING = 1e-12
@@ -206,7 +240,7 @@ def _each_current(law, force, gap):
     return result
 
 
-def _check_current(law: ForceLaw, current: npt.NDArray[np.float64]) -> None:
+def _check_current(law: ForceLaw, current: FloatArray) -> None:
     inside = (current >= 0.0) & (current <= law.current_high * (1.0 + _ROUNDING))
     if not inside.all():
         raise CurrentOutsideLaw(
@@ -215,10 +249,10 @@ def _check_current(law: ForceLaw, current: npt.NDArray[np.float64]) -> None:
         )
 
 
-def _refuse_force(law: ForceLaw, value: float, gap: float) -> None:
-    highest = float(force(law, law.current_high, gap))
-    raise ForceOutsideLaw(
-        f'magnetic force ({value:.2f} N) must lie within 0.00 .. {highest:.2f} N, which '
-        f'{law.current_high:.2f} A reach at an air gap of {gap * 1e6:.1f} um; demand less force, '
-        f'or make the gap smaller'
-    )
+def _refuse_where(failed: npt.NDArray[np.bool_], gaps: FloatArray, currents: FloatArray, what: str) -> None:
+    if failed.any():
+        row, column = np.argwhere(failed)[0]
+        raise ForceLawRefusedError(
+            f'the force must {what}; at {gaps[row] * 1e6:.0f} um and {currents[column]:.2f} A this law does '
+            f'not: narrow its range of gaps, measure more points, or look for outliers'
+        )

@@ -98,18 +98,20 @@ def sine_and_cosine(turns):
 @compiled
 def sines(turns):
     """Return sin(2 pi t) for each t of `turns`, (n,)."""
-    result = np.empty(turns.size)
-    for k in range(turns.size):
-        result[k] = sine_and_cosine(turns[k])[0]
-    return result
+    return _each(turns, 0)
 
 
 @compiled
 def cosines(turns):
     """Return cos(2 pi t) for each t of `turns`, (n,)."""
+    return _each(turns, 1)
+
+
+@compiled
+def _each(turns, place):
     result = np.empty(turns.size)
     for k in range(turns.size):
-        result[k] = sine_and_cosine(turns[k])[1]
+        result[k] = sine_and_cosine(turns[k])[place]
     return result
 
 

@@ -1,8 +1,34 @@
-"""Linear part of the friction contact: what gives way before and while the pads slide (Fig. 6)."""
+"""Linear part of the friction contact (Fig. 6), and whether coefficients of friction fit it."""
 
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
+from mount_models.friction.coefficient import (
+    FrictionCoefficients,
+    dynamic_coefficient,
+    offset_coefficient,
+    slope_coefficient,
+)
+from mount_models.friction.simplified import FADED_BELOW
 from mount_models.quantity import Quantity
+
+LOWEST, HIGHEST = 0.05, 5.0
+"""mu of both pads that is believed (chosen): linings have 0.4 .. 1.8, the controller's floor 0.05."""
+SPEEDS = (0.01, 0.05)
+"""m/s: the fastest strokes of the rack, and 1 mm at 8 Hz, at which the controller relies on them."""
+
+HIGHEST_AT_ALL = 20.0
+"""mu of both pads that is simulated and controlled (chosen): only numbers that went astray have more."""
+HIGHEST_SPEED = 1.0
+"""m/s, where the damper characteristics end."""
+HIGHEST_NORMAL_FORCE = 500.0
+"""N, chosen: more than the magnet presses with at 3 A."""
+_FORCES = np.linspace(0.0, HIGHEST_NORMAL_FORCE, 101)
+
+
+class CoefficientsRefusedError(ValueError):
+    """The coefficients contradict each other or give no plausible friction; the text says where."""
 
 
 class FrictionContact(NamedTuple):
@@ -21,3 +47,59 @@ class FrictionContact(NamedTuple):
     contact_stiffness: Annotated[
         float, Quantity('N/m', 'c_Re: spring between the mount and the creeping element', 1e4, 1e9)
     ] = 4.0e6
+
+
+def check_coefficients(coefs: FrictionCoefficients) -> None:
+    """Raise `CoefficientsRefusedError` unless mu is plausible both ways and over the normal force."""
+    _check_order(coefs)
+    for speed in SPEEDS:
+        for velocity in (speed, -speed):
+            for load in (coefs.lowest_normal_force, coefs.highest_normal_force):
+                mu = float(dynamic_coefficient(coefs, velocity, 0.0, load))
+                if not LOWEST <= mu <= HIGHEST:
+                    raise CoefficientsRefusedError(
+                        f'coefficient of friction ({mu:.3g} at {1e3 * velocity:+.0f} mm/s and {load:g} N) '
+                        f'must lie within {LOWEST:g} .. {HIGHEST:g}; identify the friction again'
+                    )
+
+
+def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> None:
+    """Raise `CoefficientsRefusedError` unless friction stays finite and positive wherever it can come to be.
+
+    That is at any normal force, at speeds from where it is not faded to the end of the characteristics, and
+    at any deflection xi of the contact. With mu = a + b u the equation of the creeping element (Eqs 8 and 9),
+    d_R xi' = F_N (a + b u) - c_R xi, has an end only if F_N b stays below c_R: mu = a c_R / (c_R - F_N b).
+    """
+    _check_order(coefs)
+    stiffness = contact.tangential_stiffness
+    for speed in (FADED_BELOW, coefs.slope_velocity_limit, HIGHEST_SPEED):
+        for velocity in (speed, -speed):
+            for force in _FORCES:
+                pull = coefs.scale * force * float(slope_coefficient(coefs, velocity, force))
+                where = f'at {1e3 * velocity:+.3g} mm/s and {force:g} N'
+                if not pull < stiffness:
+                    raise CoefficientsRefusedError(
+                        f'normal force times slope b of the friction ({pull:.3g} N/m {where}) must stay '
+                        f'below tangential_stiffness ({stiffness:g} N/m) of the contact, or its deflection '
+                        'grows without end; set b_offset, b_1, b_2, beta_1, beta_2 and scale closer to '
+                        'their defaults'
+                    )
+                if speed < FADED_BELOW:
+                    continue  # the limit of b lies there; mu is faded
+                rest = coefs.scale * float(offset_coefficient(coefs, velocity, force))
+                mu = rest * stiffness / (stiffness - pull)
+                if not 0.0 < mu <= HIGHEST_AT_ALL:
+                    raise CoefficientsRefusedError(
+                        f'coefficient of friction ({mu:.3g} {where}) must be greater than 0 and not exceed '
+                        f'{HIGHEST_AT_ALL:g}; set the parameters a_*, alpha_* and b_* of the friction closer '
+                        'to their defaults'
+                    )
+
+
+def _check_order(coefs: FrictionCoefficients) -> None:
+    low, high = coefs.lowest_normal_force, coefs.highest_normal_force
+    if low > high:
+        raise CoefficientsRefusedError(
+            f'lowest_normal_force ({low:g} N) must not exceed highest_normal_force ({high:g} N); '
+            'exchange them, or identify again'
+        )

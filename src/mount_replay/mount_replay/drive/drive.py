@@ -11,7 +11,6 @@ from engine_mount.recordings.run.folder import RunFolder, make_run_folder
 from engine_mount.recordings.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import can_port, domain_locks
-from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.nodes import (
     CONTROL,
     RECORDER,
@@ -22,9 +21,9 @@ from mount_bringup.graph.nodes import (
     Grouping,
     of_mounts,
 )
+from mount_bringup.graph.reports import GraphObserver
+from mount_bringup.graph.shutdown import ending_signals
 from mount_bringup.graph.supervisor import Supervisor
-from mount_bringup.graph.verdicts import Witness
-from mount_bringup.keyboard import MARK_KEYS, Keyboard
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
@@ -36,9 +35,10 @@ from mount_replay.drive.brought import FOLDER, Brought, provenance, written
 from mount_replay.drive.happenings import Happenings, line
 from mount_replay.drive.preflight import preflight
 from mount_replay.drive.progress import DriveProgress
+from mount_replay.keyboard import MARK_KEYS, Keyboard
 from mount_replay.loop.recording import record_car, record_core
 from mount_ros.messages.verdicts import flags_of
-from mount_sim.diagnosis import FINISHED, beyond_range_sentence
+from mount_sim.diagnosis import beyond_range_sentence
 from mount_sim.excitation.excitation import Excitation
 
 _SLACK = 30.0  # s: beyond the simulated time, until a run in real time counts as stuck
@@ -102,9 +102,9 @@ def _drive_graph(
         restart_limit=order.restart_limit,
     )
     supervisor = Supervisor(of_mounts(SIMULATED, order.mounts), settings, folder.logs)
-    supervisor.tell_loss = screen.note
+    supervisor.recovery.report = screen.note
     happenings = Happenings(supervisor.nodes, screen.say)
-    supervisor.verdicts.witness = happenings
+    supervisor.reports.observer = happenings
     with domain_locks(order.domain, order.namespace, order.mounts), ending_signals(supervisor.interrupt):
         try:
             happenings.begin()
@@ -121,13 +121,13 @@ def _drive_graph(
             controls = (supervisor.figures(node) for node in supervisor.nodes if node.is_a(CONTROL))
             complaints += _control_faults(sum(int(told.get('faults', 0)) for told in controls))
         finally:
-            supervisor.verdicts.witness = Witness()  # of the end the supervisor tells
+            supervisor.reports.observer = GraphObserver()  # of the end the supervisor tells
             recorder = supervisor.figures(RECORDER)
             flags = flags_of(recorder)
             if flags.failed and not flags.fatal:
                 supervisor.notes.append(recorder['sentence'])  # of a fatal one the graph's error tells
             complaints += supervisor.stop()
-            complaints += [restart.sentence for restart in supervisor.restarts]
+            complaints += [restart.sentence for restart in supervisor.recovery.restarts]
             for sentence in supervisor.notes:
                 screen.note(sentence)
     return {
@@ -138,7 +138,7 @@ def _drive_graph(
         'real_time_factor': float(figures['real_time_factor']),
         'latency_median_s': float(figures['latency_median_s']),
         'latency_p99_s': float(figures['latency_p99_s']),
-        'restarts': supervisor.restarts,
+        'restarts': supervisor.recovery.restarts,
     }
 
 
@@ -148,18 +148,16 @@ def _watch_drive(
     # In lock-step what is seen on the screen tells nothing of the time in the stamps: no keys.
     keyboard = Keyboard() if order.mode == 'real time' else contextlib.nullcontext(None)
     with keyboard as keys, screen.bar(f'driving ({order.scenario})') as show:
-        set_mark = supervisor.mark_setter(screen.say)
         if order.mode == 'real time':
             _tell_where_to_look(order, screen, marks=keys is not None and keys.present)
         progress = DriveProgress(supervisor.figures(SIM), real_time=order.mode == 'real time')
 
         def finished() -> bool:
-            figures = supervisor.figures(SIM)
-            show(progress.share(figures), detail=happenings.present)
+            show(progress.share(supervisor.figures(SIM)), detail=happenings.present)
             for key in keys.wait(0.0) if keys is not None else ():
                 if key in MARK_KEYS:
-                    set_mark()
-            return figures.get('sentence') == FINISHED
+                    supervisor.set_mark(screen.say)
+            return supervisor.finished
 
         supervisor.wait_until(finished, limit, 'the end of the drive')
 

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphNode
-from mount_bringup.graph.verdicts import Witness
+from mount_bringup.graph.reports import GraphObserver
 from mount_recorder.automatic_marks import MarkKind, Ration, of_mount
 from mount_ros.messages.event import BY_HAND, Mark
 from mount_ros.nodes.diagnostics import Level
@@ -23,7 +23,7 @@ def line(label: str, text: str) -> str:
     return f'{label:<10} {text}'
 
 
-class Happenings(Witness):
+class Happenings(GraphObserver):
     """Takes what the nodes tell; `say` takes each line.
 
     What happens often is rationed as the automatic marks are: ten lines of a kind, then one in 2 s, with the
@@ -74,7 +74,7 @@ class Happenings(Witness):
         lost = self._lost + sum(max(counts.values()) for counts in self._missing.values())
         return f'{damping}; {f"{lost} samples or messages lost" if lost else "nothing lost"}'
 
-    def state(self, node: GraphNode, state: str) -> None:
+    def on_state(self, node: GraphNode, state: str) -> None:
         if self._states.get(node.full_name) == 'active':
             return  # a node that was lost and came back; the supervisor tells of it
         self._states[node.full_name] = state
@@ -82,7 +82,7 @@ class Happenings(Witness):
             self._active = self._clock()
             self._say(line('active', f'all nodes, {self._clock() - self._begin:.1f} s after the start'))
 
-    def told(self, name: str, figures: Mapping[str, str]) -> None:
+    def on_report(self, name: str, figures: Mapping[str, str]) -> None:
         mount, _, node = name.rpartition('/')
         if node == DRIVER.name:
             self._find_zero(figures)
@@ -96,7 +96,7 @@ class Happenings(Witness):
                 self._note_missing(next((m for m in self._mounts if f'/{m}/' in topic), mount), node, count)
         self._tell_sentence(name, node, figures)
 
-    def mark(self, mount: str, mark: Mark) -> None:
+    def on_mark(self, mount: str, mark: Mark) -> None:
         for name in self._mounts:  # in a mark that the recorder of all sets
             if not mount and mark.text.startswith(of_mount(name)):
                 mount, mark = name, mark._replace(text=mark.text.removeprefix(of_mount(name)))

@@ -1,7 +1,6 @@
 """Refuses an order that a node would refuse, before any node is started."""
 
 from mount_bringup.chosen import Parameters
-from mount_bringup.mount_choice import check_control_of_mount
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_bringup.sample_rate import check_sample_rate
 from mount_control.settings import check_effect
@@ -11,9 +10,10 @@ from mount_recorder.parameters import RecorderParameters
 from mount_replay.drive.recorder_options import checked_recorder
 from mount_replay.loop.chain import CoreChain
 from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.excitation.scenario import build_excitation
 from mount_sim.excitation.shaking import steps_of_sample
+from mount_sim.mount_choice import check_control_of_mount
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant
 from mount_sim.plant.closing import checked_closing

@@ -20,11 +20,9 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from mount_bringup.graph.domain import can_port
-from mount_driver.bus import MULTICAST_GROUP, open_bus
+from mount_driver.bus import MULTICAST_GROUP, Frame, open_bus
 from mount_driver.can_library import can
-from mount_driver.codec import Measurement, MountCodec, Setpoint
-from mount_driver.e2e_receiver import AliveCounter
-from mount_driver.frame import Frame
+from mount_driver.protocol import AliveCounter, Measurement, MountCodec, Setpoint
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.data_path import DataPath

@@ -17,7 +17,8 @@ from rclpy.node import Node
 
 from mount_bringup.graph.nodes import DRIVER
 from mount_driver.bus import MULTICAST_GROUP, Reception, open_bus
-from mount_driver.codec import MountCodec, WrongCrcError, WrongLengthError
+from mount_driver.layout import FrameError
+from mount_driver.protocol import MountCodec
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.messages.verdicts import verdicts_of
@@ -85,7 +86,7 @@ class Observers:
         """Note a setpoint frame; one that no electronics would take is none."""
         try:
             _, setpoint = self._codec.decode_setpoint(data)
-        except (WrongCrcError, WrongLengthError):
+        except FrameError:
             return
         if setpoint is not None:
             current = setpoint.current if setpoint.enable else 0.0

@@ -12,7 +12,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from mount_bringup.graph.domain import can_port
-from mount_bringup.graph.ending_signals import ending_signals
+from mount_bringup.graph.shutdown import ending_signals
 from mount_replay.faults.fault import FaultCase, Reaction
 from mount_replay.faults.graph import Ending, GraphUnderTest, GraphUnderTestError, Place
 from mount_replay.faults.injections import NonsenseTakenError, shim_environment

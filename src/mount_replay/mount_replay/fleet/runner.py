@@ -8,8 +8,8 @@ from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from mount_bringup.graph.ending_signals import remembered_interrupts
 from mount_replay.fleet.cluster import LOCAL, SchedulerLostError, connected
+from mount_replay.fleet.interrupts import remembered_interrupts
 
 if TYPE_CHECKING:
     from distributed import Client

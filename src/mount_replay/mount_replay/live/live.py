@@ -18,10 +18,10 @@ from engine_mount.recordings.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
-from mount_bringup.keyboard import Keyboard
 from mount_recorder.chunk_groups import registered_topic
 from mount_replay.given.input import Notes, ReplayError, has, recorded_parameters
 from mount_replay.given.ramps import MeasuredGap, measured_gaps
+from mount_replay.keyboard import Keyboard
 from mount_replay.live.live_control import LiveControl
 from mount_replay.live.playback import Playback
 from mount_replay.replay import check_parameters, with_changes

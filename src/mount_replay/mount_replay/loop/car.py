@@ -12,17 +12,17 @@ from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import Samples
 from mount_replay.loop.run import BLOCK, CoreOutcome, Sink, coil_temperature, stamp_of, take_one
 from mount_sim.electronics.electronics import status_every
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.excitation.scenario import build_excitation
-from mount_sim.plant.simulated_car import CarMount, SimulatedCar, mount_parameters
-from mount_sim.plant.simulated_mount import BeyondRange
+from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
+from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
 
 @dataclass
 class _Line:
     """One mount with the chain that answers it, its samples, and the setpoint (A) on its way."""
 
-    mount: CarMount
+    mount: SimulatedMount
     chain: CoreChain
     celsius: float
     samples: Samples

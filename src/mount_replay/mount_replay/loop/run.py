@@ -16,11 +16,12 @@ from mount_replay.loop import compiled_loop as loop
 from mount_replay.loop.chain import CoreChain
 from mount_replay.loop.messages import CoreMessages, Samples, Write, WriteColumns
 from mount_sim.electronics.electronics import Reading, status_every
-from mount_sim.electronics.faults.schedule import Faults, check_without_bus
+from mount_sim.electronics.faults.schedule import check_without_bus
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.excitation.scenario import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.simulated_car import CarMount
+from mount_sim.plant.places import ALONE
+from mount_sim.plant.simulated_car import SimulatedCar
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
 
 BLOCK = 1000
@@ -77,8 +78,8 @@ def run_core_into(
     check_sample_rate(parameters)
     sim = _sim_parameters(parameters)
     check_without_bus(sim.faults)
-    faults = Faults(sim.faults, sim.seed, sim.sample_rate)
-    mount = SimulatedMount(sim.plant, excitation or build_excitation(sim), sim.seed, faults, sim.sample_rate)
+    car = SimulatedCar(parameters.get('mount_sim', {}), excitation or build_excitation(sim))
+    mount = car.mounts[ALONE]
     chain = CoreChain(parameters)
     celsius, with_status = coil_temperature(sim), status_every(sim.sample_rate)
     samples = Samples(BLOCK, chain.policy)
@@ -88,7 +89,7 @@ def run_core_into(
         if not samples.room:
             messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-        if pending is not None and faults.none_told and chain.answering.expects(stamp_of(mount)):
+        if pending is not None and mount.faults.none_told and chain.answering.expects(stamp_of(mount)):
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
@@ -122,14 +123,12 @@ def coil_temperature(sim: SimParameters) -> float:
     return quantised_coil_temperature(sim.electronics.coil_temperature)
 
 
-def stamp_of(mount: SimulatedMount | CarMount) -> int:
+def stamp_of(mount: SimulatedMount) -> int:
     """Return the stamp (ns) of the next sample."""
     return mount.sample * mount.sample_time
 
 
-def take_one(
-    mount: SimulatedMount | CarMount, chain: CoreChain, samples: Samples, pending: float | None
-) -> float:
+def take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float | None) -> float:
     """Take one sample and return the setpoint (A) as it arrives for the next."""
     place, stamp = samples.count, stamp_of(mount)
     reading = Reading(*loop.over_the_bus(*mount.measure()))

@@ -15,11 +15,11 @@ from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.switching_changes import switching_times
 from engine_mount.recordings.run.screen import Screen, Table
 from mount_bringup.chosen import Parameters, policy_of
-from mount_bringup.graph.restarts import Restart
-from mount_bringup.mount_choice import seat_of
+from mount_bringup.graph.failures import Restart
 from mount_recorder.parameters import RecorderParameters
 from mount_report.drive.evaluation import tracking_error
 from mount_report.drive.signals import DriveSignals, excitation_stamp
+from mount_sim.mount_choice import seat_of
 from mount_sim.plant.mounts import without_friction
 
 _UM, _MM, _US = 1e6, 1e3, 1e6
@@ -121,12 +121,12 @@ def late_control(figures: Mapping[str, Any]) -> list[str]:
 
 
 def _restart(restart: Restart, zero: int) -> dict[str, Any]:
-    loss = restart.loss
+    failure = restart.failure
     return {
         'time_s': (restart.time - zero) / 1e9,
-        'nodes': [node.name for node in loss.nodes],
-        'reason': loss.reason,
-        'remedy': restart.remedy.value,
+        'nodes': [node.name for node in failure.nodes],
+        'reason': failure.reason,
+        'remedy': restart.action.value,
         'took_s': restart.took,
     }
 

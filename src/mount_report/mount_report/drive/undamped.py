@@ -20,8 +20,8 @@ from mount_bringup.mounts import mounts_of
 from mount_models.quantity import with_flattened
 from mount_models.sampling import sample_time_ns
 from mount_ros.topics import SIM_TRUTH
+from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Seat
-from mount_sim.excitation.scenario import build_excitation
 from mount_sim.excitation.shaking import LONG_BLOCK, Shaking
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import seated_mount

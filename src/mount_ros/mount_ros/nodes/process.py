@@ -52,9 +52,10 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     inherited = drop_real_time()
     real_time = RealTime(int(os.environ.get(_PRIORITY, '0')) or inherited)
     prepare_environment()
+    ending = _Ending()
+    ending.add_signals(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     nodes = _created(creates, args)
     data_thread = DataThread(nodes[0].context, nodes[0].report_failure, shared=len(nodes) > 1)
-    ending = _Ending()
     for node in nodes:
         node.data_thread = data_thread
         node.after_configure = _freeze
@@ -63,7 +64,6 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     logger = nodes[0].get_logger()
     if inherited:
         logger.warning(started_in_real_time(inherited))
-    ending.add_signals(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
     _freeze()
     real_time.keep_memory()
     services = [_Service(node, ending) for node in nodes]
@@ -71,11 +71,8 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     for node in nodes:
         node.ending.set()
     if ending.starter.ended:
-        number = os.environ[_STARTER]
-        logger.error(
-            f'the process that started this one ({number}) has ended, so this one ends too, at 0 A: '
-            'start the graph again'
-        )
+        name = ending.starter.name
+        logger.error(f'{name} has ended, so this one ends too, at 0 A: start the graph again')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()
@@ -86,6 +83,8 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     left = leave_middleware(partial(_take_down, nodes), code=code)
     if ending.starter.ended:
         remove_abandoned_of_the_dead()  # that of the starter; what it started takes its own
+    for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C: Python restores other handlers first
+        signal.signal(number, signal.SIG_IGN)
     if not left or code:
         end_process(code)
 
@@ -171,9 +170,11 @@ class Starter:
         self.descriptors: list[int] = []
         """What can be read once it has ended; none where it is not known, or had ended before."""
         self._had_ended = False
-        if _STARTER in os.environ:
+        number = os.environ.get(_STARTER)
+        self.name = f'the process that started this one ({number})'
+        if number is not None:
             try:
-                self.descriptors = [os.pidfd_open(int(os.environ[_STARTER]))]
+                self.descriptors = [os.pidfd_open(int(number))]
             except ProcessLookupError:
                 self._had_ended = True
 

@@ -36,6 +36,8 @@ class Shaking:
 
     def __init__(self, excitation: Excitation, sample_rate: float = SAMPLE_RATE):
         self._excitation = excitation
+        self.sample_rate = sample_rate
+        """Hz"""
         self._steps = steps_of_sample(sample_rate, excitation.step_time)
         self.start = round(excitation.start * sample_rate)
         """Sample at which the excitation begins."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_models.arithmetic.record import record_bytes
-from mount_models.friction.coefficient_check import check_friction
+from mount_models.friction.contact import check_friction
 from mount_models.quantity import ParameterError, flattened, quantities, with_flattened
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.mounts import Contents

@@ -6,9 +6,6 @@ F = k_e x + f_1 + f_2 + f_3;  f_j' = k_j x' - f_j / tau_j,  tau_j = 1 / (2 pi co
 import math
 from typing import Annotated, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
 from mount_models.quantity import Quantity
@@ -45,20 +42,6 @@ def branch_step(elastomer, branch_forces, displacement_change, dt):
         _maxwell_step(middle, elastomer.middle_stiffness, elastomer.middle_corner, displacement_change, dt),
         _maxwell_step(fast, elastomer.fast_stiffness, elastomer.fast_corner, displacement_change, dt),
     )
-
-
-def dynamic_stiffness(elastomer: Elastomer, frequency: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-    """Return storage (real) and loss (imaginary) stiffness in N/m at `frequency` (Hz, any shape)."""
-    hertz = np.asarray(frequency, float)
-    stiffness = np.full(hertz.shape, elastomer.static_stiffness, complex)
-    for branch, corner in (
-        (elastomer.slow_stiffness, elastomer.slow_corner),
-        (elastomer.middle_stiffness, elastomer.middle_corner),
-        (elastomer.fast_stiffness, elastomer.fast_corner),
-    ):
-        turn = 1j * hertz / corner
-        stiffness += branch * turn / (1.0 + turn)
-    return stiffness
 
 
 @compiled

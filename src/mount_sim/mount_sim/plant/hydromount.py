@@ -116,18 +116,6 @@ def upper_pressure(hydromount, volume):
 
 
 @compiled
-def upper_energy(hydromount, volume):
-    """Return the energy (J) of the bulge, the integral of P_1 over V_1 from 0 to `volume` (m^3)."""
-    pressure = upper_pressure(hydromount, volume)
-    rest, asymmetry = hydromount.upper_compliance, hydromount.compliance_asymmetry
-    limit = hydromount.asymmetry_pressure
-    inside = min(max(pressure, -limit), limit)
-    energy = rest * inside * inside * (0.5 - asymmetry * inside / (3.0 * limit))
-    outside = rest * (1.0 - asymmetry * inside / limit)
-    return energy + 0.5 * outside * (pressure * pressure - inside * inside)
-
-
-@compiled
 def lower_pressure(hydromount, state):
     """Return P_2 (Pa)."""
     return state.lower_volume / hydromount.lower_compliance

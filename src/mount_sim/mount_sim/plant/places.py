@@ -40,6 +40,9 @@ class Places(NamedTuple):
     rear: Place = Place(x=-0.3)
 
 
+ALONE = ''
+"""Name of the mount where there is one."""
+
 PLACES: tuple[str, ...] = Places._fields
 """Names of the places, which are those of their mounts and of the mounts' namespaces."""
 

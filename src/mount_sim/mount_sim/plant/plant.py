@@ -16,7 +16,6 @@ from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.closing import ClosingMechanics, checked_closing, closed_state
 from mount_sim.plant.elastomer import branch_step, elastomer_force
-from mount_sim.plant.energy import ACCOUNT, book_step, new_account
 from mount_sim.plant.friction import full_step
 from mount_sim.plant.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_sim.plant.mounts import Contents, SeatedMount
@@ -26,7 +25,6 @@ from mount_sim.plant.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle
 
 _PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
 _BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
-_VEHICLE = int(Seat.VEHICLE)
 
 
 class Plant(NamedTuple):
@@ -103,7 +101,6 @@ class PlantSimulation:
         self._truth = np.zeros(1, TRUTH).view(np.uint8)
         self._truth_record = self._truth.view(TRUTH)[0]
         self._state.view(STATE)['gap'] = plant.mechanics.rest_gap
-        self._account = new_account().view(np.uint8)
 
     @property
     def memory(self) -> Memory:
@@ -141,24 +138,6 @@ class PlantSimulation:
     def change(self, plant: Plant) -> None:
         """Go on from the present state with other parameters; a fault's need not lie within their ranges."""
         self._plant[:] = record_bytes(_warm(plant))
-
-    @property
-    def account(self) -> np.void:
-        """The energy since the first `advance_with_books`, a record of `mount_sim.plant.energy.ACCOUNT`."""
-        return self._account.view(ACCOUNT)[0]
-
-    def advance_with_books(
-        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
-    ) -> None:
-        """Advance as `advance` does, to the bit, and keep account of the energy; for a vehicle only."""
-        if self._seat != int(Seat.VEHICLE):
-            raise ValueError(
-                'energy is accounted for in a vehicle only: a rack or a given acceleration has no limit '
-                'to what it gives; choose the scenario motorway or sweep'
-            )
-        advance_with_books(
-            self._plant, self._state, self._account, values, engine_forces, wanted_current, self._step_time
-        )
 
 
 def _warm(plant: Plant) -> Plant:
@@ -221,27 +200,6 @@ def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
             beside = force_beside_elastomer(law, now, now.displacement, dt)
             motion = vehicle_step(law.vehicle, now.vehicle, values[index], engine_forces[index], beside, dt)
             take_motion(law, now, motion, dt)
-
-
-@compiled
-def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
-    """Advance as `advance` does in a vehicle and book each step in `account`, the bytes of its record."""
-    law, books = plant.view(PLANT)[0], account.view(ACCOUNT)[0]
-    before = state.copy()
-    for k in range(len(values)):
-        before[:] = state
-        advance(plant, state, _VEHICLE, values[k : k + 1], engine_forces[k : k + 1], wanted_current, dt)
-        book_step(
-            books,
-            law.vehicle,
-            law.hydromount,
-            law.contact,
-            before.view(STATE)[0],
-            state.view(STATE)[0],
-            values[k],
-            engine_forces[k],
-            dt,
-        )
 
 
 @compiled

@@ -1,6 +1,7 @@
 """Electronics and plant together, sample by sample, without bus or clock."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,9 +12,7 @@ from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
 from mount_sim.electronics.faults.schedule import Faults
-from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.shaking import Shaking
-from mount_sim.plant.check import checked_plant
 from mount_sim.plant.plant import Memory, Plant, PlantSimulation
 
 FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
@@ -61,8 +60,8 @@ class Ahead(NamedTuple):
     noise: NDArray[np.float64]
 
 
-class MountElectronics:
-    """Sensors, noise and current of one mount, sample by sample; who moves the plant calls `wanted`.
+class SimulatedMount:
+    """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again.
 
     A setpoint takes effect at the sample instant after the one that it answers, as the electronics' own
     sampled current loop takes it over. Without a setpoint for `setpoint_timeout`, counted from when the last
@@ -70,9 +69,18 @@ class MountElectronics:
     """
 
     def __init__(
-        self, plant: Plant, simulation: PlantSimulation, noise: Noise, run: Run, faults: Faults | None = None
+        self,
+        plant: Plant,
+        simulation: PlantSimulation,
+        noise: Noise,
+        shaking: Shaking,
+        faults: Faults,
+        move: Callable[[], None],
     ):
-        self.faults = Faults() if faults is None else faults
+        """`move` moves plant and car on when all mounts have advanced."""
+        self.faults = faults
+        self._shaking, self._move = shaking, move
+        self.run = run = Run(shaking.samples, shaking.start, shaking.sample_rate)
         self._sound_plant = plant
         self._plant = simulation
         self._noise = noise
@@ -83,11 +91,12 @@ class MountElectronics:
         self.patience = round(plant.electronics.setpoint_timeout * run.sample_rate)
         """Samples without a setpoint after which the current goes to 0 A."""
         self._driver_opens = plant.mount.driver_opens
-        self.run = run
         self.sample = 0
         self.beyond_range = BeyondRange()
+        self.current = 0.0
+        """Current (A) of the coil up to the next sample."""
         self._silent = 0
-        self._current = 0.0
+        self._setpoint = 0.0
 
     @property
     def time(self) -> float:
@@ -134,58 +143,22 @@ class MountElectronics:
         """Take no setpoint of the past for one of the present, as electronics that were without power."""
         self._silent = self.patience
 
-    def wanted(self, setpoint: float | None, late: int) -> float:
-        """Return the current (A) that the coil is given up to the next sample; arguments as of `advance`."""
-        if setpoint is None:
-            self._silent += 1
-        else:
-            self._silent, self._current = late, setpoint
-        current = self._current if self.driver_on else 0.0
-        return self.faults.driven(current) if self.faults.present else current
-
-    def _doubt(self, displacement: float) -> None:
-        if not math.isfinite(displacement):
-            raise DivergedError(
-                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
-                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
-            )
-        self.beyond_range.note(self.time)
-
-    @property
-    def _driver_open(self) -> bool:
-        return self._driver_opens and self.sample >= self.run.excitation_start
-
-
-class SimulatedMount(MountElectronics):
-    """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again."""
-
-    def __init__(
-        self,
-        plant: Plant,
-        excitation: Excitation,
-        seed: int,
-        faults: Faults | None = None,
-        sample_rate: float = SAMPLE_RATE,
-    ):
-        simulation = PlantSimulation(plant, excitation.seat, excitation.step_time)
-        checked_plant(plant, excitation.seat, excitation.step_time)
-        self._shaking = Shaking(excitation, sample_rate)
-        run = Run(self._shaking.samples, self._shaking.start, sample_rate)
-        super().__init__(plant, simulation, Noise(seed), run, faults)
-
     def advance(self, setpoint: float | None, late: int = 0) -> None:
         """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
 
-        `late` is the number of samples since it was due. Behind the end of the run nothing shakes the mount
-        any more.
+        `late` is the number of samples since it was due. After the end of the run nothing shakes the mount.
         """
-        current = self.wanted(setpoint, late)
-        values, forces = self._shaking.at(self.sample)
-        self._plant.advance(values, forces, current)
+        if setpoint is None:
+            self._silent += 1
+        else:
+            self._silent, self._setpoint = late, setpoint
+        current = self._setpoint if self.driver_on else 0.0
+        self.current = self.faults.driven(current) if self.faults.present else current
         self.sample += 1
+        self._move()
 
     def ahead(self, count: int) -> Ahead:
-        """Return what the next samples of the run need in a compiled loop; none of them is taken yet.
+        """Return what the next samples of a mount alone need in a compiled loop; none of them is taken yet.
 
         They are at least one and at most `count`. The loop does for each what `measure` and `advance` with a
         setpoint do; `skip` notes how far it came.
@@ -199,5 +172,17 @@ class SimulatedMount(MountElectronics):
     def skip(self, count: int, setpoint: float) -> None:
         """Note that a compiled loop took `count` samples and advanced the last one with `setpoint` (A)."""
         self._noise.skip(count)
-        self._silent, self._current = 0, setpoint
+        self._silent, self._setpoint = 0, setpoint
         self.sample += count
+
+    def _doubt(self, displacement: float) -> None:
+        if not math.isfinite(displacement):
+            raise DivergedError(
+                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
+                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
+            )
+        self.beyond_range.note(self.time)
+
+    @property
+    def _driver_open(self) -> bool:
+        return self._driver_opens and self.sample >= self.run.excitation_start

@@ -128,16 +128,3 @@ def ride_without_friction(vehicle, state, road_height, engine_force, dt):
 def resting_vehicle() -> npt.NDArray[Any]:
     """Return the state (1,) of a vehicle at rest; pass element 0 to `vehicle_step`."""
     return np.zeros(1, VEHICLE_STATE)
-
-
-def modes(vehicle: Vehicle, mount_stiffness: float | None = None) -> FloatArray:
-    """Return the four undamped natural frequencies (Hz); `mount_stiffness` in N/m, k_e if not given."""
-    mount = vehicle.elastomer.static_stiffness if mount_stiffness is None else mount_stiffness
-    springs = (vehicle.tyre_stiffness, vehicle.suspension_stiffness, vehicle.chassis_stiffness, mount)
-    masses = np.array([vehicle.wheel_mass, vehicle.body_mass, vehicle.chassis_mass, vehicle.engine_mass])
-    stiffness = np.diag(np.array(springs) + np.array([*springs[1:], 0.0]))
-    for lower, spring in enumerate(springs[1:]):
-        stiffness[lower, lower + 1] = stiffness[lower + 1, lower] = -spring
-    scale = 1.0 / np.sqrt(masses)
-    squares = np.linalg.eigvalsh(stiffness * np.outer(scale, scale))
-    return np.asarray(np.sqrt(squares) / (2.0 * np.pi), dtype=np.float64)

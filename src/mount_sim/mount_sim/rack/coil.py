@@ -145,12 +145,14 @@ def write_ripple(
     return files
 
 
-def write_columns(file: Path, columns: Mapping[str, FloatArray], remark: str = '') -> Path:
+def write_columns(
+    file: Path, columns: Mapping[str, FloatArray], remark: str = '', line_end: str = '\n'
+) -> Path:
     """Write columns of one length to a CSV file, units in their names; a `remark` leads as comment."""
     with file.open('w', newline='', encoding='utf-8') as stream:
         if remark:
             stream.write(f'# {remark}\n')
-        writer = csv.writer(stream, lineterminator='\n')
+        writer = csv.writer(stream, lineterminator=line_end)
         writer.writerow(columns)
         for row in zip(*(column.tolist() for column in columns.values()), strict=True):
             writer.writerow([f'{value:.9g}' for value in row])

@@ -5,7 +5,6 @@ moves the contact, a load cell measures the friction force, another one the clam
 the full model; nothing else acts.
 """
 
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.sampling import SAMPLE_RATE
 from mount_sim.plant.friction import full_response
+from mount_sim.rack.coil import write_columns
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -214,11 +214,7 @@ def write_csv(recording: RackRecording, file: Path, *, with_desired: bool = Fals
     }
     if with_desired:
         columns['desired_displacement_mm'] = 1e3 * recording.desired_displacement
-    with file.open('w', newline='', encoding='utf-8') as stream:
-        writer = csv.writer(stream)
-        writer.writerow(columns)
-        for row in zip(*columns.values(), strict=True):
-            writer.writerow([f'{value:.9g}' for value in row])
+    write_columns(file, columns, line_end='\r\n')
 
 
 def _noisy(values: FloatArray, relative: float, random: np.random.Generator) -> FloatArray:

@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Iterator
 
-from mount_bringup.graph.errors import Interrupted
+from mount_bringup.graph.shutdown import Interrupted
 
 _GOES_ON = 'the same command goes on where it stopped'
 

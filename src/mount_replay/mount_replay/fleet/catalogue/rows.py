@@ -15,11 +15,10 @@ from engine_mount.recordings.run.session import session_parameters
 from engine_mount.recordings.run.told import duration_of, started_of, told_session, versions_told
 from mount_bringup.changed_parameters import changed_parameters
 from mount_bringup.chosen import Parameters
-from mount_bringup.mount_choice import seat_of
-from mount_bringup.recorded_mount import simulated_mounts
 from mount_replay.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
 from mount_replay.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures
 from mount_replay.fleet.catalogue.places import Place
+from mount_sim.mount_choice import seat_of, simulated_mounts
 from mount_sim.plant.mounts import without_friction
 
 Row = dict[str, Any]

@@ -15,7 +15,6 @@ import numpy as np
 
 import engine_mount
 from engine_mount.recordings.edit.cut import cut
-from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_bringup.sample_rate import with_sample_rate
 from mount_bringup.settings import checked_settings
@@ -28,6 +27,7 @@ from mount_replay.fleet.example.variations import DRIVES, VARIATIONS, Drive, Var
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.loop.recording import record_car, record_core
 from mount_sim.excitation.scenario import SweepScenario
+from mount_sim.mount_choice import with_control_of_mount
 
 WHOLE_FLEET = len(DRIVES) * len(VARIATIONS)
 FEWEST = len(DAMAGES) + 1

@@ -1,0 +1,114 @@
+"""The executable `mount_supervisor`: one graph from its arguments to its end, as the launch files start it.
+
+`mount_supervisor vehicle channel:=can0 recording:=bags/first` takes the arguments of `vehicle.launch.py`.
+"""
+
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rclpy.logging import get_logger
+
+from mount_bringup.graph.domain import domain_locks
+from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS, LaunchArgument, texts_of
+from mount_bringup.graph.nodes import GraphError
+from mount_bringup.graph.order import LaunchOrder, Texts, vehicle_order
+from mount_bringup.graph.player import Player
+from mount_bringup.graph.shutdown import Interrupted, ending_signals
+from mount_bringup.graph.supervisor import Parameters, Supervisor
+from mount_bringup.settings import SettingError
+from mount_recorder.session import new_session, session_text
+from mount_ros.environment import prepare_environment
+from mount_ros.nodes.shutdown import end_process
+
+SUPERVISOR = 'mount_supervisor'
+
+Graph = tuple[Sequence[LaunchArgument], Callable[[Texts], LaunchOrder]]
+"""The arguments of a launch file, and the function that makes an order of their texts."""
+
+
+def _vehicle() -> Graph:
+    return VEHICLE_ARGUMENTS, vehicle_order
+
+
+def _sim() -> Graph:
+    from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
+
+    return SIM_ARGUMENTS, sim_order
+
+
+def _replay() -> Graph:
+    from mount_bringup.graph.replay import REPLAY_ARGUMENTS, replay_order
+
+    return REPLAY_ARGUMENTS, replay_order
+
+
+GRAPHS: dict[str, Callable[[], Graph]] = {'vehicle': _vehicle, 'sim': _sim, 'replay': _replay}
+"""The graphs by the name of their launch file; each loads no more than it needs."""
+
+
+def main() -> None:
+    """Run a graph; end with code 0 at its end or by a signal, with 1 after a refusal or a failure."""
+    prepare_environment()
+    code = run(sys.argv[1:])
+    for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C
+        signal.signal(number, signal.SIG_IGN)
+    end_process(code)
+
+
+def run(command: Sequence[str]) -> int:
+    """Run the graph of a command line and return the exit code."""
+    logger = get_logger(SUPERVISOR)
+    try:
+        order = ordered(command)
+        mounts = list(dict.fromkeys(node.mount for node in order.nodes if node.mount))
+        with (
+            domain_locks(order.settings.domain, order.settings.namespace, mounts),
+            tempfile.TemporaryDirectory(prefix=f'{SUPERVISOR}_') as folder,
+        ):
+            return _supervise(order, Path(folder))
+    except ValueError as error:
+        logger.fatal(str(error))
+        return 1
+
+
+def ordered(command: Sequence[str]) -> LaunchOrder:
+    """Return the order of a command line; a `ValueError` says what cannot be."""
+    name, *words = command or ['']
+    if name not in GRAPHS:
+        raise SettingError(f'{SUPERVISOR} {name}: the first word must be one of {", ".join(GRAPHS)}')
+    arguments, order_of = GRAPHS[name]()
+    return order_of(texts_of(words, arguments))
+
+
+def _supervise(order: LaunchOrder, folder: Path) -> int:
+    logger = get_logger(SUPERVISOR)
+
+    def session(parameters: Parameters) -> str:
+        return session_text(
+            new_session({'scenario': order.scenario, 'mode': 'real time', 'parameters': parameters})
+        )
+
+    player = Player(order.bag, order.settings.namespace, order.rate) if order.bag else None
+    graph = Supervisor(order.nodes, order.settings, folder, player)
+    graph.recovery.report = logger.error
+    failed = False
+    with ending_signals(graph.interrupt):
+        try:
+            graph.start(session, logger.info)
+            logger.info('all nodes are active')
+            end = time.monotonic() + order.duration
+            graph.wait_until(lambda: graph.finished or time.monotonic() > end, float('inf'), 'the end')
+            logger.info('the end of the drive')
+        except Interrupted:
+            logger.info('told to end')
+        except GraphError as error:
+            logger.error(str(error))
+            failed = True
+        complaints = graph.stop()
+        for sentence in [*graph.notes, *complaints, *(each.sentence for each in graph.recovery.restarts)]:
+            logger.warning(sentence)
+    return 1 if failed or complaints or graph.recovery.restarts else 0

@@ -1,0 +1,355 @@
+"""The three messages of `mount.dbc` in SI units, protected end to end; both ends of the bus run this code.
+
+All numbers of the wire (positions, scales, limits, data ids) come from the DBC. Protection is AUTOSAR E2E
+profile 5: a 16 bit CRC over all other bytes and the data id, and an 8 bit alive counter.
+"""
+
+import math
+from collections.abc import Callable
+from enum import IntEnum
+from pathlib import Path
+from typing import Generic, NamedTuple, TypeVar
+
+from e2e.p05 import e2e_p05_check
+
+from mount_driver.can_library import Database
+from mount_driver.layout import MessageLayout, OutOfRangeError, Scaling
+
+M = TypeVar('M')
+
+DATABASE_FILE = Path(__file__).parent / 'dbc' / 'mount.dbc'
+
+_HEADER = ('Crc', 'AliveCounter')
+_MEASUREMENT = (
+    *_HEADER,
+    'DisplacementValid',
+    'CurrentValid',
+    'RippleValid',
+    'Enabled',
+    'SetpointTimeout',
+    'CurrentLimited',
+    'SampleCounter',
+    'Microseconds',
+    'Displacement',
+    'CoilCurrent',
+    'CurrentRate',
+    'FluxRate',
+)
+_SETPOINT = (*_HEADER, 'Current', 'AnsweredCounter', 'Enable')
+_STATUS = (
+    *_HEADER,
+    'SupplyVoltage',
+    'CoilTemperature',
+    'OverTemperature',
+    'OverCurrent',
+    'UnderVoltage',
+    'SetpointTimeout',
+    'DisplacementSensor',
+    'E2EError',
+)
+_VOLTAGE_NOT_AVAILABLE = 65535  # value tables of the DBC
+_TEMPERATURE_NOT_AVAILABLE = -32768
+_LOOK_BACK = 16  # frames, chosen: a sequence that goes on so soon after it was left still has its sender
+_NAN = math.nan
+_new = tuple.__new__  # makes a named tuple without the call of a Python function
+
+
+class Measurement(NamedTuple):
+    """One sample of the mount (MountMeasurement, electronics to host)."""
+
+    sample_counter: int
+    """Number of the sample, 0..65535, wraps; a sample sent again keeps its number."""
+    microseconds: int
+    """Time of the sample on the clock of the electronics, us, 0..2**32-1, wraps."""
+    displacement: float
+    """Engine minus chassis, m; NaN where the sensor has no valid reading."""
+    coil_current: float
+    """Mean coil current, A; NaN where not valid."""
+    current_rate: float
+    """Slope of the coil current 18 us after switching, A/s; NaN where not valid."""
+    flux_rate: float
+    """Slope of the flux density 18 us after switching, T/s; NaN where not valid."""
+    enabled: bool = True
+    """The coil driver is switched on."""
+    setpoint_timeout: bool = False
+    """The electronics had no valid setpoint for 20 ms and went to 0 A on their own."""
+    current_limited: bool = False
+    """The setpoint lies above what the electronics give at present."""
+
+
+class Setpoint(NamedTuple):
+    """The wanted coil current (MountSetpoint, host to electronics)."""
+
+    current: float
+    """A, 0..3."""
+    answered_counter: int
+    """`sample_counter` of the sample that this setpoint answers."""
+    enable: bool = True
+    """False: the coil driver shall be off, whatever `current` is."""
+
+
+class Status(NamedTuple):
+    """Health of the electronics (MountStatus, electronics to host)."""
+
+    supply_voltage: float
+    """V; NaN where not available."""
+    coil_temperature_celsius: float
+    """degC; NaN where not available."""
+    over_temperature: bool = False
+    over_current: bool = False
+    under_voltage: bool = False
+    setpoint_timeout: bool = False
+    displacement_sensor: bool = False
+    e2e_error: bool = False
+
+
+class MountCodec:
+    """Encodes and decodes the messages of `mount.dbc`; no state but its tables, so one serves all threads.
+
+    Encoding takes the alive counter (0..255) of the frame, decoding returns it with the message. Decoding
+    raises `FrameError` before it reads any number. `E2EReceiver` makes the same checks, then calls
+    `measurement_of`, `setpoint_of` or `status_of`.
+    """
+
+    def __init__(self, database_file: Path = DATABASE_FILE):
+        database = Database()
+        database.add_dbc_file(database_file)
+        measurement = database.get_message_by_name('MountMeasurement')
+        setpoint = database.get_message_by_name('MountSetpoint')
+        status = database.get_message_by_name('MountStatus')
+        self.measurement = MessageLayout(measurement, _MEASUREMENT)
+        self.setpoint = MessageLayout(setpoint, _SETPOINT)
+        self.status = MessageLayout(status, _STATUS)
+        self.displacement = Scaling(measurement.get_signal_by_name('Displacement'))
+        self.coil_current = Scaling(measurement.get_signal_by_name('CoilCurrent'))
+        self.current_rate = Scaling(measurement.get_signal_by_name('CurrentRate'))
+        self.flux_rate = Scaling(measurement.get_signal_by_name('FluxRate'))
+        self.current = Scaling(setpoint.get_signal_by_name('Current'))
+        self.supply_voltage = Scaling(status.get_signal_by_name('SupplyVoltage'))
+        self.coil_temperature = Scaling(status.get_signal_by_name('CoilTemperature'))
+
+    def encode_measurement(self, measurement: Measurement, alive_counter: int) -> bytearray:
+        """Return the 24 bytes of a sample; NaN is sent as not valid. Raises `OutOfRangeError`.
+
+        The two slopes share one validity: if one of them is NaN, both arrive as NaN.
+        """
+        counter, microseconds, displacement, current, current_rate, flux_rate, *bits = measurement
+        displacement_valid = displacement == displacement  # false for NaN alone, and faster than isnan
+        current_valid = current == current
+        ripple_valid = current_rate == current_rate and flux_rate == flux_rate
+        return self.measurement.pack(
+            (
+                0,
+                alive_counter,
+                displacement_valid,
+                current_valid,
+                ripple_valid,
+                *bits,
+                counter,
+                microseconds,
+                self.displacement.to_raw(displacement) if displacement_valid else 0,
+                self.coil_current.to_raw(current) if current_valid else 0,
+                self.current_rate.to_raw(current_rate) if ripple_valid else 0,
+                self.flux_rate.to_raw(flux_rate) if ripple_valid else 0,
+            )
+        )
+
+    def decode_measurement(self, data: bytes | bytearray) -> tuple[int, Measurement]:
+        """Return alive counter and sample; what is not valid or lies outside the DBC's limits is NaN."""
+        raw = self.measurement.unpack(data)
+        return raw[1], self.measurement_of(raw)
+
+    def measurement_of(self, raw: tuple[int, ...]) -> Measurement:
+        """Return the sample of raw numbers, see `decode_measurement`."""
+        # Without a function for each number: this runs for every sample.
+        (
+            _,
+            _,
+            displacement_valid,
+            current_valid,
+            ripple_valid,
+            enabled,
+            setpoint_timeout,
+            current_limited,
+            counter,
+            microseconds,
+            displacement,
+            current,
+            current_rate,
+            flux_rate,
+        ) = raw
+        x, i, di, db = self.displacement, self.coil_current, self.current_rate, self.flux_rate
+        return _new(
+            Measurement,
+            (
+                counter,
+                microseconds,
+                displacement / x.steps
+                if displacement_valid and x.raw_low <= displacement <= x.raw_high
+                else _NAN,
+                current / i.steps if current_valid and i.raw_low <= current <= i.raw_high else _NAN,
+                current_rate / di.steps
+                if ripple_valid and di.raw_low <= current_rate <= di.raw_high
+                else _NAN,
+                flux_rate / db.steps if ripple_valid and db.raw_low <= flux_rate <= db.raw_high else _NAN,
+                enabled == 1,
+                setpoint_timeout == 1,
+                current_limited == 1,
+            ),
+        )
+
+    def encode_setpoint(self, setpoint: Setpoint, alive_counter: int) -> bytearray:
+        """Return the 8 bytes of a setpoint, limited to 0..3 A; NaN is refused with `OutOfRangeError`."""
+        current, answered_counter, enable = setpoint
+        limits = self.current
+        if current != current:
+            raise OutOfRangeError(
+                f'current setpoint (NaN) must lie within {limits.low:g} .. {limits.high:g} A; '
+                f'send 0 A with enable off where no setpoint is known'
+            )
+        raw = round(min(max(current, limits.low), limits.high) * limits.steps)
+        return self.setpoint.pack((0, alive_counter, raw, answered_counter, enable))
+
+    def decode_setpoint(self, data: bytes | bytearray) -> tuple[int, Setpoint | None]:
+        """Return alive counter and setpoint, which is None where its current exceeds the DBC's limit."""
+        raw = self.setpoint.unpack(data)
+        return raw[1], self.setpoint_of(raw)
+
+    def setpoint_of(self, raw: tuple[int, ...]) -> Setpoint | None:
+        """Return the setpoint of raw numbers, see `decode_setpoint`."""
+        _, _, current, answered_counter, enable = raw
+        limits = self.current
+        if not limits.raw_low <= current <= limits.raw_high:
+            return None
+        return Setpoint(current / limits.steps, answered_counter, enable == 1)
+
+    def encode_status(self, status: Status, alive_counter: int) -> bytearray:
+        """Return the 8 bytes of a status; NaN is sent as not available. Raises `OutOfRangeError`."""
+        voltage, temperature, *faults = status
+        raw_voltage = _VOLTAGE_NOT_AVAILABLE if math.isnan(voltage) else self.supply_voltage.to_raw(voltage)
+        raw_temperature = (
+            _TEMPERATURE_NOT_AVAILABLE
+            if math.isnan(temperature)
+            else self.coil_temperature.to_raw(temperature)
+        )
+        return self.status.pack((0, alive_counter, raw_voltage, raw_temperature, *faults))
+
+    def decode_status(self, data: bytes | bytearray) -> tuple[int, Status]:
+        """Return alive counter and status; what is not available or lies outside the DBC's limits is NaN."""
+        raw = self.status.unpack(data)
+        return raw[1], self.status_of(raw)
+
+    def status_of(self, raw: tuple[int, ...]) -> Status:
+        """Return the status of raw numbers, see `decode_status`."""
+        _, _, voltage, temperature, *faults = raw
+        return Status(
+            self.supply_voltage.to_si(voltage),
+            self.coil_temperature.to_si(temperature),
+            *(fault == 1 for fault in faults),
+        )
+
+
+class Outcome(IntEnum):
+    """What became of a frame: the first two are used, those from `REPEATED` on have failed a check."""
+
+    OK = 0  # the next one
+    LOST = 1  # in order, but frames before it are missing: see `E2EReceiver.lost`
+    SYNCHRONISING = 2  # in order, but too soon after a wrong sequence or the start to be believed
+    REPEATED = 3  # the same alive counter as the last one
+    WRONG_SEQUENCE = 4  # its counter went back, or farther ahead than frames may be missing
+    WRONG_CRC = 5
+    WRONG_LENGTH = 6
+    OUT_OF_RANGE = 7  # protected and complete, but its content is not allowed
+
+
+_OK, _LOST = Outcome.OK, Outcome.LOST  # a look-up in the class costs more
+
+
+class AliveCounter:
+    """The sender's 8 bit counter: one for each message."""
+
+    def __init__(self) -> None:
+        self._next = 0
+
+    def next(self) -> int:
+        """Return the counter of the frame to be sent, 0..255."""
+        counter = self._next
+        self._next = (counter + 1) & 0xFF
+        return counter
+
+
+class E2EReceiver(Generic[M]):
+    """Checks and decodes the frames of one message, judges their order by the alive counter and counts."""
+
+    def __init__(self, layout: MessageLayout, message_of: Callable[[tuple[int, ...]], M | None]):
+        """`message_of` returns the message of the raw numbers, None where its content is not allowed."""
+        self.outcome = _OK
+        """Of the last frame."""
+        self.counts = [0] * len(Outcome)
+        """Frames by `Outcome`."""
+        self.lost = 0
+        """Frames missing so far."""
+        self.strangers = 0
+        """Sound frames that one sender alone cannot have sent.
+
+        They carry another content under the counter of the last one, or go on with a sequence that was left
+        for another a few frames before. Losses and a restart of the sender do neither.
+        """
+        self._layout, self._message_of = layout, message_of
+        self._last = -1  # alive counter of the last frame whose CRC was good; none yet
+        self._awaited = 0  # frames in order that must still come before one is used
+        self._last_data: bytes | bytearray = b''
+        self._left: list[tuple[int, int]] = []  # last counters of sequences that were left, and when
+
+    def receive(self, data: bytes | bytearray) -> M | None:
+        """Return the message of a frame, or None where it must not be used; see `outcome`."""
+        layout, message = self._layout, None
+        if len(data) != layout.length:
+            outcome = Outcome.WRONG_LENGTH
+        elif not e2e_p05_check(data, layout.data_id):
+            outcome = Outcome.WRONG_CRC
+        else:
+            raw = layout.from_wire(layout.unpack_bits(data[::-1]))
+            if (raw[1] - self._last) & 0xFF == 1 and not self._awaited:
+                outcome = _OK
+            else:
+                outcome = self._judge_order(raw[1], data)
+            self._last, self._last_data = raw[1], data
+            message = self._message_of(raw)
+            if message is None:
+                outcome = Outcome.OUT_OF_RANGE
+        self.outcome = outcome
+        self.counts[outcome] += 1
+        return message if outcome <= _LOST else None
+
+    @property
+    def failed(self) -> int:
+        """Frames that failed a check: the corrupt, the repeated and those of wrong sequence."""
+        return sum(self.counts[Outcome.REPEATED :])
+
+    def _judge_order(self, alive: int, data: bytes | bytearray) -> Outcome:
+        last = self._last
+        step = (alive - last) & 0xFF if last >= 0 else alive + 1  # a receiver that starts counts on from 255
+        if step == 0:
+            self.strangers += data != self._last_data
+            return Outcome.REPEATED
+        if step > self._layout.max_delta_counter:
+            self._awaited = self._layout.sync_frames
+            if last < 0:
+                return Outcome.SYNCHRONISING
+            self._leave(last, alive)
+            return Outcome.WRONG_SEQUENCE
+        self.lost += step - 1
+        if self._awaited > 0:
+            self._awaited -= 1
+            if self._awaited > 0:
+                return Outcome.SYNCHRONISING
+        return _OK if step == 1 else _LOST
+
+    def _leave(self, last: int, alive: int) -> None:
+        """Note that `alive` does not follow `last`; it may go on with a sequence that was left before."""
+        frames = sum(self.counts)
+        self._left = [(counter, at) for counter, at in self._left if frames - at < _LOOK_BACK]
+        if any(1 <= (alive - counter) & 0xFF <= self._layout.max_delta_counter for counter, _ in self._left):
+            self.strangers += 1
+        self._left.append((last, frames))
