@@ -1,6 +1,6 @@
 """The lines on damping: one for each change, few for many."""
 
-from mount_control.damping_log import DampingLog
+from mount_control.diagnosis import DampingLog
 
 
 def test_each_change_is_a_line_and_off_tells_how_long_damping_lasted():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mount_control.parameters import ControlParameters
 from mount_control.plausibility import HOLD, Plausibility
+from mount_control.settings import ControlParameters
 from mount_models.quantity import with_values
 
 HELD = round(1e3 * HOLD)  # samples

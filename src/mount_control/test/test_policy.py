@@ -96,7 +96,7 @@ def test_single_steps_are_a_run_to_the_bit(make, sine, policy):
     traces = whole.run(displacement)
     for number, x in enumerate(displacement):
         assert single.step(x) == traces['current'][number]
-        assert single.trace_bytes == traces[number].tobytes()
+        assert single.trace_record.tobytes() == traces[number].tobytes()
 
 
 @pytest.mark.parametrize('policy', ALL)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mount_bags.bag.column_parts import ColumnPart, column_parts
 from mount_bags.bag.recording import Recording
-from mount_control.parameters import ControlParameters
+from mount_control.settings import ControlParameters
 from mount_models.sampling import sample_time_ns
 from mount_replay.given.input import has
 from mount_replay.given.ramps import MeasuredGap, Ramp

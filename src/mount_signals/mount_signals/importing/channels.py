@@ -8,7 +8,7 @@ from mount_bags.signals.even_grid import evenly_spaced
 from mount_bags.signals.plausibility import check_size
 from mount_bags.signals.resampling import has_step, resampled
 from mount_bags.signals.signal import SECOND, FloatArray, Signal, SignalError
-from mount_control.parameters import ControlParameters
+from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_signals.importing.one_grid import (
     CHASSIS,
