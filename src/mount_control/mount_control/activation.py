@@ -2,7 +2,7 @@
 
 import threading
 import time
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from mount_control.control_loop import ControlLoop
 from mount_control.force_maker import ForceTableError
@@ -14,19 +14,6 @@ _RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside
 _REMEDY = 'activate mount_init (again)'
 
 
-class Table(Protocol):
-    """`stamp` (ns) of its air_gap, `current` (A) over `normal_force` (N), both (n,)."""
-
-    @property
-    def stamp(self) -> int: ...
-
-    @property
-    def current(self) -> Any: ...
-
-    @property
-    def normal_force(self) -> Any: ...
-
-
 class AirGap(NamedTuple):
     """What the controller needs of an air_gap: its stamp in ns and the offset current in A."""
 
@@ -35,13 +22,14 @@ class AirGap(NamedTuple):
 
 
 class Activation:
-    """The newest table and air_gap; None where none has come."""
+    """The newest messages; None where none has come."""
 
     def __init__(self) -> None:
-        self.table: Table | None = None
+        self.table: Any = None
+        """With `stamp` (ns) of its air_gap and `current` (A) over `normal_force` (N), both (n,)."""
         self.air_gap: AirGap | None = None
 
-    def wait(self, loop: ControlLoop, ending: threading.Event) -> tuple[Table, AirGap]:
+    def wait(self, loop: ControlLoop, ending: threading.Event) -> tuple[Any, AirGap]:
         """Return both as soon as they belong to the measurements that `loop` has noted.
 
         Raises `ForceTableError` when they do not within a second, or when `ending` is set.
@@ -55,7 +43,6 @@ class Activation:
                 if time.monotonic() > limit or ending.wait(_LOOK_PERIOD):
                     raise
                 continue
-            assert table is not None
             assert air_gap is not None
             return table, air_gap
 

@@ -51,7 +51,7 @@ _UNANSWERED = {Judgement.IGNORE, Judgement.EARLY, Judgement.INACTIVE}
 
 @dataclass
 class SampleCounts:
-    """What came in since activation."""
+    """What came in since activation, and since it was configured the messages that could not be read."""
 
     samples: int = 0
     bridged: int = 0
@@ -59,6 +59,7 @@ class SampleCounts:
     ignored: int = 0
     invalid: int = 0
     implausible: int = 0
+    messages_malformed: int = 0
 
 
 class Answers(NamedTuple):
@@ -84,6 +85,7 @@ class ControlLoop:
         self.judgement = Judgement.INACTIVE  # of the last sample
         self.trace: NDArray[np.uint8] | None = None
         """The bytes of the last sample's trace, None where there is none; overwritten by the next sample."""
+        self.counts = SampleCounts()
         self.changes_made: deque[str] = deque()  # texts of the changes that hold from the last sample on
         self.foreign = ''  # which other sender there is, since the activation
         self.nameless = False  # whether `foreign` only tells what came, not from whom
@@ -99,7 +101,7 @@ class ControlLoop:
         self._longest_bridge = round(parameters.longest_bridge * 1e9)  # ns
         self._range = parameters.displacement_range  # m
         self.plausibility = Plausibility(parameters)
-        self.counts = SampleCounts()
+        self.counts = SampleCounts(messages_malformed=self.counts.messages_malformed)
         self.interrupted = False
         self.foreign, self.nameless = '', False
         self.last_fault = 0  # stamp (ns) of the last sample at which the controller's memory was spoiled

@@ -89,8 +89,7 @@ class Controller:
 
     def restart(self, displacement: float) -> None:
         """Forget the past: a mount at rest at `displacement` (m), damping off."""
-        law, _, state, window = self.memory
-        self.compiled.start(law, state, window, displacement)
+        self.compiled.start(*self.memory, displacement)
 
     def change(self, law: ControlLaw) -> None:
         """Continue with another law of the same policy, from the next sample on and without a jump.
@@ -152,7 +151,8 @@ def compiled_with(policy: Policy) -> Compiled:
     return Compiled(law, state, trace, *interface)
 
 
-# What follows is compiled for each policy, with these names as `compiled_with` binds them.
+# What follows is compiled for each policy, with these names as `compiled_with` binds them. A `mount` is its
+# law, tables, state, the bits of the state, and window.
 
 policy: Any = None
 LAW = STATE = TRACE = np.dtype([])
@@ -160,9 +160,9 @@ OF_POLICY = 0  # numbers of its state, with which that of the controller begins
 OF_TRACE = 0  # numbers
 
 
-def _start(law, state, window, displacement):
+def _start(law, tables, state, window, displacement):
     """Set the memory to a mount at rest at `displacement` (m), damping off; arguments as for `_single`."""
-    _rest(law.view(LAW)[0], state.view(STATE)[0], window, displacement)
+    _rest((law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window), displacement)
 
 
 def _transfer(law, new_law, state, window, new_window):
@@ -178,7 +178,7 @@ def _single(law, tables, state, window, trace, displacement, bridged_samples):
     `law`, `state` and `trace` are the bytes of their records.
     """
     mount = law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window
-    sound = _all_finite(state.view(np.int64))
+    sound = _all_finite(mount[3])
     return _step(mount, sound, trace.view(np.float64), trace.view(TRACE)[0], displacement, bridged_samples)
 
 
@@ -190,8 +190,9 @@ def _run(law, tables, state, window, traces, displacements):
     maker is spoiled needs no way back, for then both are cleared.
     """
     mount = law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window
-    sound, wanted = _all_finite(mount[3]), np.empty((_AHEAD, 3))
+    sound = _all_finite(mount[3])
     records, numbers, place = traces.view(TRACE), traces.view(np.float64), 0
+    wanted = np.empty((_AHEAD, 3))
     while place < len(displacements):
         end = min(place + _AHEAD, len(displacements))
         if sound:
@@ -206,25 +207,22 @@ def _run(law, tables, state, window, traces, displacements):
 
 def _decide_ahead(mount, traces, displacements, wanted):
     """Let the policy take samples and fill `wanted`; return how many before one that is too far or spoils."""
-    law, tables, state, bits, window = mount
+    _, _, _, bits, _ = mount
     for index in range(len(displacements)):
         if not abs(displacements[index]) <= FARTHEST_DISPLACEMENT:  # also NaN
             return index
-        force, velocity, active = _decide(law, tables, state, window, traces[index], displacements[index])
-        wanted[index, 0], wanted[index, 1], wanted[index, 2] = force, velocity, active
-        if not (math.isfinite(force + velocity + active) and _all_finite(bits[:OF_POLICY])):
+        wanted[index] = _decide(mount, traces[index], displacements[index])
+        if not _all_finite(bits[:OF_POLICY]):
             return index
     return len(displacements)
 
 
 def _make_behind(mount, traces, wanted):
     """Let the force maker take what the policy wants; return how many samples before one that spoils."""
-    law, tables, state, bits, _ = mount
+    _, _, _, bits, _ = mount
     for index in range(len(traces)):
-        trace = traces[index]
-        trace.bridged_samples = 0
-        force, velocity, active = wanted[index, 0], wanted[index, 1], wanted[index, 2]
-        sound = _make(law, tables, state, trace, force, velocity, active)
+        traces[index].bridged_samples = 0
+        sound = _make(mount, traces[index], wanted[index])
         if not (sound and _all_finite(bits[OF_POLICY:])):
             return index
     return len(traces)
@@ -232,33 +230,34 @@ def _make_behind(mount, traces, wanted):
 
 def _step(mount, sound, numbers, trace, displacement, bridged_samples):
     """Take one sample; `numbers` are those of `trace`, `sound`: whether all of the state are finite."""
-    law, tables, state, bits, window = mount
+    _, _, state, bits, _ = mount
     if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
         return _refuse(numbers, trace, displacement)
     if not sound:
         return _clear(mount, numbers, trace, displacement)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
-        force, velocity, active = _decide(law, tables, state, window, trace, state.displacement + rise)
-        _make(law, tables, state, trace, force, velocity, active)
+        _make(mount, trace, _decide(mount, trace, state.displacement + rise))
     trace.bridged_samples = bridged_samples
-    force, velocity, active = _decide(law, tables, state, window, trace, displacement)
-    sound = _make(law, tables, state, trace, force, velocity, active)
+    sound = _make(mount, trace, _decide(mount, trace, displacement))
     if not (sound and _all_finite(bits)):
         return _clear(mount, numbers, trace, displacement)
     return trace.current
 
 
-def _decide(law, tables, state, window, trace, displacement):
-    """Let the policy take one sample; return what its `step` returns."""
+def _decide(mount, trace, displacement):
+    """Let the policy take one sample; return the force (N), velocity (m/s) and activity that it wants."""
+    law, tables, state, _, window = mount
     trace.displacement = displacement
     trace.velocity = (displacement - state.displacement) / law.maker.sample_time
     state.displacement = displacement
     return policy.step(law.policy, tables.policy, state.policy, window, trace, displacement)
 
 
-def _make(law, tables, state, trace, force, velocity, active):
+def _make(mount, trace, wanted):
     """Let the force maker make what the policy wants; return whether all results are finite numbers."""
+    law, tables, state, _, _ = mount
+    force, velocity, active = wanted[0], wanted[1], wanted[2]
     normal_force, coefficient, current = force_maker.make(
         law.maker, tables.current, state.maker, force, velocity, active
     )
@@ -271,17 +270,18 @@ def _make(law, tables, state, trace, force, velocity, active):
     return 0.0 <= active <= 1.0 and math.isfinite(force + velocity + current)
 
 
-def _rest(law, state, window, displacement):
+def _rest(mount, displacement):
+    law, _, state, bits, window = mount
+    bits[:-1] = 0  # all but the count of faults
+    window[:] = 0.0
     policy.start(law.policy, state.policy, window, displacement)
-    force_maker.rest(state.maker)
     state.displacement = displacement
 
 
 def _clear(mount, numbers, trace, displacement):
     """Begin afresh with a memory that was spoiled: whatever the cause, no current is made of it."""
-    law, _, state, _, window = mount
-    _rest(law, state, window, displacement)
-    state.faults += 1
+    _rest(mount, displacement)
+    mount[2].faults += 1
     return _refuse(numbers, trace, displacement)
 
 
@@ -289,10 +289,7 @@ def _refuse(numbers, trace, displacement):
     """Trace that nothing is known of a step, and 0 A."""
     numbers[:] = np.nan
     trace.displacement = displacement
-    trace.damping_active = 0.0
-    trace.desired_force = 0.0
-    trace.normal_force = 0.0
-    trace.current = 0.0
+    trace.damping_active = trace.desired_force = trace.normal_force = trace.current = 0.0
     trace.bridged_samples = 0.0
     return 0.0
 

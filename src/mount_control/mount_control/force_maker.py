@@ -115,17 +115,6 @@ def design(
 
 
 @compiled
-def rest(state):
-    """Set the memory to pads that are not pressed."""
-    state.deflection = 0.0
-    state.normal_force = 0.0
-    state.current = 0.0
-    state.distance = 0.0
-    state.fading = 0
-    state.on = 0
-
-
-@compiled
 def begin_fade(law, state):
     """Let the current go over to a new law from where it is; off, the new law acts at once."""
     state.fading = law.fade_samples if state.on == 1 else 0

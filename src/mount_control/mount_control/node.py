@@ -4,17 +4,18 @@ import contextlib
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
 
 from mount_control.activation import Activation, AirGap, check_rate
-from mount_control.control_loop import OFF, ControlLoop
+from mount_control.control_loop import OFF, ControlLoop, SampleCounts
 from mount_control.controller import load_compiled_law
-from mount_control.diagnosis import ControlFigures, Counted, DampingLog, Unread, counted, verdict
+from mount_control.diagnosis import ControlFigures, counted_since, verdict
 from mount_control.policy.contract import trace_fields
 from mount_control.settings import (
     FRICTION,
@@ -50,9 +51,9 @@ _MEASURED_BEFORE = (
         'break since before the present table was made, so that it holds'
     ),
 )
-
-
 _KEPT_DURATIONS = 100_000  # chosen: many more than come between two verdicts
+
+T = TypeVar('T')
 
 
 class MountControl(SafeLifecycleNode):
@@ -69,10 +70,8 @@ class MountControl(SafeLifecycleNode):
         self._of_specimen = SpecimenValues(self)
         self.loop = ControlLoop()
         self._activation = Activation()
-        self._damping_log = DampingLog()
         self._foreign = False  # whether another node publishes what this one subscribes to
         self._nameless = NamelessWriter()
-        self._unread = Unread()
         self._waiting = b''  # the newest displacement message that came while nothing was answered
         self._last_setpoint = (0, OFF)  # stamp ns, A
         self._durations: deque[float] = deque(maxlen=_KEPT_DURATIONS)  # s, since the last verdict
@@ -88,7 +87,7 @@ class MountControl(SafeLifecycleNode):
         usual = defaults()
         self._warn_without_effect(name for name, value in self._values().items() if value != usual.get(name))
         self._parameter_changes = 0
-        self._foreign, self._unread = False, Unread()
+        self._foreign, self._unread_reason = False, ''
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
@@ -112,9 +111,8 @@ class MountControl(SafeLifecycleNode):
         check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
         self._latency = LatencyHistogram()
-        self._counted = SlidingWindow(Counted())
+        self._counted = SlidingWindow(SampleCounts())
         self._heard = time.monotonic()
-        self._damping_log = DampingLog()
         with self._order:
             waiting, self._waiting = self._waiting, b''
             self.loop.begin(self._settings, currents, air_gap.stamp)
@@ -161,23 +159,23 @@ class MountControl(SafeLifecycleNode):
 
     def judge(self) -> Verdict:
         loop, now = self.loop, time.monotonic()
-        if line := self._damping_log.look(loop.damping_active, now):
-            self.get_logger().info(line)
         while self._durations:
             self._latency.add(self._durations.popleft())
-        newest = counted(loop.counts, self._unread)
+        counts = replace(loop.counts)
         figures = ControlFigures(
-            lately=newest.since(self._counted.earlier(now, newest)),
+            lately=counted_since(self._counted.earlier(now, counts), counts),
             silence=0.0 if self.lockstep else now - self._heard,
             longest_silence=self._settings.parameters.longest_bridge,
             step_median=self._latency.quantile(0.5),
             step_p99=self._latency.quantile(0.99),
-            lockstep=self.lockstep,
-            policy=self._settings.parameters.policy,
-            damper=self.get_parameter('damper').value,
-            parameter_changes=self._parameter_changes,
-            name_awaited=self._nameless.is_awaited(loop.nameless),
-            unread=self._unread,
+            # In lock-step a supervisor ends the graph, with the name of the other node where there is one.
+            foreign_is_fatal=not self._nameless.is_awaited(loop.nameless) and self.lockstep,
+            unread_reason=self._unread_reason,
+            values={
+                'policy': self._settings.parameters.policy,
+                'damper': self.get_parameter('damper').value,
+                'parameter_changes': self._parameter_changes,
+            },
         )
         return verdict(loop, figures)
 
@@ -207,28 +205,28 @@ class MountControl(SafeLifecycleNode):
         self._send_event(serialised(String(data=dated(stamp, text))))
 
     def _on_air_gap(self, raw: bytes) -> None:
-        self._activation.air_gap = None
-        if self._foreign:
-            return
-        try:
-            stamp, numbers, _ = self._gap_layout.unpack(raw)
-        except ScalarsError as error:
-            self._note_unread(error)
-            return
-        offset_current = numbers[self._gap_layout.names.index('offset_current')]
-        self._activation.air_gap = AirGap(stamp, offset_current)
+        self._activation.air_gap = self._read(self._air_gap_of, raw)
 
     def _on_table(self, raw: bytes) -> None:
-        self._activation.table = None
+        self._activation.table = self._read(from_bytes, raw)
+
+    def _read(self, unpack: Callable[[bytes], T], raw: bytes) -> T | None:
+        """Return the content of a message; None where it is unreadable or may be another node's."""
         if self._foreign:
-            return
+            return None
         try:
-            self._activation.table = from_bytes(raw)
-        except ForceTableMessageError as error:
+            return unpack(raw)
+        except (ScalarsError, ForceTableMessageError) as error:
             self._note_unread(error)
+            return None
+
+    def _air_gap_of(self, raw: bytes) -> AirGap:
+        stamp, numbers, _ = self._gap_layout.unpack(raw)
+        return AirGap(stamp, numbers[self._gap_layout.names.index('offset_current')])
 
     def _note_unread(self, error: ValueError) -> None:
-        self._unread = self._unread.and_another(error)
+        self.loop.counts.messages_malformed += 1
+        self._unread_reason = str(error)
         self.get_logger().error(str(error), throttle_duration_sec=1.0)
 
     def _warn_without_effect(self, names: Iterable[str]) -> None:

@@ -81,10 +81,6 @@ class Plausibility:
         self._record = self.memory.view(MEMORY)[0]
         self._parameters = parameters
 
-    def doubt(self, displacement: float, missing: int) -> bool:
-        """Take a sample (m) with so many missing before it; return whether it is not to be believed."""
-        return bool(doubt_of(self.limits, self.memory, displacement, missing))
-
     def believed(self, displacements: np.ndarray) -> int:
         """Take samples that follow each other up to the first that is not to be believed; return how many."""
         return int(_believed(self.limits, self.memory, displacements))

@@ -32,25 +32,19 @@ class ControlParameters(NamedTuple):
     sample_rate: SampleRate = SAMPLE_RATE
     longest_bridge: Annotated[
         float,
-        Quantity(
-            's',
-            'longest gap in the samples that is bridged; a longer one starts afresh',
-            0.002,
-            0.1,
-            'chosen',
-        ),
+        Quantity('s', 'longest gap in the samples that is bridged; a longer one starts afresh', 0.002, 0.1),
     ] = 0.020
     displacement_range: Annotated[
-        float, Quantity('m', 'largest believable displacement to either side', 1e-3, 0.1, 'chosen')
+        float, Quantity('m', 'largest believable displacement to either side', 1e-3, 0.1)
     ] = 0.020
     displacement_velocity: Annotated[
-        float, Quantity('m/s', 'largest believable velocity of the displacement', 0.1, 100.0, 'chosen')
+        float, Quantity('m/s', 'largest believable velocity of the displacement', 0.1, 100.0)
     ] = 1.0
     displacement_noise: Annotated[
-        float, Quantity('m', 'largest believable noise of the displacement', 1e-6, 0.1, 'chosen')
+        float, Quantity('m', 'largest believable noise of the displacement', 1e-6, 0.1)
     ] = 5e-5
     displacement_stuck: Annotated[
-        float, Quantity('s', 'a noisy displacement that repeats for so long is stuck', 0.01, 10.0, 'chosen')
+        float, Quantity('s', 'a noisy displacement that repeats for so long is stuck', 0.01, 10.0)
     ] = 0.05
     highest_current: Annotated[
         float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')

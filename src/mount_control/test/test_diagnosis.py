@@ -6,18 +6,19 @@ from types import SimpleNamespace
 import pytest
 
 from mount_control.control_loop import SampleCounts
-from mount_control.diagnosis import ControlFigures, Counted, Unread, counted, verdict
+from mount_control.diagnosis import ControlFigures, counted_since, verdict
 from mount_ros.nodes.diagnostics import Level, Standing
 from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
 
 GOOD = ControlFigures(
-    lately=Counted(),
+    lately=SampleCounts(),
     silence=0.001,
     longest_silence=0.020,
     step_median=80e-6,
     step_p99=210e-6,
-    policy='switched_viscous',
-    damper='viscous_2000',
+    foreign_is_fatal=False,
+    unread_reason='',
+    values={'policy': 'switched_viscous', 'damper': 'viscous_2000', 'parameter_changes': 0},
 )
 OF_NODE = {field.name for field in fields(ControlFigures)}
 
@@ -34,7 +35,7 @@ def _verdict(**changes):
             'last_fault': 0, 'foreign': '', 'writer_doubt': '', **of_loop,
         },
     )  # fmt: skip
-    of_node.setdefault('lately', counted(loop.counts, of_node.get('unread', GOOD.unread)))
+    of_node.setdefault('lately', loop.counts)
     return verdict(loop, replace(GOOD, **of_node))
 
 
@@ -121,20 +122,14 @@ def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
     assert judged.sentence.startswith('controller state became NaN or infinite: output 0 A, state reset')
 
 
-@pytest.mark.parametrize('lockstep', [True, False])
-def test_another_writer_is_an_error_that_ends_a_graph_in_lock_step_alone(lockstep):
+@pytest.mark.parametrize('fatal', [True, False])
+def test_another_writer_is_an_error_that_may_end_the_graph(fatal):
     foreign = '/evil must not publish displacement: end it'
-    judged = _verdict(foreign=foreign, lockstep=lockstep)
-    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, lockstep)
+    judged = _verdict(foreign=foreign, foreign_is_fatal=fatal)
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, fatal)
     assert judged.sentence == (
         '0 A: /evil must not publish displacement: end it, then activate mount_init and mount_control again'
     )
-
-
-def test_another_writer_whose_name_may_still_come_does_not_end_the_graph_yet():
-    judged = _verdict(foreign='10 samples were repeated: end one', lockstep=True, name_awaited=True)
-    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
-    assert judged.sentence.startswith('0 A: 10 samples were repeated')
 
 
 def test_a_writer_in_doubt_is_an_error_while_it_lasts():
@@ -144,8 +139,7 @@ def test_a_writer_in_doubt_is_an_error_while_it_lasts():
 
 
 def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
-    unread = Unread().and_another(ValueError('first')).and_another(ValueError('cut'))
-    judged = _verdict(unread=unread)
+    judged = _verdict(counts=SampleCounts(messages_malformed=2), unread_reason='cut')
     assert (judged.level, judged.figures['messages_malformed']) == (Level.WARN, 2)
     assert judged.sentence == (
         '2 messages could not be read and were not answered (limit: none in 10 s), the last for cut; which '
@@ -153,17 +147,14 @@ def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
     )
 
 
-@pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged', 'unread'])
+@pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged', 'messages_malformed'])
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
-    window, standing, told = SlidingWindow(Counted()), Standing(), []
+    window, standing, told = SlidingWindow(SampleCounts()), Standing(), []
     for tenth in range(300):
         found = 100 * min(max(tenth - 49, 0), 5)
-        unread = Unread(found, 'cut') if count == 'unread' else Unread()
-        counts = SampleCounts(samples=100 * tenth, **{count: found} if count != 'unread' else {})
-        now = counted(counts, unread)
-        lately = now.since(window.earlier(tenth / 10, now))
-        found_now = _verdict(counts=counts, unread=unread, lately=lately, doubt='step')
-        verdict_told = standing.keep(found_now)
+        counts = SampleCounts(samples=100 * tenth, **{count: found})
+        lately = counted_since(window.earlier(tenth / 10, counts), counts)
+        verdict_told = standing.keep(_verdict(counts=counts, lately=lately, doubt='step'))
         told.append((verdict_told.level, verdict_told.sentence))
     warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
     assert (warned[0], len(warned)) == (50, warned[-1] - 49)
