@@ -121,12 +121,30 @@ def skip_if_late() -> Callable[[str], None]:
     return skip
 
 
+@pytest.fixture(scope='session')
+def repeat_if_late() -> Callable[[Callable[[], str]], None]:
+    """Call a trial again while it returns by what the machine was too late; at last skip, or fail in CI."""
+
+    def repeat(trial: Callable[[], str]) -> None:
+        for _ in range(attempts()):
+            if not (late := trial()):
+                return
+        (pytest.fail if os.environ.get('CI') else pytest.skip)(f'too late for real time: {late}')
+
+    return repeat
+
+
+def attempts() -> int:
+    """Return how often a drive in real time is tried."""
+    return ATTEMPTS_IN_CI if os.environ.get('CI') else ATTEMPTS
+
+
 @pytest.fixture
 def drive_in_time(command: Command, skip_if_late: Callable[[str], None]) -> Callable[..., Result]:
     """Drive in real time, once more if something was late; a machine too late by itself skips the test."""
 
     def drive(*options: str) -> Result:
-        for _ in range(ATTEMPTS_IN_CI if os.environ.get('CI') else ATTEMPTS):
+        for _ in range(attempts()):
             with machine_watched() as stood_still:
                 result = command.drive(*options, report=True)
             if result.code == 0 and result.figures['lost_samples'] == 0:

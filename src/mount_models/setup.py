@@ -5,7 +5,7 @@ name = 'mount_models'
 setup(
     name=name,
     version='0.1.0',
-    description='Physics and laws of the engine mount: actuator, coil, friction, damper, vehicle.',
+    description='Physics and laws of the engine mount: actuator, coil, friction, damper.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test']),
     package_data={name: ['specimens/*.yaml']},

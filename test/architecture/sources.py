@@ -7,7 +7,8 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
-PACKAGES = sorted(file.parent.name for file in SOURCES.glob('*/package.xml'))
+PACKAGES = sorted(file.parent.name for file in SOURCES.glob('*/setup.py'))
+ROS_PACKAGES = [name for name in PACKAGES if (SOURCES / name / 'package.xml').is_file()]
 LOADERS = ('import_module', 'importlib.import_module', 'importlib.resources.files', 'required')
 
 

@@ -40,26 +40,26 @@ OF_LIBRARIES = {
 """Functions of `math` and numpy that choose instructions by the processor, contract, or sum in any order."""
 METHODS = {'mean', 'std', 'var', 'dot'}
 ALLOWED = {
-    ('mount_models.arithmetic.random_numbers', 'np.random'): 'whole numbers of PCG64',
+    ('mount_sim.random_numbers', 'np.random'): 'whole numbers of PCG64',
     ('mount_models.arithmetic.elementary', '**'): 'powers of whole numbers and fractions',
     ('mount_sim.plant.check', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_sim.plant.car_check', 'np.linalg'): 'whether parameters are refused, no number of a run',
-    ('mount_models.engine_body', 'np.linalg'): 'natural frequencies, by which parameters are refused',
-    ('mount_models.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
+    ('mount_sim.plant.engine_body', 'np.linalg'): 'natural frequencies, by which parameters are refused',
+    ('mount_sim.plant.vehicle', 'np.linalg'): 'natural frequencies, which no run uses',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimation', 'np.sum'): 'whole numbers',
-    ('mount_bags.bag.file_blocks', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.container.filled_chunk', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.container.stored', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.container.mcap_reading.unpacker', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.container.mcap_reading.chunk_index', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.signals.even_grid', 'np.mean'): 'shares of whole numbers',
-    ('mount_bags.messages.compact_times', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.messages.stamps', 'np.cumsum'): 'whole numbers',
-    ('mount_bags.messages.time_axis', 'np.interp'): 'times told to people',
-    ('mount_bags.messages.stamps', '**'): 'rates of topics, for the eye',
-    ('mount_bags.messages.stamps', 'np.mean'): 'rates of topics, for the eye',
+    ('engine_mount.recordings.bag.file_blocks', 'np.cumsum'): 'whole numbers',
+    ('mount_recorder.filled_chunk', 'np.cumsum'): 'whole numbers',
+    ('engine_mount.recordings.container.stored', 'np.cumsum'): 'whole numbers',
+    ('engine_mount.recordings.container.mcap_reading.unpacker', 'np.cumsum'): 'whole numbers',
+    ('engine_mount.recordings.container.mcap_reading.chunk_index', 'np.cumsum'): 'whole numbers',
+    ('engine_mount.recordings.signals.even_grid', 'np.mean'): 'shares of whole numbers',
+    ('engine_mount.recordings.messages.compact_times', 'np.cumsum'): 'whole numbers',
+    ('engine_mount.recordings.messages.stamps', 'np.cumsum'): 'whole numbers',
+    ('engine_mount.recordings.messages.time_axis', 'np.interp'): 'times told to people',
+    ('engine_mount.recordings.messages.stamps', '**'): 'rates of topics, for the eye',
+    ('engine_mount.recordings.messages.stamps', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
     ('mount_ros.messages.scalars', 'math.prod'): 'whole numbers',
     ('mount_signals.formats.trees.leaves', 'math.prod'): 'whole numbers',
@@ -162,7 +162,7 @@ def modules() -> set[str]:
 
 def _needs(source: str) -> Iterator[str]:
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ImportFrom) and (node.module or '').startswith('mount_'):
+        if isinstance(node, ast.ImportFrom) and (node.module or '').startswith(('mount_', 'engine_mount')):
             for name in (node.module, *(f'{node.module}.{each.name}' for each in node.names)):
                 if name is not None and _file(name) is not None:
                     yield name

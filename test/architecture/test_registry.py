@@ -14,18 +14,11 @@ from mount_bringup.graph.nodes import SIMULATED
 from mount_cli.command import app
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
-from mount_models.actuator.closing import ClosingMechanics
 from mount_models.actuator.law import ForceLaw
-from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.coil.ripple import RippleCoil
 from mount_models.damper import DegressiveDamper, ProgressiveDamper, ViscousDamper
-from mount_models.elastomer import Elastomer
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.hydromount import Hydromount
 from mount_models.quantity import quantities
-from mount_models.road import Gap, RandomRoad, Sweep
-from mount_models.vehicle import Vehicle
 from mount_ros import topics
 from mount_ros.qos import publisher_qos
 from mount_ros.topics import (
@@ -37,11 +30,18 @@ from mount_ros.topics import (
     Delivery,
     Topic,
 )
+from mount_sim.excitation.road import Gap, RandomRoad, Sweep
+from mount_sim.plant.closing import ClosingMechanics
+from mount_sim.plant.elastomer import Elastomer
+from mount_sim.plant.hydromount import Hydromount
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil
+from mount_sim.plant.vehicle import Vehicle
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
 MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themselves
-    'mount_bags/recorder/collector.py',
+    'mount_recorder/collector.py',
     'mount_ros/data_path.py',
     'mount_ros/nodes/diagnostics.py',
     'mount_bringup/graph/own_node.py',
@@ -49,11 +49,15 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
     'mount_cli/bench/relay.py',  # not of the graph: bare rclpy to compare with
 }
 
-PARAMETER_SETS = (
-    ForceLaw, ReluctanceActuator, RippleCoil, ClosingMechanics, FrictionCoefficients, FrictionContact,
-    ViscousDamper, DegressiveDamper, ProgressiveDamper, Elastomer, Hydromount, Vehicle, RandomRoad,
-    Gap, Sweep,
-)  # fmt: skip
+PARAMETER_SETS = {
+    ('src/mount_models/README.md', 'Parameters'): (
+        ForceLaw, FrictionCoefficients, FrictionContact, ViscousDamper, DegressiveDamper, ProgressiveDamper,
+    ),
+    ('src/mount_sim/README.md', 'Parameters of the laws'): (
+        ReluctanceActuator, RippleCoil, ClosingMechanics, Elastomer, Hydromount, Vehicle, RandomRoad,
+        Gap, Sweep,
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(('heading', 'registry'), [('Topics', TOPICS), ('Topics of the rack', RACK_TOPICS)])
@@ -143,13 +147,15 @@ def test_the_graph_waits_for_registered_topics():
     assert needed <= {topic.name for topic in TOPICS}
 
 
-def test_models_readme_lists_every_parameter_with_unit_range_and_source():
+@pytest.mark.parametrize(('place', 'kinds'), PARAMETER_SETS.items(), ids=('mount_models', 'mount_sim'))
+def test_readme_lists_every_parameter_with_unit_range_and_source(place, kinds):
+    file, heading = place
     listed: dict[str, list[tuple[str, ...]]] = {}
-    for row in table('Parameters', 'src/mount_models/README.md'):
+    for row in table(heading, file):
         name, *values = row.values()
         listed.setdefault(name, []).append(tuple(values))
-    assert set(listed) == {kind.__name__ for kind in PARAMETER_SETS}
-    for kind in PARAMETER_SETS:
+    assert set(listed) == {kind.__name__ for kind in kinds}
+    for kind in kinds:
         defaults = kind._field_defaults
         assert listed[kind.__name__] == [
             (
@@ -202,7 +208,7 @@ def ends_of_nodes(kind: str, topic_name: str) -> set[str]:
 
 
 def python_files() -> list[Path]:
-    return sorted(SOURCES.glob('*/mount_*/**/*.py'))
+    return sorted(SOURCES.glob('*/*mount*/**/*.py'))
 
 
 def topics_used_in(file: Path) -> Iterator[str]:

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.settings import defaults_of_nodes
 from mount_cli.completion.collected import collected
 from mount_cli.completion.values import FILE as NAMES
@@ -18,10 +17,10 @@ from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.quantity import Quantity, quantities
 from mount_models.specimen_choice import SpecimenChoice
+from mount_recorder.parameters import RecorderParameters
 from mount_sim.parameters import NodeParameters, SimParameters
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'parameters.md'
-README = {'mount_recorder': 'mount_bags'}
 SETS: dict[str, list[tuple[str, Any]]] = {
     'mount_driver': [('', DriverParameters()), ('', SpecimenChoice())],
     'mount_sim': [('', SimParameters()), ('', NodeParameters())],
@@ -45,11 +44,10 @@ def page() -> str:
     """Return the text of the page."""
     parts = [HEAD]
     for node, defaults in defaults_of_nodes().items():
-        package = README.get(node, node)
         notes = {name: note for prefix, given in SETS[node] for name, note in notes_of(given, prefix)}
         parts += [
             f'## {node}',
-            f'README: [{package}](../../src/{package}/README.md#parameters).',
+            f'README: [{node}](../../src/{node}/README.md#parameters).',
             '\n'.join(
                 [
                     '| parameter | default | unit | range | meaning | source |',

@@ -28,9 +28,17 @@ STATUS = 'echo $?'
 COMMAND = re.compile(r'(?:^(?:\$ )?|`)(?:\.venv/bin/)?engine-mount ((?:[^`\n\\]|\\\n)*)', re.MULTILINE)
 WRITTEN = ('docs/explanation/recorded_drive.md',)  # by a command; it needs a recording that is not shipped
 RUN = [page for page in GUIDES if any(blocks(page, *LANGUAGES))]
+FIRST = ('README.md', 'docs/tutorials/first_drive.md', 'docs/reference/python.md')
+"""Pages whose commands `make test` runs."""
 
 
-@pytest.mark.parametrize('page', RUN, ids=name_of)
+@pytest.mark.parametrize(
+    'page',
+    [
+        pytest.param(page, id=name_of(page), marks=() if name_of(page) in FIRST else pytest.mark.slow)
+        for page in RUN
+    ],
+)
 def test_the_commands_of_a_page_do_what_it_says(page, tmp_path, domain):
     if page.parent.name == 'bags':  # its commands renew a reference
         shutil.copytree(page.parent / 'reference', tmp_path / 'bags' / 'reference')

@@ -7,8 +7,8 @@ import pytest
 import yaml
 from command import done
 
-import mount_bags
-from mount_bags.run.session import recorded_session, session_content
+import engine_mount
+from engine_mount.recordings.run.session import recorded_session, session_content
 from mount_replay import fleet
 from mount_signals.testing import MAKERS
 
@@ -48,7 +48,7 @@ each_format = pytest.mark.parametrize('made', list(MAKERS), indirect=True)
 def test_drive(made, tmp_path):
     order = ['--scenario', 'recorded', '--file', made.path, '--column', column(made, 'az'), *said(made)]
     done('drive', '--core', '--no-report', '--duration', 1, *order, '--out', tmp_path / 'run')
-    session = session_content(recorded_session(mount_bags.open(tmp_path / 'run' / 'recording')))
+    session = session_content(recorded_session(engine_mount.open(tmp_path / 'run' / 'recording')))
     given = session['parameters']['mount_sim']
     values = given['recorded.scale'] * np.load(given['recorded.file'])
     assert values == pytest.approx(SHAKING + GRAVITY, abs=1e-5)
@@ -61,7 +61,7 @@ def test_drive(made, tmp_path):
 def test_replay(made, tmp_path):
     order = ['--map', f'displacement={column(made, "travel")}', *said(made)]
     done('replay', made.path, *order, '--out', tmp_path / 'run')
-    displacement = mount_bags.open(tmp_path / 'run' / 'recording')['displacement']
+    displacement = engine_mount.open(tmp_path / 'run' / 'recording')['displacement']
     assert displacement['mount'][::5][40:360] == pytest.approx(TRAVEL[40:360], abs=2e-6)
 
 
@@ -69,12 +69,13 @@ def test_replay(made, tmp_path):
 def test_import(made, tmp_path):
     order = [f'displacement={column(made, "travel")}', '--column', f'acceleration={column(made, "az")}']
     done('import', made.path, '--column', *order, *said(made), '--out', tmp_path / 'made')
-    recording = mount_bags.open(tmp_path / 'made')
+    recording = engine_mount.open(tmp_path / 'made')
     assert recording['displacement']['mount'][::5][40:360] == pytest.approx(TRAVEL[40:360], abs=2e-6)
     acceleration = recording['sim/chassis_acceleration']['linear_acceleration.z']
     assert acceleration[::5][40:360] == pytest.approx(SHAKING[40:360] + GRAVITY, abs=2e-4)
 
 
+@pytest.mark.slow  # src/mount_replay/test/test_fleet_foreign.py indexes foreign files as well
 @each_format
 def test_fleet_index(made, tmp_path):
     files = tmp_path / 'drives'

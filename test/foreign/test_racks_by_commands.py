@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from command import done, refused
 
-from mount_models.actuator.reluctance import ReluctanceActuator, force
 from mount_signals.testing import MAKERS, make_csv
+from mount_sim.plant.reluctance import ReluctanceActuator, force
 from mount_sim.rack.friction import RackNoise, sawtooth
+
+pytestmark = pytest.mark.slow
 
 RACK = sawtooth(noise=RackNoise(seed=4), normal_force=70.0, speeds=(0.002, 0.004, 0.006, 0.01), stroke=1e-3)
 TIMES = RACK.time[::2]  # s

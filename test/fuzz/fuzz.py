@@ -30,9 +30,9 @@ class HangError(AssertionError):
     """An input computed for longer than `LIMIT` or waited for longer than `LONGEST_WAIT`."""
 
 
-def property_of(package: str, module: str, name: str):
+def property_of(package: str, module: str, name: str, room: str = ''):
     """Return the property `name` of a test module of `package`, as hypothesis wrapped it."""
-    folder = str(ROOT / 'src' / package / 'test')
+    folder = str(ROOT / 'src' / package / 'test' / room)
     if folder not in sys.path:
         sys.path.insert(0, folder)
     found = importlib.import_module(module)
@@ -97,7 +97,7 @@ def settings_targets() -> dict[str, list[Check]]:
 def file_targets(folder: Path) -> dict[str, list[Check]]:
     """Return the checks of recordings: MCAP by four writers and our own, sqlite3, `metadata.yaml`."""
     files = {
-        name: property_of('mount_bags', 'test_foreign_files', name)
+        name: property_of('engine_mount', 'test_foreign_files', name, 'recordings')
         for name in (
             'test_what_is_read_of_a_mutated_file_is_what_was_written_or_not_sound',
             'test_a_mutated_database_is_read_as_far_as_it_is_one',
@@ -124,7 +124,7 @@ def small_drive(module, folder: Path, writer: str):
     if writer != 'ours':
         module.rewritten(file, made / 'other.mcap', module.WRITERS[writer])
         (made / 'other.mcap').replace(file)
-    return file, file.read_bytes(), module.contents(module.mount_bags.open(made))
+    return file, file.read_bytes(), module.contents(module.engine_mount.open(made))
 
 
 def plain(test) -> Callable[..., None]:

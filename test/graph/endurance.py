@@ -15,9 +15,9 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import mount_bags
-from mount_bags.run.folder import recordings_of
+import engine_mount
 from mount_bringup.graph.domain import DomainError, domain_lock
+from mount_recorder.folders import recordings_of
 
 EARLIEST, LATEST = 0.5, 15.0  # s, chosen: when the signal comes; Python itself needs a while to start
 PATIENCE = 60.0  # s, chosen: until a graph that was told to end counts as hanging
@@ -186,7 +186,7 @@ def open_recordings(first: Path) -> list[str]:
         if not (folder / 'metadata.yaml').exists():
             faults.append(f'{folder.name} is not closed')
             continue
-        faults += [f'{folder.name}: {warning}' for warning in mount_bags.open(folder).warnings]
+        faults += [f'{folder.name}: {warning}' for warning in engine_mount.open(folder).warnings]
     return faults
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.bag.recording import open_recording
+from engine_mount.recordings.bag.recording import open_recording
 from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.processes import node_environment, parameter_text
@@ -100,6 +100,7 @@ def setpoints_of_replay(folder, begin):
     return stamps[stamps >= begin], series['coil_current'][first][stamps >= begin]
 
 
+@pytest.mark.slow
 def test_a_player_that_fails_ends_the_replay_with_its_command_and_a_remedy(replay, tmp_path):
     (tmp_path / 'bin' / 'ros2').write_text('#!/bin/sh\nexit 2\n')
     code, output = replay(bag=str(REFERENCE), record='false')

@@ -2,6 +2,10 @@
 
 import json
 
+import pytest
+
+pytestmark = pytest.mark.slow
+
 LIMIT = 240.0  # s: only a hang takes so long
 
 

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-import mount_bags
-from mount_bags.audit.audit import audit
-from mount_bags.audit.losses import losses
-from mount_bags.audit.node_reports import node_reports
-from mount_bags.run.session import recorded_sample_rate
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit.node_reports import node_reports
+from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_replay.replay import ReplayOrder, replay_without_output
 
 DATA_TOPICS = (
@@ -35,7 +35,7 @@ PROMISED_FIGURES = {
 
 def _payloads(folder, topic):
     """Return the messages of a topic by time: reliable delivery may repair the order of two publishers."""
-    series = mount_bags.open(folder / 'recording')[topic]
+    series = engine_mount.open(folder / 'recording')[topic]
     payloads = [bytes(payload) for payload in series.payloads]
     if topic == 'current_force_table':  # has no stamp, and comes once
         return payloads
@@ -54,7 +54,7 @@ def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equal
         assert reference, topic
         assert _payloads(second.folder, topic) == reference, topic
         assert _payloads(core.folder, topic) == reference, topic
-    recording = mount_bags.open(second.folder / 'recording')
+    recording = engine_mount.open(second.folder / 'recording')
     topics = set(recording.topics)
     assert topics - {'/diagnostics'} == {name for name in topics if name.startswith('/mount_right/')}
     assert len(recording.files) > 1
@@ -62,6 +62,7 @@ def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equal
     assert losses(recording, audit(recording)).sound
 
 
+@pytest.mark.slow
 def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switching_too(command):
     options = (
         '--mount', 'hydro', '--set', 'mount_control.policy=switched_viscous',
@@ -74,13 +75,14 @@ def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switchin
     assert lockstep.code == core.code == 0, lockstep.output + core.output
     for topic in DATA_TOPICS:
         assert _payloads(lockstep.folder, topic) == _payloads(core.folder, topic), topic
-    measured = mount_bags.open(core.folder / 'recording')['coil_temperature']['temperature']
+    measured = engine_mount.open(core.folder / 'recording')['coil_temperature']['temperature']
     assert set(measured) == {55.0}
-    active = mount_bags.open(core.folder / 'recording')['control_trace']['damping_active']
+    active = engine_mount.open(core.folder / 'recording')['control_trace']['damping_active']
     assert bool(active[:200].all()) is False
     assert bool(active[200:].all()) is True
 
 
+@pytest.mark.slow
 def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(command):
     options = ('--sample-rate', '2000', '--scenario', 'bench', '--duration', '0.5')
     options += ('--set', 'mount_sim.timeline.start=2.9')
@@ -89,7 +91,7 @@ def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(comman
     for topic in DATA_TOPICS:
         assert _payloads(lockstep.folder, topic) == _payloads(core.folder, topic), topic
     for result in (lockstep, core):
-        recording = mount_bags.open(result.folder / 'recording')
+        recording = engine_mount.open(result.folder / 'recording')
         assert recorded_sample_rate(recording) == 2000.0
         assert set(np.diff(recording['displacement'].stamps)) == {500_000}
         assert result.figures['lost_samples'] == result.figures['unanswered_samples'] == 0
@@ -98,6 +100,7 @@ def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(comman
     assert replayed.agreement.equal
 
 
+@pytest.mark.slow
 def test_lockstep_equals_the_core_run_over_a_measured_road(command):
     places = np.arange(0.0, 12.0, 0.02)  # m
     height = 0.01 * np.sin(2.0 * np.pi * places / 1.1) + 0.004 * np.sin(2.0 * np.pi * places / 0.3)
@@ -110,7 +113,7 @@ def test_lockstep_equals_the_core_run_over_a_measured_road(command):
         payloads = _payloads(core.folder, topic)
         assert payloads, topic
         assert _payloads(lockstep.folder, topic) == payloads, topic
-    assert np.ptp(mount_bags.open(core.folder / 'recording')['sim/truth']['road_height']) > 0.01
+    assert np.ptp(engine_mount.open(core.folder / 'recording')['sim/truth']['road_height']) > 0.01
 
 
 @pytest.mark.real_time
@@ -131,7 +134,7 @@ def test_real_time_drive_records_every_sample_and_damps_the_gap(drive_in_time, t
     assert figures['contact_gap_m'] == pytest.approx(figures['true_contact_gap_m'], abs=3e-6)
     assert figures['rest_gap_m'] == pytest.approx(figures['true_rest_gap_m'], abs=6e-6)
     assert (result.folder / 'drive.png').stat().st_size > 10_000
-    recording = mount_bags.open(result.folder / 'recording')
+    recording = engine_mount.open(result.folder / 'recording')
     assert not [report for report in node_reports(recording) if report.is_error]  # nor when it ended
     assert set(recording.topics) >= {f'/{topic}' for topic in DATA_TOPICS}
     assert 'scenario: motorway' in recording.latched('session').data

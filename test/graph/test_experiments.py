@@ -5,13 +5,15 @@ import json
 import numpy as np
 import pytest
 
-import mount_bags
-from mount_bags.run.session import recorded_session
+import engine_mount
+from engine_mount.recordings.run.session import recorded_session
 from mount_cli.command import main
+
+pytestmark = pytest.mark.slow
 
 
 def _setpoints(run):
-    series = mount_bags.open(run / 'recording')['current_setpoint']
+    series = engine_mount.open(run / 'recording')['current_setpoint']
     order = np.argsort(series.stamps, kind='stable')
     return [bytes(series.payloads[place]) for place in order]
 
@@ -28,7 +30,7 @@ def test_an_experiment_through_the_nodes_gives_the_setpoints_and_figures_of_the_
     for out in (core, lockstep):
         found[out] = json.loads(out.with_suffix('.json').read_text())
         assert found[out].pop('mode') == out.name
-        assert f'mode: {out.name}' in recorded_session(mount_bags.open(out / '20mm_friction' / 'recording'))
+        assert f'mode: {out.name}' in recorded_session(engine_mount.open(out / '20mm_friction' / 'recording'))
     assert found[core] == found[lockstep]
     for run in ('20mm_friction', '20mm_hydromount', '20mm_friction_0A'):
         assert _setpoints(core / run) == _setpoints(lockstep / run)

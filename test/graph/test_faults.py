@@ -1,4 +1,4 @@
-"""A representative third of the fault matrix, in real time through the real graph.
+"""A representative third of the fault matrix, in real time through the real graph; six of it in `make test`.
 
 Times are those of the machine and are told, not asserted: what is asserted is what the graph does.
 """
@@ -16,17 +16,33 @@ from mount_replay.faults.fault import SAFE, Reaction
 from mount_replay.faults.matrix import MATRIX
 from mount_ros.testing import free_domain
 
-THIRD = [case for case in MATRIX.values() if case.third]
+QUICK = (
+    'can_silent',
+    'displacement_sensor',
+    'coil_open',
+    'second_setpoint',
+    'kill_control',
+    'hang_control_composed',
+)
+CASES = [
+    pytest.param(case, id=case.name, marks=() if case.name in QUICK else pytest.mark.slow)
+    for case in MATRIX.values()
+    if case.third
+]
 LIMIT = 1200.0  # s: it takes four minutes where nothing else runs; only a hang takes so long
 
 pytestmark = pytest.mark.real_time
 
 
 @pytest.fixture(scope='session')
-def outcomes(tmp_path_factory):
-    """The outcomes of the command, {fault: figures}."""
+def outcomes(request, tmp_path_factory):
+    """The outcomes of the command for the faults whose tests are passed, {fault: figures}."""
     faulthandler.cancel_dump_traceback_later()  # the limit of a test that hangs; here LIMIT is
-    found = outcomes_of(tmp_path_factory.mktemp('faults'), '--third')
+    tests = [
+        each for each in request.session.items if each.originalname == test_a_fault_ends_as_required.__name__
+    ]
+    cases = ','.join(test.callspec.params['case'].name for test in tests)
+    found = outcomes_of(tmp_path_factory.mktemp('faults'), '--only', cases)
     if os.environ.get('CI'):  # where nothing is skipped for a machine that is late, it has three more trials
         for number in range(3):
             if wrong := [name for name, outcome in found.items() if outcome['complaints']]:
@@ -56,7 +72,7 @@ def outcomes_of(folder, *chosen):
     return found
 
 
-@pytest.mark.parametrize('case', THIRD, ids=lambda case: case.name)
+@pytest.mark.parametrize('case', CASES)
 def test_a_fault_ends_as_required(case, outcomes, skip_if_late):
     outcome = outcomes[case.name]
     if outcome['complaints']:

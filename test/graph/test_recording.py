@@ -13,8 +13,8 @@ from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 from typer.testing import CliRunner
 
-import mount_bags
-from mount_bags.events.event_marks import read_marks
+import engine_mount
+from engine_mount.recordings.events.event_marks import read_marks
 from mount_cli.command import app
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.qos import publisher_qos
@@ -86,7 +86,7 @@ def test_record_holds_all_that_was_published_in_several_files_with_the_mark(doma
     folder = command.folder / 'bag'
     assert str(folder) in output
     assert len(list(folder.glob('*.mcap'))) > 1
-    recording = mount_bags.open(folder)
+    recording = engine_mount.open(folder)
     assert recording.warnings == []
     for name in ('displacement', 'current_setpoint'):
         assert recording[name].stamps.tolist() == [BEGIN + index * PERIOD for index in range(COUNT)]
@@ -119,7 +119,7 @@ def test_a_key_press_marks_and_sets_a_snapshot_off(domain_source, command):
     os.close(keys)
     os.close(terminal)
     assert code == 0, output
-    recording = mount_bags.open(command.folder / 'bag')
+    recording = engine_mount.open(command.folder / 'bag')
     assert len(recording['displacement']) == 10
     assert [mark.kind for mark in read_marks(recording['event'])] == ['mark']
 

@@ -103,6 +103,7 @@ def test_a_folder_in_use_is_refused(capsys, tmp_path):
     _expect_refusal(capsys, ('--out', str(tmp_path)), 'exists and is not empty', '--out')
 
 
+@pytest.mark.slow
 def test_a_can_interface_that_does_not_open_is_refused(command):
     # one process in lock-step, five in real time: the node, its refusal and who tells it are the same
     result = command.drive('--lockstep', '--duration', '1', '--set', 'mount_driver.interface=socketcan')

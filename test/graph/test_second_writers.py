@@ -7,9 +7,9 @@ import threading
 
 import pytest
 
-import mount_bags
-from mount_bags.audit.audit import audit
-from mount_bags.audit.losses import losses
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
 from mount_ros.environment import prepare_environment
 from mount_ros.testing import wait_until
 
@@ -70,7 +70,7 @@ def test_a_second_node_ends_the_drive_at_0_ampere_with_its_name(command, bus_lis
     assert process.returncode == 1, said[0]
     assert sentence in said[0]
     assert bus_listener[-1].current == 0.0
-    recording = mount_bags.open(out / 'recording')
+    recording = engine_mount.open(out / 'recording')
     told = losses(recording, audit(recording))
     assert not told.sound
     assert any(sentence in fault.sentence for fault in told.faults)

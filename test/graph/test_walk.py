@@ -77,6 +77,7 @@ def operator(domain):
         made.close()
 
 
+@pytest.mark.slow
 @pytest.mark.real_time
 def test_every_node_can_be_taken_down_and_up_and_the_mount_initialised_anew(command, operator, bus_listener):
     process, out = command.start_drive(

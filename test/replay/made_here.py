@@ -16,9 +16,9 @@ from numba.core.registry import cpu_target
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 from threadpoolctl import threadpool_info
 
-from mount_bags.run.session import session_text
 from mount_models.damper import DAMPERS, damper_curve
 from mount_models.quantity import with_flattened
+from mount_recorder.session import session_text
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, ReplayOrder, replay
 from mount_sim.excitation.scenario import build_excitation

@@ -9,8 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
-import mount_bags
-from mount_bags.compare.reference import differences_from_reference
+import engine_mount
+from engine_mount.recordings.compare.reference import differences_from_reference
 from mount_cli.command import app
 
 DRIVE = (
@@ -73,7 +73,7 @@ def test_what_a_tolerance_allows_is_equal(run):
 
 
 def test_recordings_without_common_topics_end_with_code_2(run, tmp_path):
-    from mount_bags.bag.writer import BagWriter
+    from mount_recorder.bag_writer import BagWriter
 
     writer = BagWriter(tmp_path / 'other')
     writer.add_topic('/other', 'std_msgs/msg/String')
@@ -95,6 +95,7 @@ def test_what_cannot_be_compared_is_not_called_different(run, tmp_path):
     assert 'nope' in command('compare', run(), tmp_path / 'nope').output
 
 
+@pytest.mark.slow
 def test_of_two_mounts_in_one_recording_both_are_compared_and_drawn_by_their_names(
     run, tmp_path, monkeypatch
 ):
@@ -121,7 +122,7 @@ def test_of_two_mounts_in_one_recording_both_are_compared_and_drawn_by_their_nam
     assert upper.get_ylabel() == 'mount_right/current_setpoint\ncoil_current (A)'
     shown = {line.get_label(): line.get_ydata() for line in upper.lines}
     for name, recording in zip('AB', both, strict=True):
-        recorded = mount_bags.open(recording)['mount_right/current_setpoint']['coil_current']
+        recorded = engine_mount.open(recording)['mount_right/current_setpoint']['coil_current']
         assert np.array_equal(shown[name], recorded)
     assert command('compare', both[0], both[0], '--figure', files[1]).exit_code == 0
     labels = {axes.get_ylabel().split('\n')[0] for axes in drawn[1].axes} - {'B - A', ''}

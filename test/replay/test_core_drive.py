@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.messages.series import Series
+from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.messages.series import Series
 from mount_bringup.chosen import policy_of
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-import mount_bags
-from mount_bags.bag.writer import BagWriter
+import engine_mount
 from mount_cli.command import app
+from mount_recorder.bag_writer import BagWriter
 from mount_replay.drive import drive as driving
 from mount_ros.messages.cdr import serialised
 
@@ -46,7 +46,7 @@ def command(*arguments: str | Path):
 
 def spoiled(folder: Path) -> None:
     """Take samples and answers out of a recording, and add marks of faults."""
-    whole = mount_bags.open(folder)
+    whole = engine_mount.open(folder)
     series = {name: whole[name] for name in whole}
     first = int(whole['displacement'].receive_times[0])
     whole_messages = {

@@ -18,6 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'mount_signals' / 'te
 
 from served_stores import Bucket, know_host, name_s3_store, s3_server, sftp_store
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = {'continuous_viscous.full_amplitude': 0.0006}
 RECORDINGS = 12
 OF_THE_PLACE = ('uri', 'fingerprint')

@@ -30,6 +30,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'mount_signals' / 'te
 
 from served_stores import BreakingWay, Bucket, name_s3_store, s3_server
 
+pytestmark = pytest.mark.slow
+
 REFERENCES = Path(__file__).parents[2] / 'bags' / 'reference'
 CHANGES = parsed_changes({'highest_current': 0.7})
 NAMES = [f'{number}_{name}' for number in range(3) for name in ('gap', 'opening', 'rough')]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 
-from mount_bags import BagWriter
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
+from mount_recorder.bag_writer import BagWriter
 from mount_replay.given.foreign import default_gap, foreign_input, foreign_order
 from mount_ros.messages.cdr import serialised
 from mount_signals.units.unit import UnitError

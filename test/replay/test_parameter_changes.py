@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from std_msgs.msg import String
 
-from mount_bags.run.session import session_text
 from mount_bringup.chosen import chosen_control
 from mount_control.controller import ControlLaw
+from mount_recorder.session import session_text
 from mount_replay.loop import recording as core_recording
 from mount_replay.loop import run as core_run
 from mount_replay.loop.chain import CoreChain

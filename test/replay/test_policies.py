@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mount_bags
-from mount_bags.compare.compare import compare
-from mount_bags.run.screen import Screen
-from mount_bags.run.session import recorded_session, session_content, session_parameters, session_text
+import engine_mount
+from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
 from mount_bringup.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES
 from mount_models.quantity import ParameterError
+from mount_recorder.session import session_text
 from mount_replay.drive.drive import DriveOrder, record_drive
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, parsed_changes, replay_without_output
@@ -58,7 +59,7 @@ def drives(tmp_path_factory):
 
 
 def test_a_recording_names_the_policy_and_what_it_traced(drives):
-    recording = mount_bags.open(drives['viscous_example'])
+    recording = engine_mount.open(drives['viscous_example'])
     trace = recording['control_trace']
     assert trace.names[:4] == ('displacement', 'velocity', 'predicted_velocity', 'damping_active')
     np.testing.assert_array_equal(trace['desired_force'], 800.0 * trace['predicted_velocity'])
@@ -75,7 +76,7 @@ def test_each_is_replayed_to_the_bit(drives, policy, mode):
 
 @pytest.mark.parametrize(('policy', 'levels'), [('switched_viscous', 2), ('viscous_example', 0)])
 def test_a_report_reads_a_drive_of_any_policy(drives, policy, levels):
-    recording = mount_bags.open(drives[policy])
+    recording = engine_mount.open(drives[policy])
     drive, facts = load_drive(recording), run_facts(Signals(recording))
     assert len(facts.levels.displacement) == levels
     assert np.isfinite(drive.seen.band_displacement).any() == (policy == 'switched_viscous')
@@ -85,13 +86,13 @@ def test_a_report_reads_a_drive_of_any_policy(drives, policy, levels):
 
 
 def test_openings_are_compared_as_a_switch_and_as_a_signal(drives, tmp_path):
-    continuous = mount_bags.open(drives['continuous_viscous'])
+    continuous = engine_mount.open(drives['continuous_viscous'])
     slower = {'mount_sim': SIM, 'mount_control': {**CONTINUOUS, 'continuous_viscous.opening_time': 0.05}}
     record_core(tmp_path / 'slower', slower, session_text({'parameters': slower}))
-    found = compare(continuous, mount_bags.open(tmp_path / 'slower'))
+    found = compare(continuous, engine_mount.open(tmp_path / 'slower'))
     assert 'damping_active' in [signal.signal for signal in found.differing]
     assert [change.on for change in found.switching] == [True]
-    paper = mount_bags.open(drives['switched_viscous'])
+    paper = engine_mount.open(drives['switched_viscous'])
     assert 'damping_active' not in [signal.signal for signal in compare(paper, paper).signals]
 
 
@@ -101,7 +102,7 @@ def test_a_session_without_a_policy_is_of_the_first_and_a_drive_names_its_own(tm
     assert replay_without_output(ReplayOrder(tmp_path / 'old', CORE)).agreement.equal
     order = DriveOrder('bench', 'core', {'mount_sim': SIM}, out=tmp_path / 'new')
     folder, _, _ = record_drive(order, Screen(io.StringIO()))
-    assert 'policy: continuous_viscous' in mount_bags.open(folder.recording).latched('session').data
+    assert 'policy: continuous_viscous' in engine_mount.open(folder.recording).latched('session').data
     outcome = replay_without_output(ReplayOrder(folder.recording, CORE))
     assert outcome.agreement.equal
     assert 'amplitude' in outcome.replayed.runs[0].traces.dtype.names

@@ -4,9 +4,9 @@ import io
 
 import pytest
 
-from mount_bags.run.screen import Screen
-from mount_bags.run.session import session_text
-from mount_bags.run.versions import versions
+from engine_mount.recordings.run.screen import Screen
+from mount_recorder.session import session_text
+from mount_recorder.versions import versions
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 from mount_replay.summary import print_replay, replay_figures

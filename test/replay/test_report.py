@@ -13,12 +13,12 @@ import pytest
 from std_msgs.msg import String
 from typer.testing import CliRunner, Result
 
-import mount_bags
-from mount_bags.bag.writer import BagWriter
-from mount_bags.container import scratch
-from mount_bags.events.recorded_events import event_time, recorded_events
-from mount_bags.messages import columns
+import engine_mount
+from engine_mount.recordings.container import scratch
+from engine_mount.recordings.events.recorded_events import event_time, recorded_events
+from engine_mount.recordings.messages import columns
 from mount_cli.command import app
+from mount_recorder.bag_writer import BagWriter
 from mount_report import report
 from mount_report.pages import default_pictures
 from mount_report.sections import overview as overview_section
@@ -360,7 +360,7 @@ def test_links_keys_mouse_and_touch_move_a_chart_and_one_line_reads_all_of_them(
 
 def test_a_moment_has_the_same_time_in_a_report_and_among_the_events(bench, tmp_path):
     """However long before the first sample the session came, and whenever the moment was received."""
-    drive = mount_bags.open(bench / 'recording')
+    drive = engine_mount.open(bench / 'recording')
     writer = BagWriter(tmp_path / 'late')
     writer.add_topic('/event', 'std_msgs/msg/String')
     for name in ('session', 'displacement', 'control_trace'):
@@ -372,7 +372,7 @@ def test_a_moment_has_the_same_time_in_a_report_and_among_the_events(bench, tmp_
     stamp = int(drive['displacement'].stamps[3000])
     writer.write('/event', serialised(String(data=f'{{time: {stamp}, kind: bump}}')), stamp + 9_000_000)
     writer.close()
-    late = mount_bags.open(tmp_path / 'late')
+    late = engine_mount.open(tmp_path / 'late')
     events = [(event.kind, event_time(event, late.time_axis)) for event in recorded_events(late)]
     begins = [time for kind, time in events if kind == 'switch_on']
     assert begins

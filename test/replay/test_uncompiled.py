@@ -5,7 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from mount_bags.compare.reference import differences_from_reference
+import pytest
+
+from engine_mount.recordings.compare.reference import differences_from_reference
+
+pytestmark = pytest.mark.slow
 
 REFERENCES = sorted(
     folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.edit.cut import cut
-from mount_bags.run.session import recorded_session, session_content, session_parameters
+from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.edit.cut import cut
+from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
 from mount_cli.command import app
 from mount_report.drive.undamped import UndampedError, undamped_of
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-import mount_bags
-from mount_bags.compare.accept import accept
-from mount_bags.run.session import session_text
+import engine_mount
+from engine_mount.recordings.compare.accept import accept
+from mount_recorder.session import session_text
 from mount_replay.given.ramps import measured_gaps
 from mount_replay.loop.recording import record_core
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
@@ -35,16 +35,16 @@ def test_the_replayed_initialisation_finds_the_recorded_gaps_to_the_bit(warm_dri
     outcome = replay(ReplayOrder(warm_drive, mode, out=tmp_path / 'replay', domain=domain))
     assert outcome.held
     (ramp,) = outcome.replayed.ramps
-    (recorded,) = measured_gaps(mount_bags.open(warm_drive))
+    (recorded,) = measured_gaps(engine_mount.open(warm_drive))
     assert ramp.gap.numbers == recorded.numbers
     assert abs(ramp.gap.numbers['rest_gap'] - 508e-6) < 5e-6  # without compensation some 40 um less
-    kept = mount_bags.open(outcome.folder.recording)['coil_temperature']
-    assert kept.stamps.tolist() == mount_bags.open(warm_drive)['coil_temperature'].stamps.tolist()
+    kept = engine_mount.open(outcome.folder.recording)['coil_temperature']
+    assert kept.stamps.tolist() == engine_mount.open(warm_drive)['coil_temperature'].stamps.tolist()
     assert set(kept['temperature']) == {55.0}
 
 
 def test_a_reference_keeps_the_temperatures_of_its_initialisation(warm_drive, tmp_path):
-    accepted = accept(mount_bags.open(warm_drive), 'warm', 'a warm coil', tmp_path)
-    stamps = mount_bags.open(accepted.folder)['coil_temperature'].stamps
+    accepted = accept(engine_mount.open(warm_drive), 'warm', 'a warm coil', tmp_path)
+    stamps = engine_mount.open(accepted.folder)['coil_temperature'].stamps
     assert stamps.tolist() == [100_000_000 * k for k in range(28)]
     assert replay(ReplayOrder(accepted.folder, CORE, out=tmp_path / 'replay')).held

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
-from mount_bags.recorder.parameters import RecorderParameters
 from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
@@ -15,6 +14,7 @@ from mount_models.damper import damper_text
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, check_name, flattened
 from mount_models.specimen_choice import SpecimenChoice
+from mount_recorder.parameters import RecorderParameters
 from mount_sim.parameters import NodeParameters, SimParameters
 from mount_sim.plant.places import general_name
 

@@ -8,7 +8,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mount_bags.run.session import SessionError, session_content, session_sample_rate
+from engine_mount.recordings.run.session import SessionError, session_content, session_sample_rate
 from mount_bringup.mounts import settings_of_mounts
 from mount_bringup.parameter_file import settings_in
 from mount_bringup.settings import checked_settings, defaults_of_nodes, settings_of_options

@@ -6,11 +6,11 @@ import signal
 
 import pytest
 
-import mount_bags
-from mount_bags.run.folder import recordings_of
+import engine_mount
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import RECORDER, GraphSettings
 from mount_bringup.graph.supervisor import Supervisor
+from mount_recorder.folders import recordings_of
 
 LIMIT = 60.0  # s: only a hang takes so long
 
@@ -53,8 +53,8 @@ def test_a_killed_recorder_begins_a_new_recording_and_the_old_one_stays_readable
     assert 'started again with a new recording' in restart.sentence
     first, second = recordings_of(tmp_path / 'recording')
     assert second.name == 'recording_restarted_2'
-    assert len(mount_bags.open(first)['session']) == 1
-    whole = mount_bags.open(second)
+    assert len(engine_mount.open(first)['session']) == 1
+    whole = engine_mount.open(second)
     assert whole.warnings == []
     assert len(whole['session']) == 1  # latched by the supervisor, so the new recording tells what it is
 
@@ -68,6 +68,7 @@ def test_a_recorder_that_stands_still_counts_as_dead_after_the_limit(tmp_path, d
         assert f'{told}: look for' in graph.restarts[0].sentence
 
 
+@pytest.mark.slow
 def test_one_that_stands_still_for_less_goes_on(tmp_path, domain):
     with recording_graph(tmp_path, domain) as graph:
         process = pid_of(graph)
@@ -79,6 +80,7 @@ def test_one_that_stands_still_for_less_goes_on(tmp_path, domain):
         assert graph.restarts == []
 
 
+@pytest.mark.slow
 def test_a_recorder_that_dies_too_often_ends_the_graph(tmp_path, domain):
     with recording_graph(tmp_path, domain, limit=1) as graph:
         lose(graph, signal.SIGKILL)
@@ -86,6 +88,7 @@ def test_a_recorder_that_dies_too_often_ends_the_graph(tmp_path, domain):
             lose(graph, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_in_lock_step_the_first_loss_ends_the_graph(tmp_path, domain):
     with recording_graph(tmp_path, domain, lockstep=True) as graph:
         os.kill(pid_of(graph), signal.SIGKILL)

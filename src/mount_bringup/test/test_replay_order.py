@@ -13,14 +13,14 @@ import pytest
 import yaml
 
 import mount_models
-from mount_bags.bag.writer import BagWriter
-from mount_bags.run.session import session_message, session_text
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS
 from mount_bringup.graph.launched import arguments_of
 from mount_bringup.graph.player import PLAYED, Player, offers_text, play_command
 from mount_bringup.graph.replay_order import replay_order
 from mount_models.quantity import ParameterError
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.session import session_message, session_text
 from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import SESSION
 

@@ -19,7 +19,7 @@ from rich.progress import (
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from mount_bags.run.screen import Bar, Line, Screen, Table
+from engine_mount.recordings.run.screen import Bar, Line, Screen, Table
 from mount_cli.terminal import note
 
 _PLAIN_PERIOD = 10.0  # s, chosen

@@ -43,6 +43,7 @@ def test_an_unknown_group_is_refused_with_the_known_ones():
         bench.print_bench(bench.BenchOrder(only=('graphs',)), None)
 
 
+@pytest.mark.slow
 def test_the_stages_of_a_replayed_second_stand_beside_all_of_it(monkeypatch):
     monkeypatch.setattr(fleet, '_RECORDINGS', 1)
     monkeypatch.setattr(fleet_workers, '_REPEATED', 6)

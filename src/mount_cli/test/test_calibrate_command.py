@@ -9,9 +9,9 @@ import yaml
 
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
-from mount_models.actuator.reluctance import force
 from mount_models.coil.gap import evaluate
 from mount_models.specimen import load_specimen
+from mount_sim.plant.reluctance import force
 from mount_sim.rack.coil import drawn_rack, measure_force, record_ripple, write_columns
 
 RACK = drawn_rack(5)
@@ -80,6 +80,7 @@ def calibrated(files, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_specimen_meets_the_actuator_it_was_measured_on(calibrated):
     specimen = load_specimen(calibrated / 'left.yaml', 'left')
     assert specimen.bridge.link_voltage == 13.5  # as told

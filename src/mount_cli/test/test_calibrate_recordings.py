@@ -10,23 +10,23 @@ import yaml
 from geometry_msgs.msg import WrenchStamped
 from std_msgs.msg import String
 
-from mount_bags.bag.writer import BagWriter
 from mount_cli.command import main
 from mount_identification.rack.columns import RackRecordingError
 from mount_identification.rack.force_points import read_force
 from mount_identification.rack.given import GivenValues
 from mount_identification.rack.ripple_recordings import read_ripple
 from mount_models.actuator.law import checked_force
-from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
+from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.messages.temperature import temperature_layout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
 from mount_signals.units.mapping import ColumnChoice
 from mount_sim.electronics.electronics import status_every
+from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.rack.coil import drawn_rack, record_ripple
 
 RACK = drawn_rack(5)

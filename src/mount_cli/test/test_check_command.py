@@ -58,6 +58,7 @@ def failed(figures):
     }
 
 
+@pytest.mark.slow
 def test_the_default_controller_passes_with_the_same_bytes_whatever_the_jobs(check, tmp_path):
     one, figures = check('one', '--jobs', '1')
     assert one.exit_code == 0, one.output
@@ -72,6 +73,7 @@ def test_the_default_controller_passes_with_the_same_bytes_whatever_the_jobs(che
     assert gap['latency_p99_us'] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('options', 'caught'),
     [

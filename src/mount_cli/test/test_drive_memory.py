@@ -5,7 +5,7 @@ import tracemalloc
 import pytest
 from typer.testing import CliRunner
 
-from mount_bags.bag.recording import Recording
+from engine_mount.recordings.bag.recording import Recording
 from mount_cli.command import app
 from mount_replay.drive.preflight import preflight
 from mount_replay.loop.recording import record_core

@@ -7,8 +7,8 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-import mount_bags
-from mount_bags.audit.audit import audit
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
 from mount_cli.command import app
 from mount_experiments import page
 from mount_experiments.field_penetration import experiment as field_penetration
@@ -150,7 +150,7 @@ def test_sliding_pads_are_told(tmp_path):
 def test_the_saw_tooth_is_recorded_in_the_topics_of_a_drive_and_nothing_is_lost(tmp_path):
     outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH)
     check(outcome)
-    recording = mount_bags.open(outcome.recordings[0])
+    recording = engine_mount.open(outcome.recordings[0])
     assert set(recording.topics) == {'/session', '/displacement', '/sim/mount_force', '/sim/clamp_force'}
     lost = {name: topic.lost for name, topic in audit(recording).items() if name != '/session'}
     assert set(lost.values()) == {0}
@@ -197,7 +197,7 @@ def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
     assert any(low <= 0.9 <= high for low, high in figures['ambiguous_currents_a'])
     assert any(low <= 0.2 <= high for low, high in figures['unique_currents_a'])
     (folder,) = outcome.recordings
-    assert {'/coil_ripple', '/air_gap', '/session'} <= set(mount_bags.open(folder).topics)
+    assert {'/coil_ripple', '/air_gap', '/session'} <= set(engine_mount.open(folder).topics)
     _check_that_calibration_reads_the_ramp(folder, figures['ramp_inductance_at_rest_h'])
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mount_bags.bag.recording import open_recording
+from engine_mount.recordings.bag.recording import open_recording
 from mount_experiments import page
 from mount_experiments.bench import experiment as bench
 from mount_experiments.harness.contract import Experiment, ExperimentError, Holds, Order, Outcome

@@ -9,11 +9,11 @@ from mount_experiments.harness.contract import Order
 from mount_experiments.policy import experiment as policy
 from mount_experiments.policy import learnable, limits, runs
 from mount_experiments.policy.cases import CONTINUOUS, POLICIES
-from mount_models.road import RandomRoad, random_road
 from mount_models.sampling import SAMPLE_TIME
-from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
 from mount_signals.roads.inversion import road_of
+from mount_sim.excitation.road import RandomRoad, random_road
 from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 SHORT = {
     'road_levels': '0.06,',
@@ -32,6 +32,7 @@ def compared(tmp_path_factory):
     return policy.EXPERIMENT.run(Order(folder, {policy.NAME: SHORT}), lambda share, what: None)
 
 
+@pytest.mark.slow
 def test_figures_are_plain_and_hold_what_is_promised(compared):
     figures = json.loads(json.dumps(compared.figures, allow_nan=False))
     for key in ('sweep_ratio', 'gap_peak_ratio', 'thd', 'energy_j_per_km'):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_cli.command import app
 from mount_experiments import page
 from mount_experiments.harness.contract import ExperimentError, Holds, Order

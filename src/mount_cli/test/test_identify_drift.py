@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
 
-from mount_bags.bag.writer import BagWriter
 from mount_cli.command import main
 from mount_identification.drift.law import DriftError, fitted_drift
+from mount_recorder.bag_writer import BagWriter
 from mount_replay.loop.run import run_core
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message

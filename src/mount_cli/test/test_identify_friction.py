@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.run.place import recording_hash
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.run.place import recording_hash
+from engine_mount.recordings.signals.signal import SignalError
 from mount_bringup.chosen import chosen_control
 from mount_cli.command import main
 from mount_cli.commands.identify_arguments import with_repeated_options
@@ -69,6 +69,7 @@ def test_several_paths_after_one_option_become_repeated_options():
     assert with_repeated_options(['--train=a', 'b']) == ['--train=a', 'b']
 
 
+@pytest.mark.slow
 def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
     # a search from fewer starts on fewer samples: which law is best here is no close race
     for name, value in (('SEARCH_SAMPLES', 400), ('FINAL_SAMPLES', 1500), ('STARTS', 2), ('DRAWS', 4)):

@@ -7,14 +7,14 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-import mount_bags
-from mount_bags.audit.audit import audit
-from mount_bags.audit.losses import losses
-from mount_bags.audit.report import sentences
-from mount_bags.bag.statement import Reception
-from mount_bags.bag.writer import BagWriter
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit.report import sentences
 from mount_cli.command import app
 from mount_cli.commands.record import _told
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.statement import Reception
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT, TOPICS
 
@@ -46,12 +46,12 @@ def verdict(recording):
 
 
 def test_an_empty_recording_is_not_said_to_be_complete(tmp_path):
-    recording = mount_bags.open(recorded(tmp_path / 'bag', {}))
+    recording = engine_mount.open(recorded(tmp_path / 'bag', {}))
     assert verdict(recording).startswith('The recording is empty')
 
 
 def test_topics_without_a_message_are_not_counted_as_complete(tmp_path):
-    recording = mount_bags.open(recorded(tmp_path / 'bag', {DISPLACEMENT: displacements(5)}))
+    recording = engine_mount.open(recorded(tmp_path / 'bag', {DISPLACEMENT: displacements(5)}))
     assert 'Nothing is known to be lost: 1 topics are complete' in verdict(recording)
 
 
@@ -92,5 +92,5 @@ def test_recover_takes_the_folder_of_a_run_its_recording_or_a_file(run, place):
     assert result.exit_code == 0, result.output
     (made,) = run.rglob('*_recovered')
     assert made.parent == (run / place if place == '' else (run / place).parent)
-    assert mount_bags.open(made).message_count == 5
+    assert engine_mount.open(made).message_count == 5
     shutil.rmtree(made)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import yaml
 
-from mount_bags.bag.recording import open_recording
-from mount_bags.run.place import recording_hash
-from mount_bags.run.session import recorded_session
+from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.run.place import recording_hash
+from engine_mount.recordings.run.session import recorded_session
 from mount_cli.command import main
 from mount_control.policy.registry import POLICIES
-from mount_models.road import RandomRoad, random_road
+from mount_sim.excitation.road import RandomRoad, random_road
 
 STONE = 0.16  # m
 SPEEDS = ('30', '60', '120')
@@ -57,6 +57,7 @@ def truth(folder, name):
     return np.asarray(open_recording(folder / 'recording')['/sim/truth'][name])
 
 
+@pytest.mark.slow
 def test_belgian_blocks_are_driven_at_three_speeds_by_each_policy_and_the_hydromount(blocks, tmp_path):
     figures = tmp_path / 'figures.json'
     own = (f'measured_road.road={blocks}', 'measured_road.speeds=30,60,120', 'measured_road.workers=1')

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import mount_cli
-from mount_bags.run.screen import Table
+from engine_mount.recordings.run.screen import Table
 from mount_cli.command import app, main
 from mount_cli.screen import TerminalScreen
 from mount_cli.terminal import refuse, terminal
@@ -62,7 +62,7 @@ def test_only_one_file_decides_how_text_is_printed():
     ways = ('Console(', ' Progress(', 'from_markup', '[yellow]', '[red]', '[bold]', ' rprint')
     found = {
         f'{file.relative_to(SOURCES)}: {way}'
-        for file in SOURCES.glob('*/mount_*/**/*.py')
+        for file in SOURCES.glob('*/*mount*/**/*.py')
         for way in ways
         if way in file.read_text(encoding='utf-8')
     }

@@ -16,13 +16,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mount_bags.bag.recording import open_recording
+from engine_mount.recordings.bag.recording import open_recording
 from mount_bringup.chosen import chosen_control, policy_of
 from mount_cli.command import main
 from mount_models.actuator.law import checked_force
-from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import evaluate
-from mount_models.coil.ripple import current_rate, flux_rate
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import flattened
@@ -30,8 +28,12 @@ from mount_models.specimen import DEFAULT_SPECIMEN, load_specimen
 from mount_replay.loop.recording import record_core
 from mount_report.drive.evaluation import tracking_error
 from mount_report.drive.signals import load_drive
+from mount_sim.plant.reluctance import force as magnetic_force
+from mount_sim.plant.ripple import current_rate, flux_rate
 from mount_sim.rack.coil import drawn_rack
 from mount_sim.rack.friction import drawn_friction
+
+pytestmark = pytest.mark.slow
 
 MAKEFILE = Path(__file__).resolve().parents[3] / 'Makefile'
 SEED = (

@@ -128,14 +128,14 @@ class ControlLoop:
         self._changes.append((ControlLaw(settings, self._table), text))
         self._horizon = 0
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
-        """Answer with 0 A: until the next activation for a `foreign` writer, and while there is a `doubt`.
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
+        """Answer with 0 A: until the next activation for a `confirmed` one, and while one is `suspected`.
 
         The first name stays. May come from another thread.
         """
-        if foreign and (self.nameless or not self.foreign):
-            self.foreign, self.nameless = foreign, False
-        self.writer_doubt = doubt
+        if confirmed and (self.nameless or not self.foreign):
+            self.foreign, self.nameless = confirmed, False
+        self.writer_doubt = suspected
         self._horizon = 0
 
     def step(self, stamp: int, displacement: float) -> float | None:

@@ -7,8 +7,7 @@ from typing import Any
 
 from mount_control.control_loop import ControlLoop, SampleCounts
 from mount_control.plausibility import HOLD
-from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 
 FAULT_SENTENCE = (
     'controller state became NaN or infinite: output 0 A, state reset; set friction.* and contact.* of '

@@ -34,14 +34,12 @@ from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import change_text, dated
 from mount_ros.messages.force_table import ForceTableMessageError, from_bytes
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
-from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
-from mount_ros.nodes.parameter_gate import Change
-from mount_ros.nodes.parameters import SpecimenValues, declare
+from mount_ros.nodes.parameters import Change, SpecimenValues, declare
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.sliding_window import SlidingWindow
+from mount_ros.publishers import UnnamedPublisher
 from mount_ros.timing import LatencyHistogram
-from mount_ros.writers import NamelessWriter
 
 _MEASURED_BEFORE = (
     'measured_before',
@@ -71,7 +69,7 @@ class MountControl(SafeLifecycleNode):
         self.loop = ControlLoop()
         self._activation = Activation()
         self._foreign = False  # whether another node publishes what this one subscribes to
-        self._nameless = NamelessWriter()
+        self._nameless = UnnamedPublisher()
         self._waiting = b''  # the newest displacement message that came while nothing was answered
         self._last_setpoint = (0, OFF)  # stamp ns, A
         self._durations: deque[float] = deque(maxlen=_KEPT_DURATIONS)  # s, since the last verdict
@@ -106,7 +104,7 @@ class MountControl(SafeLifecycleNode):
         path.start()
 
     def activate(self) -> None:
-        self.wait_for_own_writers()
+        self.wait_for_sole_publishers()
         table, air_gap = self._activation.wait(self.loop, self.ending)
         check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
@@ -116,7 +114,7 @@ class MountControl(SafeLifecycleNode):
         with self._order:
             waiting, self._waiting = self._waiting, b''
             self.loop.begin(self._settings, currents, air_gap.stamp)
-        self.tell_writers()
+        self.report_publisher_conflict()
         self.get_logger().info(
             f'takes the table of {air_gap.stamp * 1e-9:.3f} s: up to {max(table.normal_force):.0f} N, offset '
             f'current {air_gap.offset_current:.3f} A; policy {self._settings.parameters.policy}'
@@ -135,17 +133,17 @@ class MountControl(SafeLifecycleNode):
     def cleanup(self) -> None:
         self.loop, self._activation, self._waiting = ControlLoop(), Activation(), b''
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
-        self._foreign = bool(foreign)
-        if foreign:
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
+        self._foreign = bool(confirmed)
+        if confirmed:
             self._activation = Activation()  # the table may be another node's
-        self.loop.heed_writers(foreign, doubt)
+        self.loop.on_publisher_conflict(confirmed, suspected)
 
     def check_parameters(self, values: Mapping[str, Any]) -> None:
         control_settings(values, self._specimen)
         check_policies(values)  # what has no effect now stands in event and session all the same
 
-    def take_changes(self, changes: Mapping[str, Change]) -> None:
+    def apply_changes(self, changes: Mapping[str, Change]) -> None:
         self._settings = control_settings(self._values(), self._specimen)
         self._parameter_changes += len(changes)
         self._warn_without_effect(changes)

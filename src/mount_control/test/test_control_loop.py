@@ -313,10 +313,10 @@ def test_a_sender_noticed_by_its_stamps_is_told_by_its_name_as_soon_as_discovery
 ):
     judged(loop, 401, 401, 402, 402, 403, 403)
     assert loop.nameless
-    loop.heed_writers('', '')
+    loop.on_publisher_conflict('', '')
     assert loop.foreign.startswith('3 displacement samples within 1 s were repeated')
     for name in ('/evil', '/worse'):
-        loop.heed_writers(f'{name} must not publish', '')
+        loop.on_publisher_conflict(f'{name} must not publish', '')
         assert (loop.foreign, loop.nameless) == ('/evil must not publish', False)
     chosen = make_settings()
     loop.begin(chosen, chosen.table(*table_rows), START)
@@ -333,10 +333,10 @@ def test_repeated_samples_now_and_then_are_no_second_sender(loop):
 
 def test_another_writer_is_heeded_from_the_next_usual_sample_on(loop):
     assert judged(loop, 401, 402) == [(Judgement.USE, 0)] * 2
-    loop.heed_writers('', 'mount_driver_io is there twice')
+    loop.on_publisher_conflict('', 'mount_driver_io is there twice')
     assert judged(loop, 403, 404) == [(Judgement.FOREIGN, 0)] * 2
-    loop.heed_writers('', '')
+    loop.on_publisher_conflict('', '')
     assert judged(loop, 405, 406) == [(Judgement.USE, 2), (Judgement.USE, 0)]
-    loop.heed_writers('/evil must not publish', '')
-    loop.heed_writers('', '')
+    loop.on_publisher_conflict('/evil must not publish', '')
+    loop.on_publisher_conflict('', '')
     assert judged(loop, 407, 408) == [(Judgement.FOREIGN, 0)] * 2

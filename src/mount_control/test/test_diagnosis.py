@@ -7,8 +7,7 @@ import pytest
 
 from mount_control.control_loop import SampleCounts
 from mount_control.diagnosis import ControlFigures, counted_since, verdict
-from mount_ros.nodes.diagnostics import Level, Standing
-from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
 
 GOOD = ControlFigures(
     lately=SampleCounts(),
@@ -149,7 +148,7 @@ def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
 
 @pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged', 'messages_malformed'])
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
-    window, standing, told = SlidingWindow(SampleCounts()), Standing(), []
+    window, standing, told = SlidingWindow(SampleCounts()), ActiveFindings(), []
     for tenth in range(300):
         found = 100 * min(max(tenth - 49, 0), 5)
         counts = SampleCounts(samples=100 * tenth, **{count: found})

@@ -331,7 +331,7 @@ def test_another_node_that_publishes_what_control_hears_ends_the_damping_at_0_am
     assert control.trigger_activate() == FAILURE
     assert control.sentence.startswith('/elsewhere/evil and /surroundings_io must not publish')
     other.destroy_node()
-    wait_until(lambda: not control.data_path.writers.foreign, 'the end of the other')
+    wait_until(lambda: not control.data_path.publisher_watch.confirmed, 'the end of the other')
     assert control.trigger_activate() == FAILURE  # the table may have been the other's
     assert 'activate mount_init' in control.sentence
     around.initialise()

@@ -9,8 +9,7 @@ from mount_driver.parameters import DriverParameters
 from mount_driver.snapshot import Snapshot
 from mount_driver.watches.ripple_watch import RippleFigures
 from mount_models.sampling import HIGHEST_CURRENT, SETPOINT_TIMEOUT
-from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, SlidingWindow, Verdict, verdict_on
 
 _SECOND = 1.0  # s, chosen: what comes at 10 Hz and more has come within it, or does no more
 

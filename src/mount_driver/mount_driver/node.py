@@ -22,9 +22,9 @@ from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.real_time import Urgent
+from mount_ros.nodes.real_time import RealTimeThreads
+from mount_ros.publishers import UnnamedPublisher
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
-from mount_ros.writers import NamelessWriter
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
 
@@ -32,7 +32,7 @@ _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses
 class MountDriver(SafeLifecycleNode):
     """Publishes what the electronics measure, sends `current_setpoint`; away from active: 0 A."""
 
-    urgent = Urgent(frozenset({'data', 'can_receive', 'can_watch'}))
+    real_time_threads = RealTimeThreads(frozenset({'data', 'can_receive', 'can_watch'}))
 
     def __init__(self, **arguments):
         super().__init__('mount_driver', **arguments)
@@ -42,7 +42,7 @@ class MountDriver(SafeLifecycleNode):
         self._settings, self._law = DriverParameters(), RippleLaw()
         self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
-        self._watch, self._nameless = LinkWatch(), NamelessWriter()
+        self._watch, self._nameless = LinkWatch(), UnnamedPublisher()
         self._heat: HeatWatch | None = None
         self._started_ns = 0
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
@@ -69,7 +69,7 @@ class MountDriver(SafeLifecycleNode):
     def activate(self) -> None:
         assert self._codec is not None
         self.ending.wait(max(0.0, self._not_before - time.monotonic()))
-        self.wait_for_own_writers()
+        self.wait_for_sole_publishers()
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         period = sample_time_ns(self._settings.sample_rate)
@@ -90,15 +90,15 @@ class MountDriver(SafeLifecycleNode):
         attended = self.lockstep and self._settings.interface == 'virtual'
         exchange.start(threaded=not attended)
         self._exchange = exchange
-        self.tell_writers()
+        self.report_publisher_conflict()
         if attended:
-            self._path.attend(exchange.poll)
+            self._path.add_poll(exchange.poll)
 
     def deactivate(self) -> None:
         exchange, self._exchange = self._exchange, None
         if exchange is not None:
             try:
-                self._path.leave_work()
+                self._path.remove_polls()
             finally:
                 exchange.stop()
                 if exchange.link.fault:
@@ -107,11 +107,11 @@ class MountDriver(SafeLifecycleNode):
     def cleanup(self) -> None:
         self._codec = None
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
         exchange = self._exchange
         if exchange is not None:
-            exchange.guard.writer_doubt = doubt
-            exchange.switch_off(Fault(foreign, foreign_writer=True) if foreign else None)
+            exchange.guard.writer_doubt = suspected
+            exchange.switch_off(Fault(confirmed, foreign_writer=True) if confirmed else None)
 
     def judge(self) -> Verdict:
         exchange = self._exchange

@@ -9,8 +9,7 @@ from mount_driver.diagnosis import LinkWatch, Past, judge
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
 from mount_driver.snapshot import Snapshot
-from mount_ros.nodes.diagnostics import Level, Standing
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level
 
 PARAMETERS = DriverParameters(interface='socketcan', channel='can0')
 BEFORE = Snapshot(time=9.0, samples=9_000, setpoints=9_000, driving=True, status=Status(13.8, 40.0))
@@ -135,7 +134,7 @@ COUNTS = (
 
 @pytest.mark.parametrize('burst', COUNTS)
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(burst):
-    watch, standing, told = LinkWatch(), Standing(), []
+    watch, standing, told = LinkWatch(), ActiveFindings(), []
     for tenth in range(300):
         whole = {key: value for key, value in burst.items() if not isinstance(value, int)}
         grown = {

@@ -332,7 +332,7 @@ def test_a_sender_told_by_its_answers_is_told_by_its_name_before_the_graph_ends(
     wait_until(lambda: driver._exchange.link.nameless, 'the fault')
     verdict = driver.judge()
     assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, False)
-    driver.heed_writers('/evil must not publish current_setpoint too: end it', '')
+    driver.on_publisher_conflict('/evil must not publish current_setpoint too: end it', '')
     verdict = driver.judge()
     assert verdict.sentence.startswith('coil switched off: /evil must not publish current_setpoint too')
     assert verdict.figures['fatal']
@@ -393,7 +393,7 @@ def test_a_deactivation_that_goes_wrong_before_sends_0_ampere_all_the_same(activ
     def fail():
         raise RuntimeError('the data thread is gone')
 
-    monkeypatch.setattr(driver._path, 'leave_work', fail)
+    monkeypatch.setattr(driver._path, 'remove_polls', fail)
     assert driver.trigger_deactivate() == SUCCESS
     assert [far.setpoint() for _ in range(3)] == [Setpoint(0.0, 0xFFFF, False)] * 3
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from mount_bags.run.folder import RunFolderError, new_place
-from mount_bags.run.screen import Bar, Screen
+from engine_mount.recordings.run.folder import RunFolderError, new_place
+from engine_mount.recordings.run.screen import Bar, Screen
 from mount_bringup.settings import checked_settings, defaults_of_nodes, settings_of_options
 from mount_experiments.harness.contract import Experiment, ExperimentError, Order, Outcome, Progress
 from mount_models.quantity import with_flattened

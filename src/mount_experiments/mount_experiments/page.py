@@ -4,7 +4,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from mount_bags.run.screen import Screen, Table
+from engine_mount.recordings.run.screen import Screen, Table
 from mount_experiments.harness.contract import Experiment, Holds, Outcome
 
 _FIGURES = 'figures'

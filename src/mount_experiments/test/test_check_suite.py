@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.domain import DomainError
 from mount_bringup.graph.errors import GraphError, Interrupted
 from mount_experiments.check import session, trial

@@ -5,8 +5,8 @@ import pytest
 
 from mount_experiments.field_penetration.plate_field import equivalent_depth, flux_density_change
 from mount_experiments.field_penetration.plate_finite_elements import PlateSurroundings, plate_field
-from mount_models.actuator.reluctance import ReluctanceActuator, core_field, differential_permeability
-from mount_models.coil.ripple import (
+from mount_sim.plant.reluctance import ReluctanceActuator, core_field, differential_permeability
+from mount_sim.plant.ripple import (
     RippleCoil,
     diffusion_time,
     duty,

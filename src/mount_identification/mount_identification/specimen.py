@@ -175,7 +175,7 @@ def _origin(files: Sequence[Path]) -> dict[str, Any]:
 
 
 def _made_with() -> dict[str, Any]:
-    from mount_bags.run.versions import versions
+    from mount_recorder.versions import versions
 
     known = versions()
     return {

@@ -9,8 +9,8 @@ from mount_identification.actuator.fit import fit_force_law
 from mount_identification.specimen import with_force_law
 from mount_models.actuator.law import TABLE_1, ForceLaw, GapOutsideLaw, checked_force
 from mount_models.actuator.law_check import ForceLawRefusedError
-from mount_models.actuator.reluctance import ReluctanceActuator, force
 from mount_models.specimen import default_specimen
+from mount_sim.plant.reluctance import ReluctanceActuator, force
 
 GAPS = np.arange(280, 541, 20)[:, np.newaxis] * 1e-6
 CURRENTS = np.linspace(0.1, 3.0, 30)

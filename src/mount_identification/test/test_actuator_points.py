@@ -7,8 +7,8 @@ from mount_identification.actuator.fit import fit_force_law
 from mount_identification.actuator.points import gap_groups
 from mount_models.actuator.law import checked_force
 from mount_models.actuator.law_check import ForceLawRefusedError
-from mount_models.actuator.reluctance import ReluctanceActuator, force
 from mount_models.quantity import with_values
+from mount_sim.plant.reluctance import ReluctanceActuator, force
 
 GAPS = np.linspace(270e-6, 550e-6, 15)[:, np.newaxis]
 CURRENTS = np.linspace(0.1, 3.0, 59)

@@ -10,7 +10,6 @@ from scipy.optimize import brentq
 
 from mount_identification.coil.gap_calibration import calibrate_gap_curves
 from mount_identification.coil.gap_point import GapPoint
-from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.gap import (
     GapCurvesRefusedError,
     OutsideCurveError,
@@ -23,8 +22,9 @@ from mount_models.coil.gap import (
     measured_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.quantity import with_values
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
 MAGNET = ReluctanceActuator()
 COIL = RippleCoil()

@@ -14,10 +14,8 @@ from mount_identification.coil.temperature_fit import (
     stated_compensation,
 )
 from mount_identification.coil.unique_region import unique_region, warnings
-from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import GapCurvesRefusedError, OutsideCurveError, evaluate
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.coil.temperature import (
     CompensationError,
     check_compensation,
@@ -27,6 +25,8 @@ from mount_models.coil.temperature import (
 )
 from mount_models.quantity import with_values
 from mount_models.specimen import default_specimen
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 from mount_sim.rack.fixed_gaps import measure_actuator
 
 MAGNET, COIL = ReluctanceActuator(), RippleCoil()

@@ -8,7 +8,7 @@ from mount_identification.friction.laws.dahl import Dahl
 from mount_identification.friction.looks.first_look import first_look
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_response
+from mount_sim.plant.friction import full_response
 
 
 @pytest.mark.parametrize('zero', [-400.0, 0.0, 250.0])

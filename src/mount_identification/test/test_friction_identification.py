@@ -15,7 +15,7 @@ from mount_identification.friction.steps.ramp_response import ramp_response
 from mount_identification.friction.steps.sawtooth import stroke_lines
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_response
+from mount_sim.plant.friction import full_response
 
 CONTACT = FrictionContact()
 TIME = np.arange(0.0, 5.0, 1e-3)

@@ -8,7 +8,7 @@ from mount_identification.friction.steps.sawtooth import stroke_lines
 from mount_identification.friction.steps.slip_regions import slip_regions
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_response
+from mount_sim.plant.friction import full_response
 
 CONTACT, COEFFICIENTS, LOAD = FrictionContact(), FrictionCoefficients(), 100.0
 CORNERS = np.cumsum([0.0, 0.5, 1.0, 1.0, 0.5])

@@ -6,8 +6,7 @@ from typing import NamedTuple
 from mount_init.initialisation import InitialisationResult
 from mount_init.parameters import InitParameters
 from mount_models.specimen import Specimen
-from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 
 _WEAR_RESERVE = 10e-6  # m, chosen: early enough to order pads
 _SKIPPED_SHARE = 0.02  # chosen

@@ -20,11 +20,10 @@ from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
 from mount_ros.messages.temperature import temperature_of
 from mount_ros.messages.verdicts import verdicts_of
-from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.sliding_window import SlidingWindow
 
 _DRIVER_PATIENCE = 0.3  # s, chosen: the driver looks at itself ten times a second
 _VERDICT_PERIOD = 1.2  # s, chosen: it tells its figures once a second
@@ -68,7 +67,7 @@ class MountInit(SafeLifecycleNode):
         assert self._dialogue is not None
         self.real_time.begin(self)  # the ramp is part of the activation
         self._resume_streams()
-        self.wait_for_own_writers()
+        self.wait_for_sole_publishers()
         parameters = self._init_parameters
         self._dialogue.await_quiet(parameters.quiet_duration, self.ending)
         if reason := self._driver.settled(False, _DRIVER_PATIENCE, self.ending):
@@ -93,9 +92,9 @@ class MountInit(SafeLifecycleNode):
     def cleanup(self) -> None:
         self.deactivate()
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
-        if self._dialogue is not None and (foreign or doubt):
-            self._dialogue.give_way(foreign or doubt)
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
+        if self._dialogue is not None and (confirmed or suspected):
+            self._dialogue.give_way(confirmed or suspected)
 
     def judge(self) -> Verdict:
         assert self._result is not None
@@ -120,7 +119,7 @@ class MountInit(SafeLifecycleNode):
 
     def _objection(self) -> str:
         assert isinstance(self.data_path, DataPath)
-        self.data_path.writers.look()  # a thread that polls the messages does not hear who comes
+        self.data_path.publisher_watch.look()  # a thread that polls the messages does not hear who comes
         return self._driver.refusal
 
     # With the result latched no sample is answered, so the streams are unsubscribed: that saves CPU time.

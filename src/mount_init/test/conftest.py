@@ -10,10 +10,10 @@ import pytest
 from mount_init.coil_temperature import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
-from mount_models.actuator.closing import ClosingMechanics, closed_state
-from mount_models.actuator.reluctance import ReluctanceActuator, mean_incremental_inductance
-from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
 from mount_models.specimen import Specimen, default_specimen
+from mount_sim.plant.closing import ClosingMechanics, closed_state
+from mount_sim.plant.reluctance import ReluctanceActuator, mean_incremental_inductance
+from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate
 
 SAMPLE_TIME_NS = 1_000_000
 STEPS_PER_SAMPLE = 10

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mount_init.estimation import contact_gap, rest_gap
-from mount_models.actuator.closing import ClosingMechanics, closed_state
-from mount_models.actuator.closing import contact_force as true_contact_force
-from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.crossing import find_crossing
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.force_table import contact_force, current_force_table
 from mount_models.specimen import default_specimen
+from mount_sim.plant.closing import ClosingMechanics, closed_state
+from mount_sim.plant.closing import contact_force as true_contact_force
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
 MAGNET, COIL, MOUNT = ReluctanceActuator(), RippleCoil(), ClosingMechanics()
 KNOWN = default_specimen()

@@ -1,1 +1,1 @@
-"""Physics and laws of the semi-active engine mount: actuator, coil, friction, damper, vehicle."""
+"""Physics and laws that the nodes of the car load: actuator, coil, friction, damper."""

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_friction
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_response
 from mount_models.friction.simplified import simplified_response
 from mount_models.quantity import quantities, with_values
 
@@ -70,7 +69,7 @@ def _near(kind):
 @given(_near(FrictionCoefficients) | _within(FrictionCoefficients), _near(FrictionContact))
 @example(FrictionCoefficients(b_offset=30.0), FrictionContact())
 @example(FrictionCoefficients(scale=5.0), FrictionContact())
-def test_what_passes_stays_finite_in_both_laws(coefs, contact):
+def test_what_passes_stays_finite_in_the_simplified_law(coefs, contact):
     try:
         check_friction(coefs, contact)
     except CoefficientsRefusedError:
@@ -80,7 +79,5 @@ def test_what_passes_stays_finite_in_both_laws(coefs, contact):
     load = 150.0 + 150.0 * np.sin(2.0 * np.pi * 0.3 * time)
     velocity = np.gradient(displacement, time)
     simplified, _ = simplified_response(contact, coefs, velocity, load, 1e-3)
-    full, _, _ = full_response(contact, coefs, displacement, load, 1e-3)
-    for force in (simplified, full):
-        assert np.isfinite(force).all()
-        assert np.abs(force).max() < 1e5
+    assert np.isfinite(simplified).all()
+    assert np.abs(simplified).max() < 1e5

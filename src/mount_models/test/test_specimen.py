@@ -1,16 +1,13 @@
 """The specimen file: nothing is lost, nothing is guessed, and no truth of the plant comes near it."""
 
-import ast
 import copy
 import math
 from copy import deepcopy
 from dataclasses import FrozenInstanceError, replace
-from pathlib import Path
 
 import pytest
 import yaml
 
-import mount_models
 from mount_models.specimen import (
     DEFAULT_SPECIMEN,
     SpecimenError,
@@ -291,50 +288,3 @@ def test_friction_parameters_pass_through():
 def test_friction_that_is_none_is_refused(friction, sentence):
     with pytest.raises(SpecimenError, match=sentence):
         checked_specimen(replace(DEFAULT, friction=friction))
-
-
-TRUTH = {
-    'mount_models.actuator.reluctance',
-    'mount_models.coil.ripple',
-    'mount_models.actuator.closing',
-}
-
-
-def imported_by(module):
-    path = Path(mount_models.__file__).parent / Path(*module.split('.')[1:])
-    file = path.with_suffix('.py') if path.with_suffix('.py').exists() else path / '__init__.py'
-    names = set()
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            names |= {node.module, *(f'{node.module}.{alias.name}' for alias in node.names)}
-        elif isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-    package = Path(mount_models.__file__).parent
-    ours = {name for name in names if name.startswith('mount_models.')}
-    return {
-        name
-        for name in ours
-        if (package / Path(*name.split('.')[1:])).with_suffix('.py').exists()
-        or (package / Path(*name.split('.')[1:])).is_dir()
-    }
-
-
-def reached_from(module):
-    reached, waiting = set(), {module}
-    while waiting:
-        name = waiting.pop()
-        reached.add(name)
-        waiting |= imported_by(name) - reached
-    return reached
-
-
-@pytest.mark.parametrize(
-    'module',
-    ['specimen', 'force_table', 'actuator.law', 'coil.gap', 'coil.crossing'],
-)
-def test_what_the_controller_uses_never_reaches_the_simulated_truth(module):
-    assert not reached_from(f'mount_models.{module}') & TRUTH
-
-
-def test_the_search_for_imports_does_find_them():
-    assert reached_from('mount_models.coil.ripple') >= TRUTH - {'mount_models.actuator.closing'}

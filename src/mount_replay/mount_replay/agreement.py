@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.compare.signal_difference import Column, SignalDifference, signal_difference
-from mount_bags.compare.tolerances import EXACT
-from mount_bags.compare.words import signal_sentences, switching_sentence
-from mount_bags.events.switching_changes import Switching, paired_switchings, switching_times
+from engine_mount.recordings.compare.signal_difference import Column, SignalDifference, signal_difference
+from engine_mount.recordings.compare.tolerances import EXACT
+from engine_mount.recordings.compare.words import signal_sentences, switching_sentence
+from engine_mount.recordings.events.switching_changes import Switching, paired_switchings, switching_times
 from mount_replay.core import ControlAnswers, RampAnswers, Replayed
 from mount_replay.given.input import ReplayInput, Times
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.bag.writer import BagWriter
-from mount_bags.container.writer import LONG_CHUNK_SIZE
-from mount_bags.run.session import session_message, session_text
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
+from mount_recorder.session import session_message, session_text
 from mount_replay.core import OFF, ControlAnswers, Replayed
 from mount_replay.given.input import ReplayInput
 from mount_ros import topics

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.messages.taken import find
+from engine_mount.recordings.messages.taken import find
 from mount_control.policy.registry import POLICIES
 from mount_replay.fleet.catalogue.places import places
 from mount_replay.fleet.catalogue.reading import read_place

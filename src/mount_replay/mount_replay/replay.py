@@ -6,17 +6,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.folder import RunFolder, make_run_folder
-from mount_bags.run.place import open_mount
-from mount_bags.run.session import (
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.folder import RunFolder, make_run_folder
+from engine_mount.recordings.run.place import open_mount
+from engine_mount.recordings.run.session import (
     SessionError,
     recorded_session,
     session_content,
     session_parameters,
-    time_text,
 )
-from mount_bags.run.versions import versions
 from mount_bringup.chosen import (
     Parameters,
     check_policy,
@@ -32,6 +30,8 @@ from mount_init.parameters import InitParameters
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, with_flattened
+from mount_recorder.session import time_text
+from mount_recorder.versions import versions
 from mount_replay.agreement import Agreement, agreement
 from mount_replay.core import Progress, Replayed, replay_in_core
 from mount_replay.given.foreign import DEFAULT_TABLE, ForeignOrder, chosen_gap, foreign_input

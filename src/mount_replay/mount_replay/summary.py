@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.compare.signal_difference import Moment
-from mount_bags.events.switching_changes import Switching
-from mount_bags.run.screen import Screen, Table
-from mount_bags.run.versions import version_differences, versions, versions_sentence
+from engine_mount.recordings.compare.signal_difference import Moment
+from engine_mount.recordings.events.switching_changes import Switching
+from engine_mount.recordings.run.screen import Screen, Table
+from engine_mount.recordings.run.versions import version_differences, versions_sentence
+from mount_recorder.versions import versions
 from mount_replay.agreement import (
     SETTLED,
     SETTLING,

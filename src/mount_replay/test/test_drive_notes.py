@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from mount_bags.run.folder import make_run_folder
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.run.folder import make_run_folder
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.nodes import CONTROL, RECORDER
 from mount_replay.drive import drive
 from mount_replay.drive.drive import DriveOrder

@@ -13,9 +13,9 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-import mount_bags
-from mount_bags.messages.compact_times import compact
-from mount_bags.messages.packed_column import packed
+import engine_mount
+from engine_mount.recordings.messages.compact_times import compact
+from engine_mount.recordings.messages.packed_column import packed
 from mount_replay.fleet.catalogue.columns import BANDS, EVENTS, RECORDINGS, band_name
 from mount_replay.fleet.catalogue.in_bands import in_bands
 from mount_replay.fleet.catalogue.index import indexed
@@ -59,7 +59,7 @@ def test_a_row_tells_what_a_recording_is_and_what_was_lost_in_it(drives, tmp_pat
     assert (gap['kind'], gap['whole'], gap['reason'], gap['scenario']) == ('replay', True, '', 'motorway')
     assert gap['lost_samples'] == gap['faults'] == 0
     assert json.loads(gap['parameters'])['mount_sim.motorway.gap_depth'] == 0.03
-    recording = mount_bags.open(REFERENCES / 'gap')
+    recording = engine_mount.open(REFERENCES / 'gap')
     assert gap['rest_gap_m'] == recording['air_gap']['rest_gap'][-1]
     assert gap['peak_displacement_m'] == np.abs(recording['displacement']['mount']).max()
     assert gap['distance_m'] == pytest.approx(33.0 * gap['duration_s'])
@@ -110,6 +110,7 @@ def test_a_second_place_is_added_to_what_the_catalogue_holds(drives, tmp_path, i
     assert both.vanished == 0
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_from_any_number_of_workers(drives, tmp_path):
     for workers in (1, 2):
         table_of([drives], tmp_path / str(workers), workers=workers)
@@ -183,7 +184,7 @@ def test_each_mount_of_a_car_has_a_row_with_the_work_of_its_pads(tmp_path):
     assert {row['simulated_mount'] for row in rows.recordings} == {'left,right'}
     assert {row['mount'] for row in rows.events} == {'left', 'right'}
     assert all(row['switched_on'] == 1 for row in rows.recordings)
-    truth = mount_bags.open(made)['/left/sim/truth']
+    truth = engine_mount.open(made)['/left/sim/truth']
     work = 1e-3 * np.abs(truth['friction_force'] * truth['velocity']).sum()
     assert rows.recordings[0]['pad_energy_j'] == pytest.approx(work, rel=0.1)
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-import mount_bags
-from mount_bags.audit.audit import audit
-from mount_bags.bag.recording import ReadingError
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.bag.recording import ReadingError
 from mount_replay.drive.preflight import preflight
 from mount_replay.fleet.example.fleet import (
     FEWEST,
@@ -59,17 +59,17 @@ def test_each_damage_is_seen_by_the_reader(tmp_path):
     damaged = {done.result.name[3:]: done.result for done in make_example(tmp_path, FEWEST, workers=1)}
     for damage, reason in (('garbage', 'is no MCAP file'), ('no_data', 'holds no MCAP file')):
         with pytest.raises(ReadingError, match=reason):
-            mount_bags.open(damaged[damage])
+            engine_mount.open(damaged[damage])
     told = {
         'truncated': 'without its footer',
         'no_metadata': 'metadata.yaml is missing',
         'wrong_checksum': 'lost',
     }
     for damage, sentence in told.items():
-        recording = mount_bags.open(damaged[damage])
+        recording = engine_mount.open(damaged[damage])
         audit(recording)
         assert sentence in '\n'.join(recording.warnings)
-    assert list(mount_bags.open(damaged['foreign'])) == ['/imu/data']
+    assert list(engine_mount.open(damaged['foreign'])) == ['/imu/data']
 
 
 @pytest.mark.parametrize('order', [{'recordings': FEWEST - 1}, {'recordings': 201}, {'seconds': 1.0}])

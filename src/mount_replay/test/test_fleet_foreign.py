@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.bag.recording import Recording
+from engine_mount.recordings.bag.recording import Recording
 from mount_replay.fleet import before_and_after as pictures
 from mount_replay.fleet.catalogue.index import indexed
 from mount_replay.fleet.catalogue.places import places
@@ -121,6 +121,7 @@ def test_without_a_mapping_file_only_a_file_that_is_named_is_looked_at(drives, t
     assert row['peak_displacement_m'] == pytest.approx(1.2e-3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_tables_of_a_fleet_and_what_lies_in_a_run_are_no_files_of_others(drives, said, tmp_path, inside):
     indexed([drives], drives / 'catalogue', said)
     assert len(indexed([drives], tmp_path / 'catalogue', said).recordings) == 7

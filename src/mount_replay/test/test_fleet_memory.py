@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from mount_bags.audit import latency
-from mount_bags.bag import column_parts
-from mount_bags.messages import packed_column, stamps
-from mount_bags.run.place import open_run
-from mount_bags.run.session import session_text
+from engine_mount.recordings.audit import latency
+from engine_mount.recordings.bag import column_parts
+from engine_mount.recordings.messages import packed_column, stamps
+from engine_mount.recordings.run.place import open_run
+from mount_recorder.session import session_text
 from mount_replay.fleet.catalogue import in_bands
 from mount_replay.fleet.catalogue.figures import lost_figures, state_figures
 from mount_replay.fleet.what_if.compared import compared_setpoints, recorded_in

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mount_bags.bag.column_parts import ColumnPart
-from mount_bags.messages import packed_column
+from engine_mount.recordings.bag.column_parts import ColumnPart
+from engine_mount.recordings.messages import packed_column
 from mount_replay.fleet.catalogue.motion import Motion
 from mount_replay.fleet.catalogue.trace import Trace
 

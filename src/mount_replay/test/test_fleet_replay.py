@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_bags.container.writer import LONG_CHUNK_SIZE
-from mount_bags.edit.cut import cut
-from mount_bags.run.place import open_run
-from mount_bags.run.session import session_text
+from engine_mount.recordings.edit.cut import cut
+from engine_mount.recordings.run.place import open_run
 from mount_bringup.sample_rate import with_sample_rate
+from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
+from mount_recorder.session import session_text
 from mount_replay.fleet.runner import Done
 from mount_replay.fleet.what_if import compared, one, run
 from mount_replay.fleet.what_if.asked import AskedError, recordings_asked

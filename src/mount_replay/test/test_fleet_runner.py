@@ -116,6 +116,7 @@ def test_a_task_that_kills_its_workers_is_given_up_and_no_other_one_is(tmp_path)
     assert len(list(tmp_path.glob('3_*'))) == LOSSES
 
 
+@pytest.mark.slow
 def test_a_task_that_outgrows_the_memory_of_its_worker_is_given_up():
     def work(place):
         if place == 0:
@@ -175,6 +176,7 @@ def test_a_scheduler_that_is_lost_ends_the_run_with_what_was_done(cluster, tmp_p
         assert told.count('Traceback') == 1
 
 
+@pytest.mark.slow
 def test_an_address_where_no_scheduler_is_is_refused():
     with pytest.raises(SchedulerLostError, match=r'tcp://127\.0\.0\.1:1: no Dask scheduler answers there'):
         list(run_tasks(abs, [1], scheduler='tcp://127.0.0.1:1'))

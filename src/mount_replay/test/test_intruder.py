@@ -3,9 +3,12 @@
 import subprocess
 import sys
 
+import pytest
+
 from mount_ros.testing import free_domain
 
 
+@pytest.mark.slow
 def test_an_intruder_ends_with_its_input_though_no_graph_listens_any_more():
     """A graph that detects it as it appears has ended before it is matched."""
     with free_domain() as domain:

@@ -5,7 +5,7 @@ import sys
 
 _AFTER = """
 import sys
-from mount_bags.run.session import session_text
+from mount_recorder.session import session_text
 from mount_replay.fleet.catalogue.places import places
 from mount_replay.fleet.catalogue.reading import read_place
 from mount_replay.fleet.what_if.one import replay_one

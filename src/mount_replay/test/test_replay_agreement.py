@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from mount_bags.events.switching_changes import Switching
+from engine_mount.recordings.events.switching_changes import Switching
 from mount_control.control_loop import SampleCounts
 from mount_control.policy import switched_viscous
 from mount_control.policy.contract import trace_dtype

@@ -10,10 +10,10 @@ matplotlib.use('Agg')
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import Recording
-from mount_bags.compare.compare import Comparison, matched_topics
-from mount_bags.compare.signal_difference import Column, SignalDifference
-from mount_bags.compare.words import by_importance
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.compare.compare import Comparison, matched_topics
+from engine_mount.recordings.compare.signal_difference import Column, SignalDifference
+from engine_mount.recordings.compare.words import by_importance
 from mount_report.drawing.style import COLOURS, DIFFERENCE_COLOUR
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 

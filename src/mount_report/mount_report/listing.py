@@ -7,13 +7,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.metadata import METADATA_NAME
-from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.run.folder import RunFolder
-from mount_bags.run.place import open_run
-from mount_bags.run.session import session_parameters
-from mount_bags.run.told import duration_of, started_of, told_session
+from engine_mount.recordings.bag.recording import ReadingError, Recording
+from engine_mount.recordings.run.folder import RunFolder
+from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.run.session import session_parameters
+from engine_mount.recordings.run.told import duration_of, started_of, told_session
 from mount_bringup.recorded_mount import simulated_mounts
+from mount_recorder.metadata import METADATA_NAME
 from mount_signals.sources.local import local_path
 from mount_signals.sources.source import SourceError
 from mount_signals.sources.stores import is_local, outline

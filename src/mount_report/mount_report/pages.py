@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mount_bags.bag.recording import Recording
-from mount_bags.compare.alignment import ComparisonError
-from mount_bags.compare.compare import compare
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.compare.alignment import ComparisonError
+from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.run.screen import Screen
 from mount_report.report import ReportError, make_report, subjects_of
 from mount_report.run_facts import run_facts
 

@@ -4,15 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mount_bags.audit.audit import TopicAudit, audit
-from mount_bags.audit.losses import Losses, losses
-from mount_bags.bag.recording import Recording
-from mount_bags.events.event_marks import read_marks
-from mount_bags.run.screen import Table
-from mount_bags.run.session import session_parameters
-from mount_bags.run.told import duration_of, started_of, told_session, versions_told
-from mount_bags.run.versions import version_differences, versions
+from engine_mount.recordings.audit.audit import TopicAudit, audit
+from engine_mount.recordings.audit.losses import Losses, losses
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.events.event_marks import read_marks
+from engine_mount.recordings.run.screen import Table
+from engine_mount.recordings.run.session import session_parameters
+from engine_mount.recordings.run.told import duration_of, started_of, told_session, versions_told
+from engine_mount.recordings.run.versions import version_differences
 from mount_bringup.changed_parameters import changed_parameters
+from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
 
 

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mount_bags.bag.recording import Recording
-from mount_bags.compare.alignment import ComparisonError, share_stamps
-from mount_bags.container.scratch import put_away
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.compare.alignment import ComparisonError, share_stamps
+from engine_mount.recordings.container.scratch import put_away
 from mount_report.drawing.page import page
 from mount_report.sections import overview, run_sections, signal_sections
 from mount_report.sections.section import Section

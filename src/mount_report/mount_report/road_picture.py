@@ -9,11 +9,11 @@ matplotlib.use('Agg')
 import numpy as np
 from matplotlib.figure import Figure
 
-from mount_models.road import REFERENCE_FREQUENCY
 from mount_report.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
 from mount_signals.roads.iso8608 import CLASSES, FIRST_LIMIT, Unevenness
 from mount_signals.roads.long_waves import LONGEST_WAVE, without_long_waves
 from mount_signals.roads.profile import RoadProfile
+from mount_sim.excitation.road import REFERENCE_FREQUENCY
 
 
 def draw_road(profile: RoadProfile, found: Unevenness, file: Path) -> None:

@@ -4,12 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.container.scratch import kept
-from mount_bags.run.session import SessionError, session_content, session_parameters
+from engine_mount.recordings.container.scratch import kept
+from engine_mount.recordings.run.session import SessionError, session_content, session_parameters
 from mount_bringup.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_bringup.mount_choice import seat_of
 from mount_control.policy.contract import Policy
-from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import with_flattened
 from mount_report.drawing.style import COLOUR_OF
 from mount_report.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
@@ -20,6 +19,7 @@ from mount_report.sections.subject import RunFacts, Tracking, WithoutDamping
 from mount_report.signals import Signals
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
 from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.ripple import RippleCoil
 
 _NEEDED = (DISPLACEMENT, CONTROL_TRACE, SIM_TRUTH)
 _NO_SESSION = 'the recording has no session message that tells them'

@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.container.scratch import kept
-from mount_bags.events.recorded_events import recorded_marks
-from mount_bags.events.switching_changes import switching_times
-from mount_bags.messages.compact_times import Times, each_once
-from mount_bags.messages.series import Series, SeriesError
-from mount_bags.run.session import recorded_sample_rate, recorded_session
+from engine_mount.recordings.bag.recording import ReadingError, Recording
+from engine_mount.recordings.container.scratch import kept
+from engine_mount.recordings.events.recorded_events import recorded_marks
+from engine_mount.recordings.events.switching_changes import switching_times
+from engine_mount.recordings.messages.compact_times import Times, each_once
+from engine_mount.recordings.messages.series import Series, SeriesError
+from engine_mount.recordings.run.session import recorded_sample_rate, recorded_session
 from mount_report.drawing.chart import Array
 from mount_report.drive.signals import DRIVE_COLUMNS
 from mount_ros.messages.event import Mark

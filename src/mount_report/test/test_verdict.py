@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mount_bags.audit.losses import Losses
+from engine_mount.recordings.audit.losses import Losses
 from mount_report.sections.section import GOOD, LOOK, UNKNOWN
 from mount_report.sections.verdict import findings
 

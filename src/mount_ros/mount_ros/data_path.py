@@ -18,9 +18,9 @@ from mount_ros.data_thread import DataThread, Work
 from mount_ros.direct import Receiver
 from mount_ros.messages.types import message_class
 from mount_ros.private_rclpy import raw_publisher
+from mount_ros.publishers import PublisherWatch
 from mount_ros.qos import control_qos, publisher_qos
 from mount_ros.topics import Delivery, Topic
-from mount_ros.writers import WriterWatch
 
 
 def io_node(owner: Node, name: str = '') -> Node:
@@ -59,14 +59,14 @@ class DataPath:
         *,
         lockstep: bool = False,
         thread: DataThread | None = None,
-        on_writers: Callable[[str, str], None] = lambda foreign, doubt: None,
+        on_conflict: Callable[[str, str], None] = lambda confirmed, suspected: None,
         name: str = '',
     ):
         self.lockstep = lockstep
         self._thread = thread or DataThread(owner.context)
         self.node = io_node(owner, name)
-        self.writers = WriterWatch(self.node, on_writers)
-        """Who publishes what this path hears; `on_writers` is called when others begin or cease to."""
+        self.publisher_watch = PublisherWatch(self.node, on_conflict)
+        """Who publishes what this path hears; `on_conflict` is called when others begin or cease to."""
         self._serving = False
         self._publishers: list[Publisher] = []
         self._sent_directly: list[str] = []
@@ -126,7 +126,7 @@ class DataPath:
                 kind, topic.name, guarded, qos, raw=True, event_callbacks=events
             )
             if topic.writers:
-                self.writers.hear(topic, subscription)
+                self.publisher_watch.watch(topic, subscription)
 
         self._change(create)
 
@@ -135,7 +135,7 @@ class DataPath:
 
         The node is not served meanwhile: an EventsExecutor ends by an event of a destroyed subscription.
         """
-        self.writers.forget(topic)
+        self.publisher_watch.forget(topic)
         name = self.node.resolve_topic_name(topic.name)
         if self._serving:
             self._thread.remove(self.node)
@@ -158,18 +158,18 @@ class DataPath:
         self._serving = True
         self._thread.add(self.node)
 
-    def attend(self, work: Work) -> None:
+    def add_poll(self, work: Work) -> None:
         """Let the thread that serves the messages do `work` too, between them, again and again.
 
         For lock-step in one process: work that only continues what happens in this thread.
         """
         self._works.append(self._surviving('work not done', work))
-        self._thread.attend(self._works[-1])
+        self._thread.add_poll(self._works[-1])
 
-    def leave_work(self) -> None:
+    def remove_polls(self) -> None:
         """Return when none of the attended work is done any more."""
         while self._works:
-            self._thread.leave(self._works[-1])  # where this is refused the work goes on
+            self._thread.remove_poll(self._works[-1])  # where this is refused the work goes on
             self._works.pop()
 
     def stop(self) -> None:
@@ -177,21 +177,22 @@ class DataPath:
         if self._stopped:
             return
         self._stopped = True
-        self.leave_work()
+        self.remove_polls()
         for receiver in self._receivers:
             receiver.end()
         if self._serving:
             self._thread.remove(self.node)
         for name in self._sent_directly:
             self._thread.direct.end_sender(name)
-        self.writers.end()
+        self.publisher_watch.end()
         self.node.destroy_node()
 
     def _events(self, topic: Topic) -> SubscriptionEventCallbacks | None:
         """Return what is done when a publisher comes or goes; a thread that polls does not hear it."""
         if not topic.writers:
             return None
-        noticed = self._surviving(f'writers of {topic.name} not known', lambda _: self.writers.notice(topic))
+        trouble, watch = f'writers of {topic.name} not known', self.publisher_watch
+        noticed = self._surviving(trouble, lambda _: watch.notice(topic))
         return SubscriptionEventCallbacks(matched=noticed)
 
     def _change(self, make: Callable[[], Any]) -> None:

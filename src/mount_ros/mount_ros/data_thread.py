@@ -58,7 +58,7 @@ class DataThread:
     one round where receivers were added before senders.
 
     An exception ends it: `failure` says which, `on_failure` takes the same sentence in this thread, and
-    every waiting or later call of `change` raises `DataThreadEndedError`; `remove` and `leave` return.
+    every waiting or later call of `change` raises `DataThreadEndedError`; `remove` and `remove_poll` return.
     """
 
     def __init__(self, context: Context, on_failure: Callable[[str], None] = lambda sentence: None):
@@ -83,11 +83,11 @@ class DataThread:
         with contextlib.suppress(DataThreadEndedError):
             self.change(lambda: self._nodes.remove(node))
 
-    def attend(self, work: Work) -> None:
+    def add_poll(self, work: Work) -> None:
         """Do `work` between the messages from now on, again and again."""
         self.change(lambda: self._works.append(work))
 
-    def leave(self, work: Work) -> None:
+    def remove_poll(self, work: Work) -> None:
         """Return when `work` is done no more and does not run, also if it was left before."""
         with contextlib.suppress(DataThreadEndedError):
             self.change(lambda: self._forget(work))

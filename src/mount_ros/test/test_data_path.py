@@ -91,7 +91,7 @@ def test_a_path_that_was_never_started_can_be_stopped_twice(make_end):
 def test_what_is_no_more_subscribed_is_heard_no_more_until_it_is_again(pair, working):
     receiver, send = pair
     if working:
-        receiver.path.attend(lambda: False)
+        receiver.path.add_poll(lambda: False)
     for turn in range(5):
         send(2 * turn)
         wait_until(lambda turn=turn: receiver.stamps[-1:] == [2 * turn], 'arrival')
@@ -120,7 +120,7 @@ def test_a_callback_that_raises_costs_its_own_message_only(pair, capfd, working)
     receiver.path.subscribe(DISPLACEMENT, choke)
     wait_until(lambda: receiver.path.node.count_subscribers('displacement') == 2, 'second subscription')
     if working:
-        receiver.path.attend(lambda: False)
+        receiver.path.add_poll(lambda: False)
     seen = len(receiver.stamps)
     for stamp in range(4):
         send(stamp)
@@ -197,11 +197,11 @@ def test_attended_work_is_done_between_messages_and_without_any(pair):
         doing.append(threading.current_thread().name)
         return False
 
-    receiver.path.attend(work)
+    receiver.path.add_poll(work)
     wait_until(lambda: len(doing) > 3, 'work without messages')
     send(1)
     wait_until(lambda: receiver.stamps == [1], 'arrival')
-    receiver.path.leave_work()
+    receiver.path.remove_polls()
     done = len(doing)
     send(2)
     wait_until(lambda: receiver.stamps == [1, 2], 'arrival after the work was left')
@@ -211,7 +211,7 @@ def test_attended_work_is_done_between_messages_and_without_any(pair):
 
 def test_work_that_is_never_done_keeps_no_message_waiting(pair):
     receiver, send = pair
-    receiver.path.attend(lambda: True)
+    receiver.path.add_poll(lambda: True)
     for stamp in range(20):
         send(stamp)
         wait_until(lambda stamp=stamp: receiver.stamps[-1:] == [stamp], 'arrival')
@@ -223,10 +223,10 @@ def test_no_message_is_lost_or_doubled_where_work_begins_and_ends(pair):
     receiver, send = pair
     for stamp in range(0, 40, 4):
         send(stamp)
-        receiver.path.attend(lambda: False)
+        receiver.path.add_poll(lambda: False)
         send(stamp + 1)
         send(stamp + 2)
-        receiver.path.leave_work()
+        receiver.path.remove_polls()
         send(stamp + 3)
         wait_until(lambda stamp=stamp: receiver.stamps[-1:] == [stamp + 3], 'arrival')
     assert receiver.stamps == list(range(40))
@@ -251,9 +251,9 @@ def test_a_sample_passes_through_the_chain_in_one_round(context, make_end):
             publish(source.layout.pack(1, (0.0,)))
         return False
 
-    source.path.attend(work)
+    source.path.add_poll(work)
     wait_until(lambda: arrived, 'arrival')
-    source.path.leave_work()
+    source.path.remove_polls()
     assert arrived == [3]
 
 
@@ -263,7 +263,7 @@ def test_work_that_raises_ends_neither_the_thread_nor_the_service(pair, capfd):
     def work():
         raise ValueError('too hard')
 
-    receiver.path.attend(work)
+    receiver.path.add_poll(work)
     send(1)
     wait_until(lambda: receiver.stamps == [1], 'arrival')
     receiver.path.stop()
@@ -301,7 +301,7 @@ def _outcome(call, *arguments):
 def test_a_change_that_fails_is_told_to_its_caller_and_the_thread_goes_on(pair):
     receiver, send = pair
     assert isinstance(_outcome(receiver.path._thread.remove, Node), ValueError)
-    assert _outcome(receiver.path._thread.leave, _collapse) is None  # it is not done anyway
+    assert _outcome(receiver.path._thread.remove_poll, _collapse) is None  # it is not done anyway
     send(1)
     wait_until(lambda: receiver.stamps == [1], 'arrival')
     assert receiver.path.failure == ''
@@ -313,7 +313,7 @@ def test_the_end_of_the_thread_is_told_and_nobody_waits_for_it(context, make_end
     thread = DataThread(context, told.append)
     end, other = make_end('end', thread), make_end('other', thread)
     end.path.start()
-    assert _outcome(end.path.attend, _collapse) is None
+    assert _outcome(end.path.add_poll, _collapse) is None
     wait_until(lambda: told, 'the failure')
     assert told == ['the data thread has ended: CollapseError: out of order']
     assert end.path.failure == other.path.failure == told[0]
@@ -322,7 +322,7 @@ def test_the_end_of_the_thread_is_told_and_nobody_waits_for_it(context, make_end
     assert str(refusal) == told[0]
     assert not _data_threads()
     # to be served no more is what has happened already
-    assert _outcome(end.path.leave_work) is None
+    assert _outcome(end.path.remove_polls) is None
     assert _outcome(end.path.stop) is None
 
 
@@ -334,7 +334,7 @@ def test_who_waits_when_the_thread_ends_gets_the_reason(pair, monkeypatch):
         raise RuntimeError('the executor is broken')
 
     monkeypatch.setattr(mount_ros.data_thread, '_take_effect', fail)
-    refusal = _outcome(receiver.path.attend, lambda: False)
+    refusal = _outcome(receiver.path.add_poll, lambda: False)
     assert isinstance(refusal, DataThreadEndedError)
     assert 'RuntimeError: the executor is broken' in str(refusal)
 
@@ -347,10 +347,10 @@ def test_a_thread_that_does_not_answer_is_not_waited_for_for_ever(pair, monkeypa
         blocked.set()
         return release.wait(LIMIT)
 
-    receiver.path.attend(block)
+    receiver.path.add_poll(block)
     assert blocked.wait(LIMIT)
     monkeypatch.setattr(mount_ros.data_thread, '_PATIENCE', 0.05)
-    refusal = _outcome(receiver.path.leave_work)
+    refusal = _outcome(receiver.path.remove_polls)
     release.set()
     monkeypatch.undo()
     assert isinstance(refusal, DataThreadError)
@@ -359,7 +359,7 @@ def test_a_thread_that_does_not_answer_is_not_waited_for_for_ever(pair, monkeypa
 
 def test_a_callback_that_would_wait_for_its_own_thread_is_refused(pair):
     receiver, send = pair
-    receiver.path.attend(lambda: receiver.path.leave_work() is not None)
+    receiver.path.add_poll(lambda: receiver.path.remove_polls() is not None)
     wait_until(lambda: receiver.path.refused, 'the refusal')
     assert 'cannot wait for the data thread' in receiver.path.refusal
     send(1)

@@ -4,8 +4,15 @@ import random
 
 import pytest
 
-from mount_ros.nodes.diagnostics import Finding, Level, Standing, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+from mount_ros.nodes.diagnostics import (
+    WINDOW,
+    ActiveFindings,
+    Finding,
+    Level,
+    SlidingWindow,
+    Verdict,
+    verdict_on,
+)
 
 LOOK = 0.1  # s
 
@@ -18,7 +25,7 @@ def loss(count):
 def test_a_burst_counts_for_as_long_as_the_window_lasts_and_is_told_in_the_same_words(seed):
     rng = random.Random(seed)
     begin, length = rng.randrange(1, 300), rng.randrange(1, 50)
-    window, standing, counted, told = SlidingWindow(0), Standing(), 0, []
+    window, standing, counted, told = SlidingWindow(0), ActiveFindings(), 0, []
     for look in range(600):
         counted += rng.randrange(1, 9) if begin <= look < begin + length else 0
         lately = counted - window.earlier(look * LOOK, counted)
@@ -48,7 +55,7 @@ def test_a_window_forgets_however_rarely_it_is_looked_at():
 
 
 def test_a_finding_that_came_back_is_told_afresh():
-    standing = Standing()
+    standing = ActiveFindings()
     said = [
         standing.keep(verdict_on(found, 'well', {})).sentence
         for found in ([loss(1)], [], [loss(7)], [loss(9)])
@@ -58,7 +65,7 @@ def test_a_finding_that_came_back_is_told_afresh():
 
 def test_a_graver_level_is_told_at_once_and_the_first_error_speaks_alone():
     hot, hotter = Finding(Level.WARN, 'hot', '120 degC'), Finding(Level.ERROR, 'hot', '150 degC')
-    standing = Standing()
+    standing = ActiveFindings()
     assert standing.keep(verdict_on([hot, loss(1)], 'well', {})).sentence == '120 degC. 1 lost; check the bus'
     silent = Finding(Level.ERROR, 'silence', 'no frames')
     verdict = standing.keep(verdict_on([hotter, silent, loss(2)], 'well', {}))
@@ -67,4 +74,4 @@ def test_a_graver_level_is_told_at_once_and_the_first_error_speaks_alone():
 
 def test_a_verdict_without_findings_passes():
     verdict = Verdict(Level.ERROR, 'as it is')
-    assert Standing().keep(verdict) is verdict
+    assert ActiveFindings().keep(verdict) is verdict

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_ros.data_path import DataPath
-from mount_ros.nodes.aside import done_aside
+from mount_ros.nodes.aside import run_in_thread
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.qos import publisher_qos
@@ -185,7 +185,7 @@ def test_an_exception_beside_a_transition_waits_for_its_end(context):
 
     begun = threading.Event()
     with pytest.raises(RuntimeError, match='out of order'):
-        done_aside(executor, work, 'transition')
+        run_in_thread(executor, work, 'transition')
     assert steps == ['work']
     executor.shutdown()
 
@@ -193,8 +193,8 @@ def test_an_exception_beside_a_transition_waits_for_its_end(context):
 def test_what_long_work_raises_concerns_who_asked_for_it(context):
     executor = SingleThreadedExecutor(context=context)
     with pytest.raises(ZeroDivisionError):
-        done_aside(executor, lambda: 1 / 0, 'transition')
-    assert done_aside(executor, lambda: 7, 'transition') == 7
+        run_in_thread(executor, lambda: 1 / 0, 'transition')
+    assert run_in_thread(executor, lambda: 7, 'transition') == 7
     executor.shutdown()
 
 
@@ -355,7 +355,7 @@ def test_a_data_thread_that_has_ended_is_an_error_whatever_the_node_thinks_of_it
 
     operator.change(CONFIGURE)
     operator.change(ACTIVATE)
-    probe.data_path.attend(collapse)
+    probe.data_path.add_poll(collapse)
     assert told.wait(LIMIT)
     sentence = 'the data thread has ended: SystemExit: out of order'
     wait_until(lambda: operator.heard(Level.ERROR, sentence), 'the sentence in the diagnostics')
@@ -376,6 +376,6 @@ def test_errors_in_the_data_path_are_a_warning_where_the_node_knows_of_none(prob
             raise ValueError('too hard')
         return False
 
-    probe.data_path.attend(work)
+    probe.data_path.add_poll(work)
     sentence = 'errors in the data path (1, limit: none), the last: work not done: ValueError: too hard'
     wait_until(lambda: operator.heard(Level.WARN, sentence), 'the sentence in the diagnostics')

@@ -4,7 +4,7 @@ import pytest
 from rclpy.parameter import Parameter
 
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
-from mount_ros.nodes.parameter_gate import Change
+from mount_ros.nodes.parameters import Change
 
 
 class Subject(SafeLifecycleNode):
@@ -23,7 +23,7 @@ class Subject(SafeLifecycleNode):
         if not values['lower'] < values['upper']:
             raise ValueError(f'lower ({values["lower"]:g}) must lie below upper ({values["upper"]:g})')
 
-    def take_changes(self, changes):
+    def apply_changes(self, changes):
         self.taken.append((changes, self.get_parameter('lower').value))
 
 

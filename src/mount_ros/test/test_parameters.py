@@ -8,8 +8,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from mount_models.quantity import ParameterError, Quantity
-from mount_ros.nodes.declaring import DeclaringNode
-from mount_ros.nodes.parameters import SpecimenValues, declare, read
+from mount_ros.nodes.parameters import DeclaringNode, SpecimenValues, declare, read
 
 
 class Spring(NamedTuple):

@@ -181,7 +181,7 @@ def test_an_exception_in_a_node_ends_all_nodes_of_its_process_with_code_1(start,
 def test_the_end_of_the_data_thread_ends_the_process_with_the_reason_and_code_1(start):
     """It is attended work that fails past every border; the nodes are closed as at a signal."""
     collapse = "(lambda: (_ for _ in ()).throw(SystemExit('out of order')))"
-    process = start(2, in_service=f"if self.get_name() == 'two': self.data_path.attend({collapse})")
+    process = start(2, in_service=f"if self.get_name() == 'two': self.data_path.add_poll({collapse})")
     code, errors = process.end()
     assert code == 1
     assert '[FATAL] [two]: the data thread has ended: SystemExit: out of order' in errors

@@ -3,7 +3,7 @@
 import pytest
 
 from mount_ros.nodes import real_time
-from mount_ros.nodes.real_time import WATCH_PERIOD, Beats, RealTime, Urgent
+from mount_ros.nodes.real_time import WATCH_PERIOD, LoopTiming, RealTime, RealTimeThreads
 
 NAMES = {
     1: 'MainThread', 2: 'mount_driver', 3: 'diagnostics', 4: 'data', 5: 'can_receive',
@@ -15,10 +15,10 @@ ALL = {WATCH, *BESIDE, *LOOP}
 
 class Loop:
     def __init__(self, interpreter=True):
-        self.urgent = Urgent(frozenset({'data', 'can_receive'}), interpreter)
-        self.kept = Beats()
+        self.real_time_threads = RealTimeThreads(frozenset({'data', 'can_receive'}), interpreter)
+        self.kept = LoopTiming()
 
-    def beats(self):
+    def loop_timing(self):
         return self.kept
 
 
@@ -49,7 +49,7 @@ class FakeThreads:
     def processor_time(self, number):
         return self.times[number]
 
-    def urgent(self):
+    def prioritised(self):
         return {number for number, priority in self.priorities.items() if priority}
 
 
@@ -79,13 +79,13 @@ def looks(whole, system, count, shares=None):
 
 def test_the_threads_of_the_data_have_the_priority_while_a_node_is_active(system):
     whole, loop = shared(system), Loop()
-    assert not system.urgent()
+    assert not system.prioritised()
     whole.begin(loop)
-    assert system.urgent() == ALL
+    assert system.prioritised() == ALL
     assert {system.priorities[number] for number in LOOP} == {10}
     assert whole.held == 10
     whole.end(loop)
-    assert not system.urgent()
+    assert not system.prioritised()
     assert whole.held == 0
 
 
@@ -101,7 +101,7 @@ def test_the_memory_of_a_process_in_real_time_stays_in_place(system, monkeypatch
 def test_who_can_wait_for_the_interpreter_leaves_the_others_ordinary(system):
     whole = shared(system, priority=5)
     whole.begin(Loop(interpreter=False))
-    assert system.urgent() == {WATCH, *LOOP}
+    assert system.prioritised() == {WATCH, *LOOP}
 
 
 def test_the_watch_runs_above_the_loop_who_takes_turns_with_it_behind_and_the_system_bounds_both(system):
@@ -117,9 +117,9 @@ def test_a_thread_made_by_the_activation_has_it_by_the_next_look(system):
     whole = shared(system)
     whole.begin(Loop())
     system.shown[5] = 'can_receive'
-    assert 5 not in system.urgent()
+    assert 5 not in system.prioritised()
     looks(whole, system, 1)
-    assert 5 in system.urgent()
+    assert 5 in system.prioritised()
 
 
 def test_of_two_nodes_in_a_process_the_last_one_ends_it(system):
@@ -127,15 +127,15 @@ def test_of_two_nodes_in_a_process_the_last_one_ends_it(system):
     whole.begin(first)
     whole.begin(second)
     whole.end(first)
-    assert system.urgent() == ALL
+    assert system.prioritised() == ALL
     whole.end(second)
-    assert not system.urgent()
+    assert not system.prioritised()
 
 
 def test_without_a_priority_nothing_is_changed(system):
     whole = shared(system, priority=0)
     whole.begin(Loop())
-    assert (looks(whole, system, 20), system.urgent(), system.bounds) == ([], set(), [])
+    assert (looks(whole, system, 20), system.prioritised(), system.bounds) == ([], set(), [])
 
 
 def test_where_it_is_not_permitted_the_node_works_without(system):
@@ -149,7 +149,7 @@ def test_a_loop_within_its_share_keeps_it(system):
     whole = shared(system)
     whole.begin(Loop())
     assert looks(whole, system, 100, {4: 0.5, 5: 0.5, 6: 0.75}) == []
-    assert system.urgent() == ALL
+    assert system.prioritised() == ALL
 
 
 def test_a_thread_that_uses_more_than_its_share_ends_it_within_two_seconds(system):
@@ -158,7 +158,7 @@ def test_a_thread_that_uses_more_than_its_share_ends_it_within_two_seconds(syste
     said = looks(whole, system, round(2.0 / WATCH_PERIOD), {4: 0.9})
     assert len(said) == 1
     assert 'thread data used 0.90 of a core in 1.0 s (limit 0.8); lower the load' in said[0]
-    assert not system.urgent()
+    assert not system.prioritised()
     assert whole.given_back == said[0]
 
 
@@ -177,7 +177,7 @@ def test_an_ordinary_thread_that_waits_for_a_processor_ends_it(system):
     said = looks(whole, system, round(1.0 / WATCH_PERIOD))
     assert len(said) == 1
     assert 'had to wait for a processor for 0.6 s (limit 0.6 s)' in said[0]
-    assert not system.urgent()
+    assert not system.prioritised()
 
 
 def test_an_ordinary_thread_that_is_seen_waiting_but_runs_between_is_served(system):
@@ -193,7 +193,7 @@ def test_a_loop_that_misses_most_of_its_periods_ends_it(system, missed, kept):
     whole.begin(loop)
     said = []
     for _ in range(20):
-        loop.kept = Beats(loop.kept.periods + 200, loop.kept.missed + missed)
+        loop.kept = LoopTiming(loop.kept.periods + 200, loop.kept.missed + missed)
         said += looks(whole, system, 1)
     assert (not said) == kept
     if not kept:
@@ -205,17 +205,17 @@ def test_a_loop_that_catches_up_after_a_stall_of_the_machine_keeps_it(system):
     whole.begin(loop)
     said = []
     for missed in 10 * [*[400] * 12, 0]:  # a stall, and looks until all is made up for
-        loop.kept = Beats(loop.kept.periods + 400, loop.kept.missed + missed)
+        loop.kept = LoopTiming(loop.kept.periods + 400, loop.kept.missed + missed)
         said += looks(whole, system, 1)
     assert said == []
-    assert system.urgent() == ALL
+    assert system.prioritised() == ALL
 
 
 def test_a_thread_that_the_system_says_does_not_sleep_ends_it_at_once(system):
     whole = shared(system)
     whole.begin(Loop())
     assert 'for 1 s without a sleep (limit 1 s)' in whole.ran_without_sleep()
-    assert not system.urgent()
+    assert not system.prioritised()
 
 
 def test_what_was_given_back_stays_so_until_an_activation_30_s_later(system):
@@ -223,14 +223,14 @@ def test_what_was_given_back_stays_so_until_an_activation_30_s_later(system):
     whole.begin(loop)
     looks(whole, system, 10, {4: 1.0})
     assert looks(whole, system, 20) == []
-    assert not system.urgent()
+    assert not system.prioritised()
     whole.end(loop)
     assert whole.given_back
     whole.begin(loop)
     assert whole.given_back  # so soon it is not taken again
-    assert not system.urgent()
+    assert not system.prioritised()
     whole.end(loop)
     system.now += 30.0
     whole.begin(loop)
     assert not whole.given_back
-    assert system.urgent() == ALL
+    assert system.prioritised() == ALL

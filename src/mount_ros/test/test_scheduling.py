@@ -81,7 +81,7 @@ class Spinning(SafeLifecycleNode):
         self.turn = iter(['configure', 'activate'])
     def configure(self):
         path = self.open_data_path()
-        path.attend(lambda: True)  # never sleeps: there is always something to do
+        path.add_poll(lambda: True)  # never sleeps: there is always something to do
     def _turn(self):
         getattr(self, 'trigger_' + next(self.turn, 'nothing'), lambda: None)()
         if self.real_time.held:

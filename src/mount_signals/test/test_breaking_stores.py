@@ -51,6 +51,7 @@ def breaking(request, own_home):
     way.close()
 
 
+@pytest.mark.slow
 def test_a_connection_that_breaks_is_gone_on_with(breaking, copies, monkeypatch):
     way, uri = breaking
     monkeypatch.setattr(reading, 'BLOCK', 50_000)

@@ -5,7 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.reading import headings, read
 from mount_signals.testing import MAKERS
 from mount_signals.testing.made import BEGIN

@@ -6,11 +6,11 @@ import json
 import numpy as np
 import pytest
 
-import mount_bags
-from mount_bags.bag.recording import open_recording
-from mount_bags.edit.cut import cut
-from mount_bags.run.session import recorded_session, session_content
-from mount_bags.signals.signal import SignalError
+import engine_mount
+from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.edit.cut import cut
+from engine_mount.recordings.run.session import recorded_session, session_content
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.reading import read
 from mount_signals.importing.importing import ImportOrder, import_recording
 from mount_signals.units.mapping import ColumnChoice, Mapping, MappingError, TimeChoice
@@ -45,7 +45,7 @@ def test_titles_and_units_tell_what_columns_are(tmp_path):
     done = imported(tmp_path, file)
     assert done.recordings == [tmp_path / 'out']
     assert done.samples == {'/displacement': 3000, '/sim/chassis_acceleration': 3000}
-    recording = mount_bags.open(tmp_path / 'out')
+    recording = engine_mount.open(tmp_path / 'out')
     assert recording['displacement']['mount'] == pytest.approx(TRAVEL, abs=1e-9)
     assert recording['displacement'].stamps[0] == 1_000_000_000
     acceleration = recording['sim/chassis_acceleration']
@@ -107,7 +107,7 @@ def test_a_gap_parts_the_recording_and_is_told(tmp_path):
     assert done.recordings == [tmp_path / 'out_1', tmp_path / 'out_2']
     assert done.lengths == pytest.approx([0.999, 1.798])
     assert any('a gap of 0.202 s at 0.999 s' in note for note in done.notes)
-    second = mount_bags.open(tmp_path / 'out_2')['displacement']
+    second = engine_mount.open(tmp_path / 'out_2')['displacement']
     assert second.stamps[0] == 2_201_000_000
     assert (
         session_content(recorded_session(open_recording(tmp_path / 'out_2')))['imported']['piece'] == '2 of 2'

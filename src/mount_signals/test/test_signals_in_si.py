@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from measured_columns import SHAKING, TIMES, TRAVEL, measured
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.units.mapping import Mapping, MappingError, with_options
 from mount_signals.units.signals import signals
 from mount_signals.units.unit import UnitError

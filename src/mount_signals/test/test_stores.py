@@ -5,8 +5,8 @@ import shutil
 import pytest
 from served_stores import SECRET_KEY, HttpStore
 
-from mount_bags.run.place import open_run
-from mount_bags.run.session import recorded_session
+from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.run.session import recorded_session
 from mount_signals.sources import looking, outlines
 from mount_signals.sources.source import SourceError
 from mount_signals.sources.stores import entries, fetched, local_copy, outline, traffic, uri_of

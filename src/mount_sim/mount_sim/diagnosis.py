@@ -4,8 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from mount_ros.nodes.diagnostics import Finding, Level, Verdict, verdict_on
-from mount_ros.nodes.sliding_window import WINDOW
+from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.simulated_mount import FARTHEST_DISPLACEMENT, Run
 

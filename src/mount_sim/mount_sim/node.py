@@ -20,12 +20,11 @@ from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.messages.level_imu import level_imu
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
-from mount_ros.nodes.diagnostics import Verdict
+from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.real_time import Beats, Urgent
-from mount_ros.nodes.sliding_window import SlidingWindow
+from mount_ros.nodes.real_time import LoopTiming, RealTimeThreads
 from mount_ros.private_rclpy import given_at_start
 from mount_sim.car_loop import CarLoop
 from mount_sim.diagnosis import Counted, car_verdict, counted, verdict
@@ -48,7 +47,7 @@ class MountSim(SafeLifecycleNode):
     """Stands in for the hardware: everything behind the CAN connectors of one mount or of several."""
 
     run_time_parameters = frozenset({INJECT})
-    urgent = Urgent(frozenset({'electronics'}))
+    real_time_threads = RealTimeThreads(frozenset({'electronics'}))
 
     def __init__(self, **arguments):
         super().__init__('mount_sim', **arguments)
@@ -100,14 +99,14 @@ class MountSim(SafeLifecycleNode):
         self._patience = self.get_parameter('answer_patience').value
         if self.lockstep and interface == 'virtual':
             # Both ends of the bus are in this process: the answering node works in the data thread.
-            self._path.attend(self._step)
+            self._path.add_poll(self._step)
         else:
             self._thread = threading.Thread(target=self._run, name='electronics', daemon=True)
             self._thread.start()
 
     def deactivate(self) -> None:
         self._ending.set()
-        self._path.leave_work()
+        self._path.remove_polls()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -149,11 +148,11 @@ class MountSim(SafeLifecycleNode):
             response.message = str(error)
         return response
 
-    def beats(self) -> Beats:
+    def loop_timing(self) -> LoopTiming:
         figures = [loop.figures for loop in self._loops.values()]
         if not figures:
-            return Beats()
-        return Beats(min(each.samples for each in figures), max(each.overruns for each in figures))
+            return LoopTiming()
+        return LoopTiming(min(each.samples for each in figures), max(each.overruns for each in figures))
 
     def _open_bus(self, interface: str, name: str) -> can.BusABC:
         """Return the bus of a mount; no two mounts may have the same."""

@@ -2,16 +2,10 @@
 
 from typing import Annotated, NamedTuple
 
-from mount_models.actuator.closing import ClosingMechanics
-from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.coil.ripple import RippleCoil
-from mount_models.engine_body import RigidEngine
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.hydromount import Hydromount
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_RATE, SampleRate
-from mount_models.vehicle import Engine, Vehicle
 from mount_sim.electronics.electronics import ElectronicsParameters
 from mount_sim.electronics.warm_coil import TemperatureCoefficients
 from mount_sim.excitation.scenario import (
@@ -25,9 +19,15 @@ from mount_sim.excitation.scenario import (
     Timeline,
     TipIn,
 )
+from mount_sim.plant.closing import ClosingMechanics
+from mount_sim.plant.engine_body import RigidEngine
+from mount_sim.plant.hydromount import Hydromount
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.places import PLACES, Places
 from mount_sim.plant.plant import Plant
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil
+from mount_sim.plant.vehicle import Engine, Vehicle
 
 
 class SimParameters(NamedTuple):

@@ -2,8 +2,7 @@
 
 import pytest
 
-from mount_ros.nodes.diagnostics import Level, Standing
-from mount_ros.nodes.sliding_window import WINDOW, SlidingWindow
+from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
 from mount_sim.diagnosis import DRIVING, FINISHED, Counted, car_verdict, counted, verdict
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.simulated_mount import BeyondRange, Run
@@ -72,7 +71,7 @@ def test_a_mount_beyond_the_range_of_its_sensor_is_a_warning_with_the_first_mome
 
 @pytest.mark.parametrize('count', ['overruns', 'beyond_range'])
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
-    window, standing, told = SlidingWindow({}), Standing(), []
+    window, standing, told = SlidingWindow({}), ActiveFindings(), []
     run = Run(samples=100_000, excitation_start=0)
     for tenth in range(300):
         found = 600 * min(max(tenth - 49, 0), 5)

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from mount_models.actuator.reluctance import ReluctanceActuator, mean_incremental_inductance
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_sim.electronics.electronics import ElectronicsParameters, Noise, advance_current, read_sensors
+from mount_sim.plant.reluctance import ReluctanceActuator, mean_incremental_inductance
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
 ACTUATOR, COIL = ReluctanceActuator(), RippleCoil()
 DT, GAP = 5e-5, 349e-6

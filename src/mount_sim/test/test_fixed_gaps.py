@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from mount_models.actuator.closing import ClosingMechanics
 from mount_models.actuator.law import checked_force
-from mount_models.actuator.reluctance import ReluctanceActuator, force
 from mount_models.coil.gap import (
     crossing_current_from_gap,
     inductance_from_gap,
 )
-from mount_models.coil.ripple import RippleCoil, incremental_inductance
 from mount_models.specimen import default_specimen
+from mount_sim.plant.closing import ClosingMechanics
+from mount_sim.plant.reluctance import ReluctanceActuator, force
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 from mount_sim.rack.fixed_gaps import (
     RIG_CURRENTS,
     RIG_GAPS,

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from mount_models.elastomer import Elastomer, dynamic_stiffness
-from mount_models.energy import LOSSES, imbalance
 from mount_models.quantity import ParameterError
-from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
 from mount_sim.electronics.electronics import Noise
 from mount_sim.excitation.excitation import Seat
 from mount_sim.excitation.scenario import build_excitation
+from mount_sim.plant.elastomer import Elastomer, dynamic_stiffness
+from mount_sim.plant.energy import LOSSES, imbalance
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.plant import PlantSimulation
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 PERIOD = 125  # samples of 8 Hz
 CHASSIS = {'scenario': 'recorded', 'timeline__duration': 1.0}

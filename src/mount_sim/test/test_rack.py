@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mount_bags.signals.csv_file import read_csv
-from mount_models.actuator.reluctance import force
+from engine_mount.recordings.signals.csv_file import read_csv
+from mount_sim.plant.reluctance import force
 from mount_sim.rack.coil import (
     GAPS,
     Rack,

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
 
 RATE = 104.26  # Hz, of a common motion sensor

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.excitation import Seat
 from mount_sim.excitation.scenario import STEP_TIME, build_excitation

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mount_models.actuator.closing import ClosingError
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.closing import ClosingError
 from mount_sim.plant.plant import TRUTH, Plant, PlantSimulation
 
 

@@ -10,7 +10,7 @@ import foxglove
 from foxglove import Channel, Schema
 from foxglove.websocket import Capability, WebSocketServer
 
-from mount_bags.bag.schemas import schema_text
+from mount_recorder.schemas import schema_text
 from mount_ros.topics import Topic
 from mount_view.feed.feed import FeedError, Message
 

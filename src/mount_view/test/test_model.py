@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import mount_bags
+import engine_mount
 from mount_ros.topics import DISPLACEMENT, EVENT
 from mount_view.feed.feed import FeedError, Message
 from mount_view.feed.recorded import Recorded
@@ -32,7 +32,7 @@ def highest(model, key):
 
 
 def test_no_peak_is_lost_between_the_intervals(drive, shown):
-    recorded = mount_bags.open(drive)
+    recorded = engine_mount.open(drive)
     peak = 1e3 * recorded['displacement']['mount'].max()
     assert np.nanmax([one.extents['displacement'][1] for one in shown.intervals]) == pytest.approx(peak)
     assert np.nanmax([one.extents['setpoint'][1] for one in shown.intervals]) == pytest.approx(3.0)

@@ -52,6 +52,7 @@ def test_the_stream_tells_the_whole_and_then_each_interval(page):
     assert any('displacement' in interval[2] for one in others for interval in one['intervals'])
 
 
+@pytest.mark.slow
 def test_a_viewer_that_does_not_read_holds_up_nobody(page):
     async def both():
         async with aiohttp.ClientSession() as session, session.ws_connect(f'{page.address}stream'):

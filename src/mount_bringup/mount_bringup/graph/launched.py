@@ -10,7 +10,6 @@ from pathlib import Path
 from rclpy.logging import get_logger
 from std_msgs.msg import Float64MultiArray
 
-from mount_bags.run.session import new_session, session_text
 from mount_bringup.graph.bringup import Bringup
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.graph.errors import GraphError, Interrupted
@@ -19,6 +18,7 @@ from mount_bringup.graph.order import LaunchOrder
 from mount_bringup.graph.player import Player
 from mount_bringup.graph.restarts import Loss, NodesLostError, restartable
 from mount_bringup.graph.siblings import Sibling, sibling_of
+from mount_recorder.session import new_session, session_text
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.leaving import end_process
 from mount_ros.nodes.starter import Starter

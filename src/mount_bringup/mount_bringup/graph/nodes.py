@@ -31,7 +31,7 @@ class GraphNode:
         return self.name in {other.name for other in others}
 
 
-RECORDER = GraphNode('mount_recorder', 'mount_bags', 'MountRecorder', ())
+RECORDER = GraphNode('mount_recorder', 'mount_recorder', 'MountRecorder', ())
 DRIVER = GraphNode(
     'mount_driver',
     'mount_driver',

@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
 from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, LaunchArgument
@@ -29,6 +28,7 @@ from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import with_flattened
+from mount_recorder.parameters import RecorderParameters
 from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
 from mount_sim.electronics.faults.schedule import told_faults

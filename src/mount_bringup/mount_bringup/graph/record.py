@@ -13,14 +13,14 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
-from mount_bags.bag.writer import RecordingError
-from mount_bags.node import NAME, MountRecorder
-from mount_bags.recorder.diagnosis import OnFull
-from mount_bags.recorder.parameters import RecorderParameters
-from mount_bags.recorder.snapshot import snapshot_folder
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.ending_signals import ending_signals
 from mount_bringup.keyboard import MARK_KEYS, Keyboard
+from mount_recorder.bag_writer import RecordingError
+from mount_recorder.diagnosis import OnFull
+from mount_recorder.folders import snapshot_folder
+from mount_recorder.node import NAME, MountRecorder
+from mount_recorder.parameters import RecorderParameters
 from mount_ros.nodes.aside import wake
 from mount_ros.nodes.hosting import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic

@@ -12,7 +12,6 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
 from rclpy.parameter import Parameter
 
-from mount_bags.run.folder import next_recording
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphNode
 from mount_bringup.graph.reinitialisation import deactivate
@@ -26,6 +25,7 @@ from mount_bringup.graph.restarts import (
     table_holds,
 )
 from mount_bringup.graph.verdicts import Verdicts
+from mount_recorder.folders import next_recording
 
 _BIRTH_LIMIT = 60.0  # s, chosen
 _ASK_PERIOD = 0.5  # s, chosen: the middleware may still believe in the dead predecessor, and ask that one

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.place import open_run, recording_place
-from mount_bags.run.session import recorded_session, session_content, session_parameters
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.place import open_run, recording_place
+from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
 from mount_bringup.chosen import chosen_control, with_recorded_policy
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.graph.launch_arguments import REPLAY_ARGUMENTS

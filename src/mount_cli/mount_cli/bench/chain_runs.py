@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from mount_bags.run.session import session_text
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.errors import GraphError
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, SIMULATED, GraphSettings, Grouping
@@ -21,6 +20,7 @@ from mount_bringup.sample_rate import with_sample_rate
 from mount_cli.bench.processes import children, memory, processor_time
 from mount_cli.bench.relay import EVENTS, SPIN
 from mount_models.sampling import SAMPLE_RATE
+from mount_recorder.session import session_text
 from mount_ros.environment import prepare_environment
 
 _SETTLING = 2.0  # s, chosen: the simulator tells its figures every second

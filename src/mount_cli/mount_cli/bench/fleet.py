@@ -8,9 +8,9 @@ from dataclasses import replace
 from itertools import islice, pairwise
 from pathlib import Path
 
-from mount_bags.bag.column_parts import column_parts
-from mount_bags.bag.recording import open_recording
-from mount_bags.run.place import recording_hash
+from engine_mount.recordings.bag.column_parts import column_parts
+from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.run.place import recording_hash
 from mount_cli.bench.comparison import Comparison
 from mount_cli.bench.fleet_workers import worker_figures
 from mount_replay.fleet.catalogue.places import Place, places

@@ -10,7 +10,6 @@ import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from mount_bags.bag.writer import BagWriter
 from mount_bringup.chosen import chosen_control
 from mount_cli.bench.comparison import Comparison, in_turn
 from mount_control.controller import ControlLaw, Controller
@@ -18,6 +17,7 @@ from mount_control.force_maker import resample
 from mount_driver.can_library import cantools
 from mount_driver.codec import DATABASE_FILE, Measurement, MountCodec
 from mount_models.sampling import SAMPLE_TIME
+from mount_recorder.bag_writer import BagWriter
 from mount_replay.loop.run import run_core
 from mount_replay.replay import ReplayOrder, replay_without_output
 from mount_ros.messages.scalars import ScalarsLayout

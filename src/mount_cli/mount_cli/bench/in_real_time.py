@@ -5,13 +5,13 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mount_bags.run.session import session_text
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import RECORDER, SIM, SIMULATED, GraphSettings, Grouping
 from mount_bringup.graph.supervisor import Supervisor
 from mount_cli.bench.chain_runs import ChainRun, Place, relay_in_turn, run_graph, run_relay
 from mount_cli.bench.comparison import Comparison
 from mount_cli.bench.relay import EVENTS
+from mount_recorder.session import session_text
 from mount_ros.environment import prepare_environment
 from mount_sim.diagnosis import FINISHED
 

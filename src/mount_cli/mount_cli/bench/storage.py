@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import Writer
 
-import mount_bags
-from mount_bags.bag.writer import BagWriter
-from mount_bags.container.writer import CHUNK_SIZE
+import engine_mount
 from mount_cli.bench.comparison import Comparison, in_turn
 from mount_models.sampling import SAMPLE_TIME
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.mcap_writer import CHUNK_SIZE
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import DISPLACEMENT
 
@@ -69,7 +69,7 @@ def _loading(folder: Path, samples: int, rounds: int) -> Comparison | None:
     store = get_typestore(Stores.ROS2_JAZZY)
 
     def ours() -> None:
-        series = mount_bags.open(recording)[DISPLACEMENT.name]
+        series = engine_mount.open(recording)[DISPLACEMENT.name]
         _require(series.stamps, series['mount'], samples)
 
     def other() -> None:

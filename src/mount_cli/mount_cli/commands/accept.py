@@ -32,10 +32,10 @@ def accept(
     folder: Annotated[Path, typer.Option(help='folder of the references')] = Path('bags/reference'),
 ) -> None:
     """Make a run the reference that `make test` replays; the reason is kept with it."""
-    from mount_bags.compare.accept import ACCEPTED_NAME
-    from mount_bags.compare.accept import accept as accept_run
-    from mount_bags.run.place import open_run
-    from mount_bags.run.versions import versions
+    from engine_mount.recordings.compare.accept import ACCEPTED_NAME
+    from engine_mount.recordings.compare.accept import accept as accept_run
+    from engine_mount.recordings.run.place import open_run
+    from mount_recorder.versions import versions
 
     console = terminal()
     accepted = accept_run(open_run(local(run, console)), reference, reason, folder, versions())

@@ -30,10 +30,10 @@ def audit(
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
-    from mount_bags.audit.audit import audit as audited
-    from mount_bags.audit.losses import losses
-    from mount_bags.audit.report import as_json, as_table, latency_lines, sentences
-    from mount_bags.run.place import open_run
+    from engine_mount.recordings.audit.audit import audit as audited
+    from engine_mount.recordings.audit.losses import losses
+    from engine_mount.recordings.audit.report import as_json, as_table, latency_lines, sentences
+    from engine_mount.recordings.run.place import open_run
     from mount_cli.screen import TerminalScreen
     from mount_report.json_file import write_json
 

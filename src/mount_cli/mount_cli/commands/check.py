@@ -44,7 +44,7 @@ def check(
     domain: Domain = None,
 ) -> None:
     """Drive the manoeuvre suite and tell which limits hold, the worst first."""
-    from mount_bags.run.folder import make_run_folder, new_place
+    from engine_mount.recordings.run.folder import make_run_folder, new_place
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.settings import settings_of_options
     from mount_cli.screen import TerminalScreen

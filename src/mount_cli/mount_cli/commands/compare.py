@@ -56,10 +56,10 @@ def _told(
     a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
-    from mount_bags.compare.compare import compare as compare_recordings
-    from mount_bags.compare.tolerances import Tolerances
-    from mount_bags.compare.words import as_json, as_table, sentences
-    from mount_bags.run.place import open_run
+    from engine_mount.recordings.compare.compare import compare as compare_recordings
+    from engine_mount.recordings.compare.tolerances import Tolerances
+    from engine_mount.recordings.compare.words import as_json, as_table, sentences
+    from engine_mount.recordings.run.place import open_run
     from mount_cli.screen import TerminalScreen
     from mount_report.json_file import write_json
 

@@ -280,7 +280,7 @@ def given_without_file(**options: object) -> None:
 
 
 def _list_faults() -> None:
-    from mount_bags.run.screen import Table
+    from engine_mount.recordings.run.screen import Table
     from mount_cli.screen import TerminalScreen
     from mount_sim.electronics.faults.kinds import FAULTS
 

@@ -58,7 +58,7 @@ def experiment(
 
     A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
     """
-    from mount_bags.run.screen import Table
+    from engine_mount.recordings.run.screen import Table
     from mount_cli.screen import TerminalScreen
     from mount_experiments.registry import experiments_named, listed
 

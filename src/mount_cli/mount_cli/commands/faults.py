@@ -47,8 +47,8 @@ def faults(
     domain: Domain = None,
 ) -> None:
     """Bring every fault into the real graph and tell what the graph does about it."""
-    from mount_bags.run.folder import make_run_folder
-    from mount_bags.run.screen import Table
+    from engine_mount.recordings.run.folder import make_run_folder
+    from engine_mount.recordings.run.screen import Table
     from mount_bringup.graph.domain import chosen_domain
     from mount_cli.screen import TerminalScreen
     from mount_replay.faults.graph import Place

@@ -108,7 +108,7 @@ def info(
 
     Of a file of others, its columns.
     """
-    from mount_bags.run.place import open_run
+    from engine_mount.recordings.run.place import open_run
     from mount_report.json_file import write_json
     from mount_report.recording_facts import recording_facts
     from mount_signals.formats.reading import is_foreign
@@ -148,9 +148,10 @@ def _info_of_columns(place: Path, said: 'Stated', console: Console, json_file: P
 
 
 def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
-    from mount_bags.run.told import duration_of, started_of
-    from mount_bags.run.versions import versions, versions_sentence
+    from engine_mount.recordings.run.told import duration_of, started_of
+    from engine_mount.recordings.run.versions import versions_sentence
     from mount_cli.screen import TerminalScreen
+    from mount_recorder.versions import versions
 
     def tell(label: str, text: str) -> None:
         console.print(f'{label:<20}{text}', soft_wrap=True)

@@ -54,12 +54,12 @@ def record(
     namespace: Namespace = '',
 ) -> None:
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
-    from mount_bags.recorder.parameters import RecorderParameters
-    from mount_bags.run.folder import new_place
+    from engine_mount.recordings.run.folder import new_place
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.record import RecordOrder
     from mount_bringup.graph.record import record as run_record
     from mount_cli.screen import TerminalScreen
+    from mount_recorder.parameters import RecorderParameters
     from mount_replay.drive.recorder_options import checked_recorder, recorder_options
 
     if duration is not None and not duration > 0.0:
@@ -86,10 +86,10 @@ def record(
 
 def _told(folder: Path, console: Console) -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
-    from mount_bags.audit.audit import audit
-    from mount_bags.audit.losses import losses
-    from mount_bags.audit.report import sentences
-    from mount_bags.bag.recording import open_recording
+    from engine_mount.recordings.audit.audit import audit
+    from engine_mount.recordings.audit.losses import losses
+    from engine_mount.recordings.audit.report import sentences
+    from engine_mount.recordings.bag.recording import open_recording
 
     recording = open_recording(folder)
     audits = audit(recording)

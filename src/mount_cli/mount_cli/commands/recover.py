@@ -34,8 +34,8 @@ def recover(
     ] = None,
 ) -> None:
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
-    from mount_bags.edit.recover import recover as recovered
-    from mount_bags.run.place import recording_place
+    from engine_mount.recordings.edit.recover import recover as recovered
+    from engine_mount.recordings.run.place import recording_place
     from mount_cli.screen import progress_bar
 
     console = terminal()

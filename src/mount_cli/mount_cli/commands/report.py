@@ -53,7 +53,7 @@ def report(
 
     Several recordings share the charts. What a recording lacks stands in the page in words.
     """
-    from mount_bags.run.place import open_run
+    from engine_mount.recordings.run.place import open_run
     from mount_cli.screen import TerminalScreen
     from mount_report.pages import default_pictures, write_report
 

@@ -53,7 +53,7 @@ def show(
 
     With `--speed` also which frequencies it holds at that speed.
     """
-    from mount_bags.run.screen import Table
+    from engine_mount.recordings.run.screen import Table
     from mount_cli.screen import TerminalScreen
     from mount_report.json_file import write_json
     from mount_signals.roads.iso8608 import unevenness

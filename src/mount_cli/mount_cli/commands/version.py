@@ -11,7 +11,7 @@ def tell(asked: bool) -> None:
     """Print the versions of project, ROS, Python and numpy, and end; the session of a recording tells all."""
     if not asked:
         return
-    from mount_bags.run.versions import versions
+    from mount_recorder.versions import versions
 
     found = versions()
     distribution = os.environ.get('ROS_DISTRO', 'jazzy')  # without one installed, rclpy is that of this

@@ -5,8 +5,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from mount_bags.recorder.diagnosis import OnFull
-from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.settings import defaults_of_nodes
 from mount_cli.bench.bench import GROUPS
 from mount_control.policy.registry import POLICIES
@@ -17,6 +15,8 @@ from mount_experiments.registry import listed as listed_experiments
 from mount_init.parameters import InitParameters
 from mount_models.damper import DAMPERS
 from mount_models.quantity import quantities
+from mount_recorder.diagnosis import OnFull
+from mount_recorder.parameters import RecorderParameters
 from mount_replay.faults.matrix import MATRIX
 from mount_ros.topics import TOPICS
 from mount_sim.electronics.faults.kinds import FAULTS

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.events.switching_changes import Switching
+from engine_mount.recordings.events.switching_changes import Switching
 from mount_bringup.chosen import policy_of
 from mount_bringup.mount_choice import seat_of
 from mount_experiments.check.measures import BANDS, RACK

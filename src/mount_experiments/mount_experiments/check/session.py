@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mount_bags.run.screen import Bar, Screen
+from engine_mount.recordings.run.screen import Bar, Screen
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.mounts import mounts_of
 from mount_bringup.settings import checked_settings

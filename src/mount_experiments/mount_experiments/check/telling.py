@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
-from mount_bags.run.screen import Screen, Table
+from engine_mount.recordings.run.screen import Screen, Table
 from mount_experiments.check.judgement import Judged, Verdict, passed, verdicts_of, worst_first
 from mount_experiments.check.session import CheckOrder
 from mount_experiments.check.trial import Result

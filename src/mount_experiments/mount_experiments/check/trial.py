@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.audit.audit import audit
-from mount_bags.audit.losses import Losses, losses
-from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import Losses, losses
+from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.errors import GraphError
 from mount_experiments.check.evaluation import Beside, Driven, figures_of
 from mount_experiments.check.suite import Manoeuvre

@@ -19,14 +19,14 @@ from mount_experiments.harness.contract import (
     parameters_of,
 )
 from mount_experiments.harness.drawing import BLUE, RED, family, finish, new_figure
-from mount_models.actuator.reluctance import (
+from mount_models.quantity import Quantity
+from mount_sim.plant.reluctance import (
     MU_0,
     ReluctanceActuator,
     core_field,
     differential_permeability,
 )
-from mount_models.coil.ripple import RippleCoil, penetration_depth
-from mount_models.quantity import Quantity
+from mount_sim.plant.ripple import RippleCoil, penetration_depth
 
 if TYPE_CHECKING:
     from mount_experiments.field_penetration.plate_finite_elements import PlateField

@@ -7,8 +7,8 @@ It belongs to the plant.
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.coil.ripple import RippleCoil, diffusion_time, duty
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil, diffusion_time, duty
 
 FloatArray = npt.NDArray[np.float64]
 

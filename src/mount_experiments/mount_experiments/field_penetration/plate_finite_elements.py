@@ -18,9 +18,9 @@ from scipy.sparse import bmat, csc_matrix
 from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, condense, solve
 
-from mount_models.actuator.reluctance import MU_0, ReluctanceActuator, core_flux_density
-from mount_models.coil.ripple import RippleCoil, duty
 from mount_models.quantity import Quantity
+from mount_sim.plant.reluctance import MU_0, ReluctanceActuator, core_flux_density
+from mount_sim.plant.ripple import RippleCoil, duty
 
 FloatArray = npt.NDArray[np.float64]
 

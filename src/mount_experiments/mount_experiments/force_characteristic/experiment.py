@@ -18,11 +18,11 @@ from mount_experiments.harness.contract import (
 )
 from mount_experiments.harness.drawing import GREY, family, finish, new_figure
 from mount_models.actuator.law import TABLE_1, GapOutsideLaw, check_gap, checked_force
-from mount_models.actuator.reluctance import ReluctanceActuator, core_flux_density
-from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_models.specimen import Specimen, default_specimen
+from mount_sim.plant.reluctance import ReluctanceActuator, core_flux_density
+from mount_sim.plant.ripple import RippleCoil
 from mount_sim.rack.fixed_gaps import RigMeasurements, RigNoise, measure_actuator
 
 NAME = 'force_characteristic'

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from mount_bags.bag.recording import open_recording
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.settings import defaults_of_nodes

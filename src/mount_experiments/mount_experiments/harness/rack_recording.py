@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 from geometry_msgs.msg import WrenchStamped
 
-from mount_bags.bag.writer import BagWriter
-from mount_bags.container.writer import LONG_CHUNK_SIZE
-from mount_bags.run.session import new_session, session_message, session_text
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME_NS
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
+from mount_recorder.session import new_session, session_message, session_text
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import (
     DISPLACEMENT,

@@ -7,8 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.run.session import new_session, session_text
+from engine_mount.recordings.bag.recording import Recording, open_recording
 from mount_experiments.harness.contract import (
     Experiment,
     Holds,
@@ -21,8 +20,6 @@ from mount_experiments.harness.contract import (
 )
 from mount_experiments.harness.drawing import BLUE, RED, family, finish, new_figure
 from mount_experiments.inductance_map import REFERENCE, TITLE
-from mount_models.actuator.closing import ClosingMechanics, closed_state
-from mount_models.actuator.reluctance import ReluctanceActuator
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import (
     crossing_current_from_gap,
@@ -31,10 +28,13 @@ from mount_models.coil.gap import (
     measured_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import Quantity, flattened
 from mount_models.specimen import Specimen, default_specimen
+from mount_recorder.session import new_session, session_text
 from mount_replay.loop.recording import record_core
+from mount_sim.plant.closing import ClosingMechanics, closed_state
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil
 from mount_sim.rack.fixed_gaps import RIG_CURRENTS, RigMeasurements, RigNoise, measure_actuator
 
 FloatArray = npt.NDArray[np.float64]

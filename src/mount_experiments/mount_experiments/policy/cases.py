@@ -9,10 +9,10 @@ from mount_experiments.harness.closed_loop import settings_of_run
 from mount_experiments.harness.contract import Order
 from mount_experiments.policy.runs import PolicyJob
 from mount_experiments.sweep.evaluation import FIRST_FREQUENCY, RATE
-from mount_models.elastomer import Elastomer
 from mount_models.quantity import Quantity
-from mount_models.vehicle import Vehicle
 from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario
+from mount_sim.plant.elastomer import Elastomer
+from mount_sim.plant.vehicle import Vehicle
 
 NAME = 'policy'
 PAPER, CONTINUOUS = 'switched_viscous', 'continuous_viscous'

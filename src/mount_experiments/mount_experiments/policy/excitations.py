@@ -3,7 +3,6 @@
 import functools
 
 from mount_models.arithmetic.series import series_of
-from mount_models.vehicle import Vehicle
 from mount_report.drive.signals import FloatArray
 from mount_signals.roads.inversion import road_of
 from mount_sim.excitation.excitation import Excitation, Seat, idle_force
@@ -14,6 +13,7 @@ from mount_sim.excitation.scenario import (
     RecordedScenario,
     recorded_signal,
 )
+from mount_sim.plant.vehicle import Vehicle
 
 
 @functools.cache

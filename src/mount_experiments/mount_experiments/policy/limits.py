@@ -7,12 +7,12 @@ import numpy as np
 from mount_experiments.policy.runs import first_extremum
 from mount_experiments.sweep.evaluation import FIRST_FREQUENCY, RATE, peak_in
 from mount_models.arithmetic.compiled import compiled
-from mount_models.bands import BELOW_ISOLATION
-from mount_models.road import Gap, Sweep, gap_in_road, sweep_road
 from mount_models.sampling import SAMPLE_TIME
-from mount_models.vehicle import Vehicle, resting_vehicle, vehicle_step
+from mount_replay.bands import BELOW_ISOLATION
 from mount_report.drive.signals import FloatArray
+from mount_sim.excitation.road import Gap, Sweep, gap_in_road, sweep_road
 from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, vehicle_step
 
 _STEPS = round(SAMPLE_TIME / STEP_TIME)
 _SPEED, _GAP_LENGTH, _GAP_SECONDS = 33.0, 1.0, 1.0  # m/s, m, s

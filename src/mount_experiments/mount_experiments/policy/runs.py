@@ -11,9 +11,9 @@ from mount_experiments.policy.learnable import frequency_in_band, friction_scale
 from mount_experiments.recorded_drive.evaluation import rms_in_bands
 from mount_experiments.sensitivity.grid import TruthOnly
 from mount_experiments.sweep.evaluation import peak_and_rms
-from mount_models.bands import BELOW_ISOLATION
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
+from mount_replay.bands import BELOW_ISOLATION
 from mount_replay.loop.run import run_core_into
 from mount_report.drive.signals import FloatArray
 from mount_report.sections.periodic import distortion, harmonics, whole_periods

@@ -11,8 +11,8 @@ from mount_identification.friction.recording import FloatArray, FrictionRecordin
 from mount_identification.friction.steps.sawtooth import StrokeLine, deflection_from_force, stroke_lines
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_response
 from mount_models.friction.simplified import simplified_response
+from mount_sim.plant.friction import full_response
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,11 @@ from mount_experiments.sensitivity.maps import (
 )
 from mount_experiments.sensitivity.reference import DAMPER as THERE
 from mount_experiments.sweep.evaluation import FIRST_FREQUENCY, RATE
-from mount_models.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from mount_models.damper import damper_curve
-from mount_models.hydromount import Hydromount
 from mount_models.quantity import checked
+from mount_replay.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from mount_report.drive.signals import FloatArray
+from mount_sim.plant.hydromount import Hydromount
 
 NAME = 'sensitivity'
 _BENCH_FREQUENCY, _BENCH_AMPLITUDE, _BENCH_SECONDS = 8.0, 1e-3, 4.75

@@ -9,7 +9,7 @@ import numpy as np
 
 from mount_experiments.sensitivity.maps import EVEN_WITHIN, higher, lower
 from mount_experiments.sensitivity.reference import agreement
-from mount_models.bands import ISOLATION_BANDS
+from mount_replay.bands import ISOLATION_BANDS
 
 if TYPE_CHECKING:
     from mount_experiments.sensitivity.maps import Maps, SensitivityParameters

@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 
 from mount_experiments.harness.drawing import finish, new_figure
 from mount_experiments.sensitivity.maps import lower
-from mount_models.bands import ISOLATION_BANDS
+from mount_replay.bands import ISOLATION_BANDS
 
 if TYPE_CHECKING:
     from mount_experiments.sensitivity.maps import Maps

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mount_models.bands import ISOLATION_BANDS
+from mount_replay.bands import ISOLATION_BANDS
 
 if TYPE_CHECKING:
     from mount_experiments.sensitivity.maps import Maps

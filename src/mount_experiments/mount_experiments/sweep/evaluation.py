@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from mount_models.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from mount_models.sampling import SAMPLE_TIME
+from mount_replay.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from mount_report.drive.evaluation import switching
 from mount_report.drive.signals import DriveSignals, FloatArray
 from mount_report.sections.sweep import peak_per_band, rms_per_band

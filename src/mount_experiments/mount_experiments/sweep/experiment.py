@@ -31,9 +31,9 @@ from mount_experiments.sweep.evaluation import (
     SweepRun,
     figures_of,
 )
-from mount_models.bands import ISOLATION_BANDS
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity
+from mount_replay.bands import ISOLATION_BANDS
 
 NAME = 'sweep'
 

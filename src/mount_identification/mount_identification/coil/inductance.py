@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.run.screen import Table
+from engine_mount.recordings.run.screen import Table
 from mount_identification.coil.few_points import levels_of_all
 from mount_identification.coil.gap_calibration import GapCalibration, calibrate_gap_curves
 from mount_identification.coil.gap_point import GapPoint, RippleRecording, in_steps, measured_point

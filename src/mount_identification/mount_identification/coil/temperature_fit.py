@@ -16,12 +16,12 @@ from mount_identification.coil.gap_point import GapPoint
 from mount_models.actuator.law import ForceLaw, checked_force
 from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, ScaledPolynomial, evaluate
 from mount_models.coil.resistance import COPPER_COEFFICIENT
-from mount_models.coil.ripple import RippleCoil, duty, skin_factor
 from mount_models.coil.temperature import (
     CONDUCTIVITY_COEFFICIENT,
     TemperatureCompensation,
     check_compensation,
 )
+from mount_sim.plant.ripple import RippleCoil, duty, skin_factor
 
 FloatArray = npt.NDArray[np.float64]
 

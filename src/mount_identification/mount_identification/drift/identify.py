@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.place import open_run
-from mount_bags.run.session import recorded_session, session_content
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.run.session import recorded_session, session_content
 from mount_identification.drift.law import FEWEST, Drift, DriftError, fitted_drift
 from mount_identification.friction.files import TOPICS, read_recording
 from mount_models.specimen import Specimen

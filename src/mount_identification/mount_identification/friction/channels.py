@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mount_bags.signals.table import Table
+from engine_mount.recordings.signals.table import Table
 from mount_identification.friction.recording import FloatArray, IdentificationError
 from mount_identification.rack.measured_table import MeasuredTable
 from mount_identification.rack.unit_words import unit_word

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from mount_bags.run.place import recording_hash
+from engine_mount.recordings.run.place import recording_hash
 from mount_identification.friction.files import read_recording
 from mount_identification.friction.found import Identification, IdentifyOrder
 from mount_identification.friction.kind import RAMP, SAWTOOTH, recognised

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_identification.rack.measured_table import MeasuredTable
 from mount_identification.rack.unit_words import unit_word
 from mount_signals.formats.content import Stated

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.run.place import open_run
+from engine_mount.recordings.run.place import open_run
 from mount_identification.rack.columns import (
     CURRENT,
     FORCE,

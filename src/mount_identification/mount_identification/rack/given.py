@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.place import open_run, recording_hash
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.place import open_run, recording_hash
 from mount_identification.rack.columns import RackRecordingError
 from mount_identification.rack.measured_table import in_topics
 from mount_ros.topics import COIL_RIPPLE

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.run.place import recording_place
-from mount_bags.signals.loading import is_recording
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.run.place import recording_place
+from engine_mount.recordings.signals.loading import is_recording
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import FloatArray, Measured, MeasuredColumn, TimeBase, found
 from mount_signals.formats.reading import headings, read

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.place import open_run
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.place import open_run
 from mount_identification.actuator.points import gap_groups
 from mount_identification.coil.gap_point import RippleRecording
 from mount_identification.rack.columns import (

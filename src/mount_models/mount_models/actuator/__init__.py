@@ -1,1 +1,1 @@
-"""The electromagnet: the controller's force law and its fit, and the simulated actuator."""
+"""The electromagnet as the controller knows it: its force law."""

@@ -1,1 +1,1 @@
-"""The coil's switching ripple: what it tells of the air gap, and the simulated coil."""
+"""The coil's switching ripple, and what it tells of the air gap."""

@@ -1,1 +1,1 @@
-"""Dry friction of the mount's pads: coefficient, simplified model (control), full model (plant)."""
+"""Dry friction of the mount's pads: coefficient and simplified model."""

@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mount_bags.recorder.parameters import RecorderParameters, split_of
-from mount_bags.run.folder import RunFolder, make_run_folder
-from mount_bags.run.screen import Screen
-from mount_bags.run.session import new_session, session_text
+from engine_mount.recordings.run.folder import RunFolder, make_run_folder
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import can_port, domain_locks
 from mount_bringup.graph.ending_signals import ending_signals
@@ -32,6 +30,8 @@ from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
+from mount_recorder.parameters import RecorderParameters, split_of
+from mount_recorder.session import new_session, session_text
 from mount_replay.drive.brought import FOLDER, Brought, provenance, written
 from mount_replay.drive.happenings import Happenings, line
 from mount_replay.drive.preflight import preflight

@@ -4,9 +4,9 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from mount_bags.events.automatic_marks import MarkKind, Ration, of_mount
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphNode
 from mount_bringup.graph.verdicts import Witness
+from mount_recorder.automatic_marks import MarkKind, Ration, of_mount
 from mount_ros.messages.event import BY_HAND, Mark
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.topics import DISPLACEMENT

@@ -1,14 +1,13 @@
 """Refuses an order that a node would refuse, before any node is started."""
 
-from mount_bags.recorder.parameters import RecorderParameters
 from mount_bringup.chosen import Parameters
 from mount_bringup.mount_choice import check_control_of_mount
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_bringup.sample_rate import check_sample_rate
 from mount_control.settings import check_effect
 from mount_driver.parameters import DriverParameters
-from mount_models.actuator.closing import checked_closing
 from mount_models.quantity import with_flattened
+from mount_recorder.parameters import RecorderParameters
 from mount_replay.drive.recorder_options import checked_recorder
 from mount_replay.loop.chain import CoreChain
 from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
@@ -17,6 +16,7 @@ from mount_sim.excitation.scenario import build_excitation
 from mount_sim.excitation.shaking import steps_of_sample
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant
+from mount_sim.plant.closing import checked_closing
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
 

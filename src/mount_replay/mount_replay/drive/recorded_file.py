@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.signals.even_grid import evenly_spaced
-from mount_bags.signals.signal import Signal
+from engine_mount.recordings.signals.even_grid import evenly_spaced
+from engine_mount.recordings.signals.signal import Signal
 from mount_replay.drive.brought import Brought
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mount_bags.bag.split import duration_in_nanoseconds, split_rule
-from mount_bags.events.automatic_marks import mark_kinds
-from mount_bags.recorder.diagnosis import OnFull
-from mount_bags.recorder.parameters import RecorderParameters, split_of
 from mount_models.quantity import ParameterError, with_flattened
+from mount_recorder.automatic_marks import mark_kinds
+from mount_recorder.diagnosis import OnFull
+from mount_recorder.parameters import RecorderParameters, split_of
+from mount_recorder.split import duration_in_nanoseconds, split_rule
 
 
 def recorder_options(split: Sequence[str], snapshot: str, snapshot_after: str = '') -> dict[str, Any]:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-import mount_bags
-from mount_bags import ReadingError
+import engine_mount
+from engine_mount.recordings import ReadingError
 from mount_models.sampling import SAMPLE_TIME_NS
 
 _SLACK = 1.0  # s: from the stamp of a sample to the log time of its neighbour
@@ -46,7 +46,7 @@ def _recordings(folder: Path) -> list[Path]:
 def _truth(place: Path) -> np.ndarray | None:
     """Return the stamps (ns) of `sim/truth`; None where nothing can be read."""
     try:
-        recording = mount_bags.open(place)
+        recording = engine_mount.open(place)
         return recording['sim/truth'].stamps if 'sim/truth' in recording else np.empty(0, np.int64)
     except (ReadingError, KeyError):
         return None

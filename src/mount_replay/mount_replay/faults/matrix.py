@@ -80,8 +80,8 @@ def _hanging(name: str, *options: str) -> FaultCase:
     """A step of the control does not come to its end for a while; `options` of the graph."""
     meaning = f'a control step lasts 0.5 s{" in a composed graph" if options else ""}'
     injection = ControlHangs(0.5)
-    words, lasts = 'no setpoint', 0.4
-    return FaultCase(name, meaning, injection, _WHILE, words, lasts, silent=True, options=options, shim=True)
+    rest = {'silent': True, 'options': options, 'shim': True, 'third': True}
+    return FaultCase(name, meaning, injection, _WHILE, 'no setpoint', lasts=0.4, **rest)
 
 
 def _lost(node: str, reaction: Reaction, **options) -> FaultCase:

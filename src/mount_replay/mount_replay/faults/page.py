@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from mount_bags.run.screen import Table
+from engine_mount.recordings.run.screen import Table
 from mount_replay.faults.fault import SAFE, FaultCase, Reaction
 from mount_replay.faults.outcome import AFTER_DETECTION, AFTER_OCCURRENCE, Outcome
 

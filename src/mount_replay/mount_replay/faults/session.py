@@ -20,8 +20,8 @@ from mount_replay.faults.kept import lost_while
 from mount_replay.faults.observers import observers
 from mount_replay.faults.outcome import Outcome, tells
 from mount_replay.faults.trial import tried
+from mount_ros.nodes.diagnostics import WINDOW
 from mount_ros.nodes.hosting import ros_context
-from mount_ros.nodes.sliding_window import WINDOW
 
 _TRIALS = 2  # chosen: a machine with other work is late now and then
 _PATIENCE = WINDOW + 4.0  # s, chosen: for damping without complaint in a graph that has seen faults

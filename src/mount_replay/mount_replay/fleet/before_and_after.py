@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.run.place import open_mount
+from engine_mount.recordings.run.place import open_mount
 from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from mount_replay.fleet.what_if.closed_loop import both_motions
 from mount_replay.fleet.what_if.compared import recorded_in

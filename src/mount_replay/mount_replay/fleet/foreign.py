@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.place import open_run
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.place import open_run
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading
 from mount_signals.formats.reading import headings, is_foreign

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.run.place import open_run
-from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
-from mount_bags.signals.plausibility import check_size
-from mount_bags.signals.signal import SECOND
+from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.recordings.signals.plausibility import check_size
+from engine_mount.recordings.signals.signal import SECOND
 from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters
 from mount_init.parameters import InitParameters
-from mount_models.actuator.closing import ClosingMechanics
 from mount_models.arithmetic.averages import mean
 from mount_models.force_table import contact_force, current_force_table, offset_current
 from mount_models.quantity import with_flattened
@@ -35,6 +34,7 @@ from mount_signals.units.columns import place, read_chosen
 from mount_signals.units.mapping import MEAN, Mapping, checked_scale, mapping_in_file, with_options
 from mount_signals.units.signals import ChosenSignal, chosen_signals
 from mount_sim.excitation.recorded import LONGEST_GAP
+from mount_sim.plant.closing import ClosingMechanics
 
 DEFAULT_TABLE = 'default'
 _FIELDS = (DISPLACEMENT, ENGINE, CHASSIS)

@@ -6,9 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.bag.recording import Recording
-from mount_bags.messages.series import Payloads
-from mount_bags.run.session import SessionError, recorded_session, session_content, session_parameters
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.messages.series import Payloads
+from engine_mount.recordings.run.session import (
+    SessionError,
+    recorded_session,
+    session_content,
+    session_parameters,
+)
 from mount_bringup.chosen import control_parameters, with_recorded_policy
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_models.sampling import SAMPLE_TIME_NS

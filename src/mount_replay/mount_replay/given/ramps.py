@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import Recording
+from engine_mount.recordings.bag.recording import Recording
 from mount_bringup.chosen import chosen_specimen
 from mount_init.coil_temperature import TemperatureReadings
 from mount_init.initialisation import Initialisation

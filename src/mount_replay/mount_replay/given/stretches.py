@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.column_parts import ColumnPart, column_parts
-from mount_bags.bag.recording import Recording
+from engine_mount.recordings.bag.column_parts import ColumnPart, column_parts
+from engine_mount.recordings.bag.recording import Recording
 from mount_control.settings import ControlParameters
 from mount_models.sampling import sample_time_ns
 from mount_replay.given.input import has

@@ -11,14 +11,15 @@ import typer
 from numpy.typing import NDArray
 from rclpy.node import Node
 
-from mount_bags.bag.recording import Recording
-from mount_bags.messages.series import Payloads, registered_topic
-from mount_bags.run.place import open_mount
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.messages.series import Payloads
+from engine_mount.recordings.run.place import open_mount
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
 from mount_bringup.keyboard import Keyboard
+from mount_recorder.chunk_groups import registered_topic
 from mount_replay.given.input import Notes, ReplayError, has, recorded_parameters
 from mount_replay.given.ramps import MeasuredGap, measured_gaps
 from mount_replay.live.live_control import LiveControl

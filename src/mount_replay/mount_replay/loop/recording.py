@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.split import WHOLE, SplitRule
-from mount_bags.bag.writer import BagWriter
-from mount_bags.container.writer import LONG_CHUNK_SIZE
-from mount_bags.run.session import session_message
 from mount_bringup.chosen import Parameters
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
+from mount_recorder.session import session_message
+from mount_recorder.split import WHOLE, SplitRule
 from mount_replay.loop.car import run_car_into
 from mount_replay.loop.messages import Columns, CoreMessages
 from mount_replay.loop.run import CoreOutcome, coil_temperature, run_core

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.container.scratch import put_away
+from engine_mount.recordings.container.scratch import put_away
 from mount_report.drawing.chart import Array, Chart, Curve, Dots, Panel
 from mount_report.drawing.style import SPAN_COLOUR
 

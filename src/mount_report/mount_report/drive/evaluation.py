@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.audit.audit import TopicAudit
-from mount_bags.bag.recording import Recording
-from mount_bags.events.switching_changes import Switching, switching_times
+from engine_mount.recordings.audit.audit import TopicAudit
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.events.switching_changes import Switching, switching_times
 from mount_control.delay import LOOP_DELAY, delay_at
 from mount_control.policy.contract import Policy
 from mount_report.drive.signals import DriveSignals, Seen

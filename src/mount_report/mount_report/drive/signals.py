@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import Recording
-from mount_bags.container.scratch import kept
-from mount_bags.messages.compact_times import Times, each_once, is_in
-from mount_bags.run.session import recorded_sample_rate
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.container.scratch import kept
+from engine_mount.recordings.messages.compact_times import Times, each_once, is_in
+from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
 

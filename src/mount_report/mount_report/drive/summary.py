@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.audit.audit import TopicAudit
-from mount_bags.audit.losses import Losses
-from mount_bags.audit.peak_current import peak_current
-from mount_bags.bag.recording import Recording
-from mount_bags.events.switching_changes import switching_times
-from mount_bags.recorder.parameters import RecorderParameters
-from mount_bags.run.screen import Screen, Table
+from engine_mount.recordings.audit.audit import TopicAudit
+from engine_mount.recordings.audit.losses import Losses
+from engine_mount.recordings.audit.peak_current import peak_current
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.events.switching_changes import switching_times
+from engine_mount.recordings.run.screen import Screen, Table
 from mount_bringup.chosen import Parameters, policy_of
 from mount_bringup.graph.restarts import Restart
 from mount_bringup.mount_choice import seat_of
+from mount_recorder.parameters import RecorderParameters
 from mount_report.drive.evaluation import tracking_error
 from mount_report.drive.signals import DriveSignals, excitation_stamp
 from mount_sim.plant.mounts import without_friction

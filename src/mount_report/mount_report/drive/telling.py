@@ -5,16 +5,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mount_bags.audit.audit import audit
-from mount_bags.audit.losses import losses
-from mount_bags.audit.report import as_table, sentences
-from mount_bags.bag.recording import Recording, open_recording
-from mount_bags.recorder.parameters import RecorderParameters
-from mount_bags.recorder.snapshot import saved_snapshots
-from mount_bags.run.folder import RunFolder, recordings_of
-from mount_bags.run.screen import Screen
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit.report import as_table, sentences
+from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.run.folder import RunFolder
+from engine_mount.recordings.run.screen import Screen
 from mount_bringup.chosen import Parameters, policy_of
 from mount_bringup.mounts import mounts_of, settings_of_mounts
+from mount_recorder.folders import recordings_of, saved_snapshots
+from mount_recorder.parameters import RecorderParameters
 from mount_report.drive.evaluation import levels_of, samples_at_the_ends
 from mount_report.drive.signals import DriveSignals, load_drive
 from mount_report.drive.summary import (

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.messages.series import SeriesError
+from engine_mount.recordings.bag.recording import ReadingError, Recording
+from engine_mount.recordings.messages.series import SeriesError
 from mount_bringup.chosen import Parameters
 from mount_bringup.mounts import mounts_of
 from mount_models.quantity import with_flattened

@@ -9,7 +9,7 @@ from itertools import cycle
 
 import numpy as np
 
-from mount_bags.container.scratch import kept
+from engine_mount.recordings.container.scratch import kept
 from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Chart, Curve, Dots, Level, Panel, Span
 from mount_report.drawing.style import COLOUR_OF, COLOURS, DIFFERENCE_COLOUR, UNDAMPED_COLOUR
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mount_bags.audit.peak_current import peak_current
-from mount_bags.compare.quantity_text import quantity_text
-from mount_bags.run.session import session_values
+from engine_mount.recordings.audit.peak_current import peak_current
+from engine_mount.recordings.compare.quantity_text import quantity_text
+from engine_mount.recordings.run.session import session_values
 from mount_report.sections.run_sections import HEAD_OF_SESSION
 from mount_report.sections.section import Cell, Link, Section, Table
 from mount_report.sections.subject import Subject

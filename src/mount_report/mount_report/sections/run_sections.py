@@ -5,12 +5,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mount_bags.audit.report import sentences as audit_sentences
-from mount_bags.compare.quantity_text import quantity_text, time_text
-from mount_bags.compare.words import by_importance
-from mount_bags.compare.words import sentences as comparison_sentences
-from mount_bags.container.scratch import put_away
-from mount_bags.run.session import session_values
+from engine_mount.recordings.audit.report import sentences as audit_sentences
+from engine_mount.recordings.compare.quantity_text import quantity_text, time_text
+from engine_mount.recordings.compare.words import by_importance
+from engine_mount.recordings.compare.words import sentences as comparison_sentences
+from engine_mount.recordings.container.scratch import put_away
+from engine_mount.recordings.run.session import session_values
 from mount_report.sections import charts
 from mount_report.sections.charts import Named
 from mount_report.sections.coil_load import CoilLoad, coil_load

@@ -6,8 +6,8 @@ from itertools import chain
 
 import numpy as np
 
-from mount_bags.compare.quantity_text import quantity_text
-from mount_bags.container.scratch import put_away
+from engine_mount.recordings.compare.quantity_text import quantity_text
+from engine_mount.recordings.container.scratch import put_away
 from mount_report.drawing.chart import Array
 from mount_report.sections import charts, periodic
 from mount_report.sections.charts import Levels, Named

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mount_bags.audit.audit import TopicAudit, audit
-from mount_bags.audit.losses import Losses, losses
-from mount_bags.compare.compare import Comparison
+from engine_mount.recordings.audit.audit import TopicAudit, audit
+from engine_mount.recordings.audit.losses import Losses, losses
+from engine_mount.recordings.compare.compare import Comparison
 from mount_report.drawing.chart import Array
 from mount_report.sections.charts import Levels
 from mount_report.sections.periodic import Sine, dominant_sine

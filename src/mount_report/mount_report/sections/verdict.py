@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mount_bags.compare.quantity_text import quantity_text, time_text
+from engine_mount.recordings.compare.quantity_text import quantity_text, time_text
 from mount_report.drawing.chart import Array
 from mount_report.sections.section import BAD, GOOD, LOOK, UNKNOWN, Cell, Finding, Link
 from mount_report.sections.subject import Subject

@@ -24,7 +24,7 @@ def verdicts_of(raw: bytes) -> list[ToldVerdict]:
 
 
 def verdicts_in(report: Any) -> list[ToldVerdict]:
-    """Return the verdicts in a `DiagnosticArray`, as rclpy or as `mount_bags` has decoded it."""
+    """Return the verdicts in a `DiagnosticArray`, as rclpy or as `engine_mount.recordings` has decoded it."""
     return [
         ToldVerdict(
             status.name,

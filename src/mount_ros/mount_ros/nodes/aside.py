@@ -17,7 +17,7 @@ def wake(executor: Executor) -> None:
     executor.create_task(_nothing)
 
 
-def done_aside(executor: Executor, work: Callable[[], T], name: str) -> T:
+def run_in_thread(executor: Executor, work: Callable[[], T], name: str) -> T:
     """Return what `work` returns, done in a thread `name`, while `executor` serves in this one.
 
     It is called in a callback of the executor. Nothing of the same callback group is served meanwhile.

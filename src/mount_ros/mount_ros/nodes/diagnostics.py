@@ -7,11 +7,13 @@ A thread of its own judges ten times a second. By a timer of the node's executor
 milliseconds of Python (measured), which the executor takes to find out what is ready.
 """
 
+import math
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -19,8 +21,17 @@ from rclpy.node import Node
 from mount_ros.qos import publisher_qos
 from mount_ros.topics import DIAGNOSTICS
 
+WINDOW = 10.0
+"""s, chosen: over it counts and shares that raise a warning are taken.
+
+Long enough that whoever looks at `/diagnostics`, which are repeated each second, sees what lasted for a
+moment; short enough that a warning tells of the present and not of the start.
+"""
 _PERIOD = 0.1  # s, chosen
 _BEATS_TO_REPEAT = 10  # 1 Hz
+
+
+Counted = TypeVar('Counted')
 
 
 class Level(IntEnum):
@@ -69,7 +80,7 @@ def _joined(sentences: Sequence[str]) -> str:
     return ' '.join(text if text.endswith('?') else f'{text}.' for text in sentences).removesuffix('.')
 
 
-class Standing:
+class ActiveFindings:
     """What was found and still stands, each in the words in which it was told first."""
 
     def __init__(self) -> None:
@@ -80,6 +91,27 @@ class Standing:
         before = self._told
         self._told = {each[:2]: before.get(each[:2], each) for each in verdict.findings}
         return verdict_on(self._told.values(), verdict.sentence, verdict.figures) if self._told else verdict
+
+
+class SlidingWindow(Generic[Counted]):
+    """Keeps what had been counted at each look of the last `duration` s; any thread may ask.
+
+    `initial` is what had been counted when counting began.
+    """
+
+    def __init__(self, initial: Counted, duration: float = WINDOW):
+        self._duration = duration
+        self._looks: deque[tuple[float, Counted]] = deque([(-math.inf, initial)])
+        self._guard = threading.Lock()
+
+    def earlier(self, now: float, counted: Counted) -> Counted:
+        """Note what is counted `now` (s, steady clock); return what was a window ago, or in the beginning."""
+        with self._guard:
+            looks = self._looks
+            looks.append((now, counted))
+            while len(looks) > 1 and now - looks[1][0] >= self._duration:
+                looks.popleft()
+            return looks[0][1]
 
 
 class Diagnostics:

@@ -10,14 +10,19 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
-from mount_ros.nodes.aside import done_aside
-from mount_ros.nodes.declaring import DeclaringNode
-from mount_ros.nodes.diagnostics import Diagnostics, Finding, Level, Standing, Verdict, verdict_on
-from mount_ros.nodes.parameter_gate import Change, ParameterGate
-from mount_ros.nodes.parameters import refuse_sim_time, refuse_unknown
-from mount_ros.nodes.real_time import Beats, RealTime, Urgent
-from mount_ros.nodes.sliding_window import SlidingWindow
-from mount_ros.writers import WriterWatch
+from mount_ros.nodes.aside import run_in_thread
+from mount_ros.nodes.diagnostics import (
+    ActiveFindings,
+    Diagnostics,
+    Finding,
+    Level,
+    SlidingWindow,
+    Verdict,
+    verdict_on,
+)
+from mount_ros.nodes.parameters import Change, DeclaringNode, ParameterGate, refuse_sim_time, refuse_unknown
+from mount_ros.nodes.real_time import LoopTiming, RealTime, RealTimeThreads
+from mount_ros.publishers import PublisherWatch
 
 _LOCKSTEP = (
     'lockstep',
@@ -61,18 +66,18 @@ class SafeLifecycleNode(DeclaringNode):
     """
 
     run_time_parameters: frozenset[str] = frozenset()
-    """Names of the parameters that can be set on the configured node: `check_parameters`, `take_changes`."""
+    """Names of the parameters that can be set on the configured node: `check_parameters`, `apply_changes`."""
 
-    urgent = Urgent(frozenset({'data'}))
+    real_time_threads = RealTimeThreads(frozenset({'data'}))
     """Its threads that work in real time while it is active."""
 
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
         self._registered_name = name  # its own one may have been remapped
-        self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.take_changes)
+        self._gate = ParameterGate(self, self.run_time_parameters, self.check_parameters, self.apply_changes)
         self._lockstep = bool(self.declare_parameter(*_LOCKSTEP).value)
         self.data_path: ServedPath | None = None
-        self._writers: WriterWatch | None = None  # of what the data path hears
+        self._publisher_watch: PublisherWatch | None = None  # of what the data path hears
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
         self.real_time = RealTime(0)  # that of the process, if it has one
         self.after_configure: Callable[[], None] = _nothing  # what a process wants done then
@@ -80,7 +85,7 @@ class SafeLifecycleNode(DeclaringNode):
         self.ending = threading.Event()  # set when the process is told to end: long work must look at it
         self._active = False
         self._refusal = ''
-        self._standing = Standing()
+        self._standing = ActiveFindings()
         self._path_errors = SlidingWindow(0)
         self._diagnostics = Diagnostics(self, self._look_and_judge)
         self._diagnostics.start()
@@ -102,10 +107,10 @@ class SafeLifecycleNode(DeclaringNode):
     def check_parameters(self, values: Mapping[str, Any]) -> None:
         """Raise a `ValueError` if the configured node could not go on with these values, {name: value}."""
 
-    def take_changes(self, changes: Mapping[str, Change]) -> None:
+    def apply_changes(self, changes: Mapping[str, Change]) -> None:
         """Go on with the parameters as they are now; `changes` were set while the node was configured."""
 
-    def heed_writers(self, foreign: str, doubt: str) -> None:
+    def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
         """Stay at 0 A: for good if `foreign` says that another node publishes, while `doubt` says it may.
 
         Both are sentences, empty where there is nothing to say. Called when they change, in any thread.
@@ -115,9 +120,9 @@ class SafeLifecycleNode(DeclaringNode):
         """Return the verdict on the active node; must be quick and must not block."""
         return Verdict(Level.OK, 'active')
 
-    def beats(self) -> Beats:
+    def loop_timing(self) -> LoopTiming:
         """Return how a loop with a clock of its own has kept its time since the activation."""
-        return Beats()
+        return LoopTiming()
 
     # State.
 
@@ -138,28 +143,28 @@ class SafeLifecycleNode(DeclaringNode):
 
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
-        thread = self.data_thread or DataThread(self.context, self.tell_failure)
+        thread = self.data_thread or DataThread(self.context, self.report_failure)
         path = DataPath(
             self,
             lockstep=self.lockstep,
             thread=thread,
-            on_writers=self.heed_writers,
+            on_conflict=self.on_publisher_conflict,
             name=self._registered_name,
         )
-        self.data_path, self._writers = path, path.writers
+        self.data_path, self._publisher_watch = path, path.publisher_watch
         return path
 
-    def tell_writers(self) -> None:
-        """Call `heed_writers` with what holds now: for a node that has begun to heed it."""
-        if self._writers is not None:
-            self._writers.deliver()
+    def report_publisher_conflict(self) -> None:
+        """Call `on_publisher_conflict` with what holds now: for a node that has begun to heed it."""
+        if self._publisher_watch is not None:
+            self._publisher_watch.deliver()
 
-    def wait_for_own_writers(self) -> None:
-        """Return when only their own writers publish what this node hears; raises `ForeignWriterError`."""
-        if self._writers is not None:
-            self._writers.wait_for_own(self.ending)
+    def wait_for_sole_publishers(self) -> None:
+        """Return when topics have their own writers alone, or raise `PublisherConflictError`."""
+        if self._publisher_watch is not None:
+            self._publisher_watch.wait_for_own(self.ending)
 
-    def tell_failure(self, sentence: str) -> None:
+    def report_failure(self, sentence: str) -> None:
         """Say that a thread of the node has ended by itself; the process ends the node then."""
         self.get_logger().fatal(sentence)
         self.after_failure()
@@ -219,7 +224,7 @@ class SafeLifecycleNode(DeclaringNode):
     def serve_transition(self, answer: Callable[[], Any]) -> Any:
         # An activation may take seconds, and parameters and state shall be told meanwhile.
         assert self.executor is not None
-        return done_aside(self.executor, answer, f'{self.get_name()} transition')
+        return run_in_thread(self.executor, answer, f'{self.get_name()} transition')
 
     def change_state(self, transition_id: int) -> TransitionCallbackReturn:
         # rclpy lets a transition that is not valid in the present state end the process with an
@@ -259,7 +264,7 @@ class SafeLifecycleNode(DeclaringNode):
     def _release(self) -> None:
         self._gate.open()
         self._make_safe(self.cleanup)
-        path, self.data_path, self._writers = self.data_path, None, None
+        path, self.data_path, self._publisher_watch = self.data_path, None, None
         if path is not None:
             self._make_safe(path.stop)
 
@@ -270,16 +275,16 @@ class SafeLifecycleNode(DeclaringNode):
             self.get_logger().error(f'{step.__name__} failed: {type(error).__name__}: {error}')
 
     def _look_and_judge(self) -> Verdict:
-        writers = self._writers
-        if writers is not None:
-            writers.look()
+        watch = self._publisher_watch
+        if watch is not None:
+            watch.look()
         return self._present_verdict()
 
     def _present_verdict(self) -> Verdict:
-        path, writers = self.data_path, self._writers
+        path, watch = self.data_path, self._publisher_watch
         verdict = self._verdict_without_path()
         errors = self._errors_of(path) if path is not None else []
-        other = (writers.foreign or writers.doubt) if writers is not None else ''
+        other = (watch.confirmed or watch.suspected) if watch is not None else ''
         if other and verdict.level is Level.OK:
             verdict = Verdict(Level.WARN, other, verdict.figures)
         if path is not None and path.failure:

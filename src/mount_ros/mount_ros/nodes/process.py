@@ -45,12 +45,12 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     real_time = RealTime(given_priority() or inherited)
     prepare_environment()
     nodes = _created(creates, args)
-    data_thread = DataThread(nodes[0].context, nodes[0].tell_failure)
+    data_thread = DataThread(nodes[0].context, nodes[0].report_failure)
     over = _Ending()
     for node in nodes:
         node.data_thread = data_thread
         node.after_configure = _freeze
-        node.after_failure = over.tell_failure
+        node.after_failure = over.report_failure
         node.real_time = real_time
     logger = nodes[0].get_logger()
     if inherited:
@@ -133,7 +133,7 @@ class _Ending:
         with contextlib.suppress(BlockingIOError):  # full: it has been told often enough
             os.write(self._write, b'.')
 
-    def tell_failure(self) -> None:
+    def report_failure(self) -> None:
         self.failed = True
         self.tell()
 
@@ -184,6 +184,6 @@ class _Service:
         except Exception as error:
             # The border of the process: without it the nodes would not be closed.
             traceback.print_exc()
-            self._node.tell_failure(f'{type(error).__name__}: {error}')
+            self._node.report_failure(f'{type(error).__name__}: {error}')
         finally:
             self._over.tell()

@@ -52,14 +52,14 @@ _ORDINARY = (
 )
 
 
-class Beats(NamedTuple):
+class LoopTiming(NamedTuple):
     """Periods of a loop with a clock of its own, and how many of them were over when its work was done."""
 
     periods: int = 0
     missed: int = 0
 
 
-class Urgent(NamedTuple):
+class RealTimeThreads(NamedTuple):
     """The threads of a node that work in real time while it is active, besides those of the middleware."""
 
     names: frozenset[str]
@@ -70,9 +70,9 @@ class Urgent(NamedTuple):
 class RealTimeLoop(Protocol):
     """A node with threads that work in real time."""
 
-    urgent: Urgent
+    real_time_threads: RealTimeThreads
 
-    def beats(self) -> Beats:
+    def loop_timing(self) -> LoopTiming:
         """Return how its loop has kept its time so far; zeros where it has no clock of its own."""
 
 
@@ -97,7 +97,7 @@ class RealTime:
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
         self._past: deque[_Look] = deque(maxlen=_WINDOW + 1)
-        self._late: list[Beats] = []  # of each of the last looks since which most periods were missed
+        self._late: list[LoopTiming] = []  # of each of the last looks since which most periods were missed
         self._waiting: tuple[float, int] = (math.nan, 0)  # processor time of the ordinary thread; periods
 
     @property
@@ -139,7 +139,7 @@ class RealTime:
             if not self._loops or self._stepped_down:
                 return ''
             self._give()
-            self._past.append(_Look(self._clock(), self._used(), self._beats()))
+            self._past.append(_Look(self._clock(), self._used(), self._loop_timing()))
             return self._give_back(self._overuse() or self._starved() or self._missed())
 
     def ran_without_sleep(self) -> str:
@@ -172,9 +172,9 @@ class RealTime:
 
     def _wanted(self) -> dict[int, int]:
         """Return {thread: priority}."""
-        own = frozenset[str]().union(*(loop.urgent.names for loop in self._loops))
+        own = frozenset[str]().union(*(loop.real_time_threads.names for loop in self._loops))
         wanted = {}
-        if any(loop.urgent.interpreter for loop in self._loops):
+        if any(loop.real_time_threads.interpreter for loop in self._loops):
             wanted = dict.fromkeys(self._threads.of_python(), max(1, self.priority - 1))
         for number, name in self._threads.names().items():
             if name in own or _MIDDLEWARE.fullmatch(name):
@@ -199,9 +199,9 @@ class RealTime:
     def _used(self) -> dict[int, float]:
         return {number: self._threads.processor_time(number) for number in self._held}
 
-    def _beats(self) -> Beats:
-        every = [loop.beats() for loop in self._loops]
-        return Beats(sum(beats.periods for beats in every), sum(beats.missed for beats in every))
+    def _loop_timing(self) -> LoopTiming:
+        every = [loop.loop_timing() for loop in self._loops]
+        return LoopTiming(sum(timing.periods for timing in every), sum(timing.missed for timing in every))
 
     def _overuse(self) -> str:
         if len(self._past) <= _WINDOW:
@@ -232,8 +232,8 @@ class RealTime:
         if len(self._past) < 2:
             self._late = []
             return ''
-        before, now = self._past[-2].beats, self._past[-1].beats
-        lately = Beats(now.periods - before.periods, now.missed - before.missed)
+        before, now = self._past[-2].timing, self._past[-1].timing
+        lately = LoopTiming(now.periods - before.periods, now.missed - before.missed)
         self._late = [*self._late, lately] if lately.missed > _MISSED * lately.periods else []
         if len(self._late) < _LATE:
             return ''
@@ -245,7 +245,7 @@ class RealTime:
 class _Look(NamedTuple):
     time: float  # s
     used: dict[int, float]  # processor time of each thread that has the priority, s
-    beats: Beats
+    timing: LoopTiming
 
 
 def bound(soft: float, hard: float) -> None:

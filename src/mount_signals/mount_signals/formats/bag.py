@@ -1,13 +1,13 @@
-"""MCAP files and rosbag2 folders: every number of every topic as `/topic.field`, read by `mount_bags`."""
+"""MCAP files and rosbag2 folders: every number of every topic as `/topic.field`."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from mount_bags.bag.recording import ReadingError, open_recording
-from mount_bags.messages.series import Series, SeriesError
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.bag.recording import ReadingError, open_recording
+from engine_mount.recordings.messages.series import Series, SeriesError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
 
@@ -31,7 +31,7 @@ class Bag:
     """A recording of ROS 2, whole or in part; raises `SignalError`."""
 
     def __init__(self, path: Path, stated: Stated):
-        self.format, self.reader = 'rosbag2', 'mount_bags'
+        self.format, self.reader = 'rosbag2', 'engine_mount.recordings'
         self._path = path
         try:
             self._recording = open_recording(path)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.run.screen import Table
+from engine_mount.recordings.run.screen import Table
 from mount_signals.formats.measured import FloatArray, Measured, MeasuredColumn
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.signals.loading import is_recording
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.loading import is_recording
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.content import Content, Stated
 from mount_signals.formats.measured import (
     Heading,

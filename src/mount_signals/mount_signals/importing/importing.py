@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from mount_bags.run.session import new_session
-from mount_bags.signals.signal import SECOND, Signal
+from engine_mount.recordings.signals.signal import SECOND, Signal
+from mount_recorder.session import new_session
 from mount_signals.formats.content import Stated
 from mount_signals.importing.channels import channels_of
 from mount_signals.importing.joined import joined

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from mount_bags.signals.signal import Signal, SignalError
+from engine_mount.recordings.signals.signal import Signal, SignalError
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading
 from mount_signals.formats.reading import headings

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.signals.signal import FloatArray
+from engine_mount.recordings.signals.signal import FloatArray
 from mount_ros import topics
 from mount_ros.messages.level_imu import level_imu
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout

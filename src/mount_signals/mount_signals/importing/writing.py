@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.writer import BagWriter
-from mount_bags.container.writer import LONG_CHUNK_SIZE
-from mount_bags.run.session import session_message, session_text
-from mount_bags.signals.signal import FloatArray
+from engine_mount.recordings.signals.signal import FloatArray
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
+from mount_recorder.session import session_message, session_text
 from mount_ros.topics import SESSION
 from mount_signals.importing.topics import PREFIX, RecordedAs
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.signals.even_grid import EvenSignal
-from mount_bags.signals.resampling import resampled
-from mount_models.road import RandomRoad
+from engine_mount.recordings.signals.even_grid import EvenSignal
+from engine_mount.recordings.signals.resampling import resampled
 from mount_signals.importing.provenance import told_provenance
 from mount_signals.roads.iso8608 import unevenness
 from mount_signals.roads.long_waves import LONGEST_WAVE, without_long_waves
 from mount_signals.roads.profile import FloatArray, ProfileError, RoadProfile
 from mount_signals.roads.speed import Speed
+from mount_sim.excitation.road import RandomRoad
 
 CONTACT_LENGTH = 0.1
 """m, chosen: on so much of the road a tyre of a passenger car stands."""

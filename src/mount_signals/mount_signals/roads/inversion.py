@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_models.arithmetic.averages import mean
-from mount_models.vehicle import Vehicle
 from mount_signals.roads.driving import BAND
 from mount_signals.roads.profile import FloatArray
+from mount_sim.plant.vehicle import Vehicle
 
 _EDGE = 0.2  # chosen: share of an edge frequency over which the band fades
 WEAKEST = 1e-3

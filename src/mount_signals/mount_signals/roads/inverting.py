@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
-from mount_bags.signals.resampling import resampled
-from mount_bags.signals.signal import Signal
-from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.recordings.signals.resampling import resampled
+from engine_mount.recordings.signals.signal import Signal
 from mount_signals.roads.driving import BAND, STEP_TIME
 from mount_signals.roads.inversion import Kept, kept, road_of
 from mount_signals.roads.profile import FloatArray, ProfileError
@@ -16,6 +15,7 @@ from mount_signals.roads.speed import Speed
 from mount_signals.roads.table import EFFECTIVE
 from mount_sim.excitation.recorded import LONGEST_GAP, LOWEST_RATE, acceleration_at
 from mount_sim.excitation.scenario import STEP_TIME as PLANT_STEP
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 _SLOWEST = 1.0  # m/s, chosen: slower, many samples fall on one place of the road
 _PAUSE = 4.0  # s, chosen: four periods of the body

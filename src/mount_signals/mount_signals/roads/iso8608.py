@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_models.road import REFERENCE_FREQUENCY
 from mount_signals.roads.profile import FloatArray, RoadProfile
+from mount_sim.excitation.road import REFERENCE_FREQUENCY
 
 CLASSES = 'ABCDEFGH'
 FIRST_LIMIT = 32e-6  # m^3: between A and B; from class to class four times as much

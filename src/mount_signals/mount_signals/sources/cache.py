@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from mount_bags.bag.split import size_in_bytes
+from mount_recorder.split import size_in_bytes
 from mount_signals.sources.source import SourceError
 
 FOLDER_VARIABLE, LIMIT_VARIABLE = 'ENGINE_MOUNT_CACHE', 'ENGINE_MOUNT_CACHE_LIMIT'

@@ -7,8 +7,8 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
-from mount_bags.bag.metadata import METADATA_NAME
-from mount_bags.container.mcap_reading.summary import Proof, Summary, read_summary
+from engine_mount.recordings.container.mcap_reading.summary import Proof, Summary, read_summary
+from mount_recorder.metadata import METADATA_NAME
 from mount_signals.sources.fetching import write_whole
 from mount_signals.sources.looking import Found
 from mount_signals.sources.patience import Patience, persistent

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.content import Stated
 from mount_signals.formats.measured import Heading, Measured, MeasuredColumn, found, listed
 from mount_signals.formats.reading import headings, read

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.signals.signal import FloatArray
+from engine_mount.recordings.signals.signal import FloatArray
 from mount_models.arithmetic.averages import mean
 from mount_signals.units.quantities import Quantity
 from mount_signals.units.unit import STANDARD_GRAVITY, Unit, unit_of, units_of

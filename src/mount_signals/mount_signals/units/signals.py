@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mount_bags.signals.signal import SECOND, Signal, check_count
+from engine_mount.recordings.signals.signal import SECOND, Signal, check_count
 from mount_models.arithmetic.averages import mean
 from mount_signals.formats.measured import FloatArray, Measured, MeasuredColumn
 from mount_signals.units.column_unit import unit_of_column

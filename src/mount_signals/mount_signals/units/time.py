@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mount_bags.signals.signal import SECOND, FloatArray
+from engine_mount.recordings.signals.signal import SECOND, FloatArray
 from mount_signals.formats.measured import Measured, MeasuredColumn, TimeBase
 from mount_signals.units.columns import column_of, group, is_time, known, place
 from mount_signals.units.mapping import MappingError, TimeChoice

@@ -5,9 +5,9 @@ import struct
 import numpy as np
 import pytest
 
-from mount_models.road import RandomRoad, random_road
 from mount_signals.formats.measured import Provenance
 from mount_signals.roads.profile import RoadProfile
+from mount_sim.excitation.road import RandomRoad, random_road
 
 SEPARATOR = '$' * 80
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from mount_bags.signals.signal import signal_of
-from mount_models.road import RandomRoad, random_road
-from mount_models.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from engine_mount.recordings.signals.signal import signal_of
 from mount_signals.roads.inversion import BAND, chassis_response, in_band, road_of
 from mount_signals.roads.inverting import inverted
 from mount_signals.roads.profile import ProfileError
 from mount_signals.roads.speed import Speed, speed_of
+from mount_sim.excitation.road import RandomRoad, random_road
 from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 DURATION = 16.0
 STEPS = round(DURATION / STEP_TIME)

@@ -5,13 +5,13 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_models.actuator.reluctance import mean_incremental_inductance
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
-from mount_models.arithmetic.random_numbers import RandomNumbers
-from mount_models.coil.ripple import current_rate, flux_rate
 from mount_models.quantity import Quantity
 from mount_models.sampling import SETPOINT_TIMEOUT
+from mount_sim.plant.reluctance import mean_incremental_inductance
+from mount_sim.plant.ripple import current_rate, flux_rate
+from mount_sim.random_numbers import RandomNumbers
 
 STATUS_PERIOD = 0.1
 """s from one status to the next; the first sample has one."""

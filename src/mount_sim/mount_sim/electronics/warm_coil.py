@@ -2,8 +2,8 @@
 
 from typing import Annotated, NamedTuple
 
-from mount_models.coil.ripple import RippleCoil
 from mount_models.quantity import Quantity
+from mount_sim.plant.ripple import RippleCoil
 
 REFERENCE_CELSIUS = 20.0
 """Temperature at which the parameters of the truth hold."""

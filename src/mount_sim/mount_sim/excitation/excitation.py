@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mount_models.arithmetic.elementary import cosines, sines
 from mount_models.arithmetic.series import StreamedSeries, series_over_time
 from mount_models.quantity import checked
-from mount_models.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
+from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
 
 
 class Seat(IntEnum):

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
-from mount_bags.signals.loading import load_signal
-from mount_bags.signals.plausibility import check_size
-from mount_bags.signals.resampling import resampled
+from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.recordings.signals.loading import load_signal
+from engine_mount.recordings.signals.plausibility import check_size
+from engine_mount.recordings.signals.resampling import resampled
 from mount_models.arithmetic.series import StreamedSeries
 
 LOWEST_RATE = 100.0  # Hz, chosen: a road is of use up to 40 Hz at least

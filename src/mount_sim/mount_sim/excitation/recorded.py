@@ -3,10 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-from mount_bags.signals.even_grid import EvenSignal, evenly_spaced
-from mount_bags.signals.loading import load_signal
-from mount_bags.signals.plausibility import check_size
-from mount_bags.signals.resampling import resampled
+from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.recordings.signals.loading import load_signal
+from engine_mount.recordings.signals.plausibility import check_size
+from engine_mount.recordings.signals.resampling import resampled
 from mount_models.arithmetic.averages import mean
 from mount_models.arithmetic.series import StreamedSeries
 

@@ -3,14 +3,14 @@
 from dataclasses import replace
 from typing import Annotated, NamedTuple, Protocol
 
-from mount_bags.signals.even_grid import EvenSignal
+from engine_mount.recordings.signals.even_grid import EvenSignal
 from mount_models.arithmetic.series import StreamedSeries
 from mount_models.quantity import ParameterError, Quantity
-from mount_models.road import Gap, RandomRoad, Sweep
 from mount_sim.excitation import excitation
 from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.measured_road import height_at, measured_height
 from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
+from mount_sim.excitation.road import Gap, RandomRoad, Sweep
 
 SCENARIO_NAMES = ('motorway', 'bench', 'sweep', 'recorded', 'road')
 STEP_TIME = 5e-5  # s, chosen: step of the plant, 20 in each sample

@@ -1,1 +1,1 @@
-"""The plant behind the electronics: coil, actuator, mount, vehicle."""
+"""The plant behind the electronics and its laws: coil, actuator, mount, vehicle."""

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype
-from mount_models.engine_body import (
+from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.engine_body import (
     BODY_STATE,
     SUPPORT,
     SUPPORT_STATE,
@@ -20,8 +21,6 @@ from mount_models.engine_body import (
     resting_supports,
     support_records,
 )
-from mount_models.vehicle import MountMotion, Vehicle
-from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.plant import (
     PLANT,
     STATE,
@@ -31,6 +30,7 @@ from mount_sim.plant.plant import (
     force_beside_elastomer,
     take_motion,
 )
+from mount_sim.plant.vehicle import MountMotion, Vehicle
 
 QUARTERS = 2.0
 """Of the vehicle, `Vehicle` each: the front half of the car, whose two wheels move alike (chosen)."""

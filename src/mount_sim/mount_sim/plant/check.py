@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from mount_models.arithmetic.record import record_bytes
 from mount_models.friction.coefficient_check import check_friction
 from mount_models.quantity import ParameterError, flattened, quantities, with_flattened
-from mount_models.vehicle import Engine
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.mounts import Contents
 from mount_sim.plant.plant import STATE, Plant, advance
+from mount_sim.plant.vehicle import Engine
 
 GROWTH_ALLOWED = 1e-6
 """Of a motion in one step, chosen: far above rounding, 2 % in a second."""

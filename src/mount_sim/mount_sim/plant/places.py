@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
-from mount_models.engine_body import RigidEngine, Support, engine_modes
 from mount_models.quantity import ParameterError, Quantity, check_name
-from mount_models.vehicle import Vehicle
 from mount_sim.electronics.faults.schedule import texts_of_mount
+from mount_sim.plant.engine_body import RigidEngine, Support, engine_modes
+from mount_sim.plant.vehicle import Vehicle
 
 _X = Quantity('m', 'x of the mount, forward of the centre of gravity', -2.0, 2.0, 'chosen')
 _Y = Quantity('m', 'y of the mount, left of the centre of gravity', -2.0, 2.0, 'chosen')

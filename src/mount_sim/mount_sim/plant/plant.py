@@ -5,24 +5,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_models.actuator.closing import ClosingMechanics, checked_closing, closed_state
-from mount_models.actuator.reluctance import ReluctanceActuator, gap_flux_density
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
-from mount_models.coil.ripple import RippleCoil
-from mount_models.elastomer import branch_step, elastomer_force
-from mount_models.energy import ACCOUNT, book_step, new_account
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_step
-from mount_models.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_models.quantity import checked
-from mount_models.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
 from mount_ros.topics import SIM_TRUTH
 from mount_sim.electronics.electronics import ElectronicsParameters, advance_current, read_sensors
 from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.closing import ClosingMechanics, checked_closing, closed_state
+from mount_sim.plant.elastomer import branch_step, elastomer_force
+from mount_sim.plant.energy import ACCOUNT, book_step, new_account
+from mount_sim.plant.friction import full_step
+from mount_sim.plant.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_sim.plant.mounts import Contents, SeatedMount
+from mount_sim.plant.reluctance import ReluctanceActuator, gap_flux_density
+from mount_sim.plant.ripple import RippleCoil
+from mount_sim.plant.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
 
 _PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
 _BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
@@ -144,7 +144,7 @@ class PlantSimulation:
 
     @property
     def account(self) -> np.void:
-        """The energy since the first `advance_with_books`, a record of `mount_models.energy.ACCOUNT`."""
+        """The energy since the first `advance_with_books`, a record of `mount_sim.plant.energy.ACCOUNT`."""
         return self._account.view(ACCOUNT)[0]
 
     def advance_with_books(

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.actuator.reluctance import ReluctanceActuator
-from mount_models.actuator.reluctance import force as magnetic_force
 from mount_models.coil.gap import measured_inductance
-from mount_models.coil.ripple import RippleCoil, current_rate, flux_rate
 from mount_models.sampling import HIGHEST_CURRENT
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.reluctance import force as magnetic_force
+from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_response
 from mount_models.sampling import SAMPLE_RATE
+from mount_sim.plant.friction import full_response
 
 FloatArray = npt.NDArray[np.float64]
 

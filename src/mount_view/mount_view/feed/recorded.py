@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.run.place import open_run
+from engine_mount.recordings.run.place import open_run
 from mount_replay.live.playback import Playback
 from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
 from mount_view.feed.feed import FeedError, Message, Receive

@@ -10,8 +10,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from mount_bags.recorder.collector import Collector
 from mount_bringup.graph.nodes import RECORDER
+from mount_recorder.collector import Collector
 from mount_ros.environment import prepare_environment
 from mount_ros.qos import control_qos
 from mount_ros.topics import TOPICS, Topic

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mount_bags.messages.layout import LayoutError
+from engine_mount.recordings.messages.layout import LayoutError
 from mount_bringup.chosen import policy_of
 from mount_models.quantity import ParameterError
 from mount_report.drive.evaluation import levels_of

@@ -4,9 +4,9 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
-from mount_bags.messages.decoding import decode
-from mount_bags.messages.definitions import installed_definition
-from mount_bags.run.session import SessionError, session_content, session_parameters
+from engine_mount.recordings.messages.decoding import decode
+from engine_mount.recordings.messages.definitions import installed_definition
+from engine_mount.recordings.run.session import SessionError, session_content, session_parameters
 from mount_ros.messages.event import read_mark
 from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, DIAGNOSTICS, EVENT, SESSION

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.container.stored import HEAD
-from mount_bags.messages.series import Payloads, Series, SeriesError, heads_of
+from engine_mount.recordings.container.stored import HEAD
+from engine_mount.recordings.messages.series import Payloads, Series, SeriesError, heads_of
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 from mount_view.feed.feed import Message
 

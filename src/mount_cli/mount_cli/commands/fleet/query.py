@@ -59,7 +59,7 @@ def query(
 
 def print_rows(answer: 'pyarrow.Table', console: Console) -> None:
     """Print rows as a table where it fits the terminal, else one below another."""
-    from mount_bags.run.screen import Table
+    from engine_mount.recordings.run.screen import Table
     from mount_cli.screen import TerminalScreen
 
     names = answer.column_names

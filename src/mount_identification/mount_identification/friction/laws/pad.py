@@ -10,8 +10,8 @@ from mount_identification.friction.steps.coefficient_fit import NORMALISED_AT
 from mount_models.arithmetic.compiled import compiled
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.friction.full import full_step
 from mount_models.quantity import Quantity
+from mount_sim.plant.friction import full_step
 
 _LOAD_SPREAD = 0.05
 """Loads that differ by less (of their mean) do not tell how mu depends on them."""

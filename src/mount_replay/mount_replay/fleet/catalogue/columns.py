@@ -1,6 +1,6 @@
 """What a catalogue tells of each recording, and of each event in it."""
 
-from mount_models.bands import BELOW_ISOLATION, ISOLATION_BANDS
+from mount_replay.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from mount_replay.fleet.columns import COUNT, FLAG, NUMBER, TEXT, TIME, Column
 
 BANDS = (BELOW_ISOLATION, *ISOLATION_BANDS)

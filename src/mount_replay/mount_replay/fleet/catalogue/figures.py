@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.audit.audit import TopicAudit, audit
-from mount_bags.audit.losses import losses
-from mount_bags.audit.peak_current import PeakCurrent
-from mount_bags.bag.column_parts import column_parts
-from mount_bags.bag.recording import Recording
-from mount_bags.run.session import recorded_sample_rate
+from engine_mount.recordings.audit.audit import TopicAudit, audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit.peak_current import PeakCurrent
+from engine_mount.recordings.bag.column_parts import column_parts
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_replay.fleet.catalogue.motion import Motion
 from mount_replay.fleet.catalogue.trace import Trace
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.messages.compact_times import compact
-from mount_bags.messages.packed_column import packed
-from mount_bags.signals.signal import SECOND, Signal
+from engine_mount.recordings.messages.compact_times import compact
+from engine_mount.recordings.messages.packed_column import packed
+from engine_mount.recordings.signals.signal import SECOND, Signal
 from mount_models.sampling import SAMPLE_RATE
 from mount_replay.fleet.catalogue.columns import FOREIGN
 from mount_replay.fleet.catalogue.figures import Figures

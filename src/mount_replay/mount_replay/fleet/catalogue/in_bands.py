@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_bags.messages.compact_times import CompactTimes
-from mount_bags.messages.packed_column import PackedColumn
+from engine_mount.recordings.messages.compact_times import CompactTimes
+from engine_mount.recordings.messages.packed_column import PackedColumn
 from mount_replay.fleet.catalogue.band_pass import BandPass, FloatArray
 
 _PIECE = 1 << 18  # samples, chosen

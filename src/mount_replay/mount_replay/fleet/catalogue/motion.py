@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.bag.column_parts import ColumnPart
-from mount_bags.messages.compact_times import CompactTimes, compact
-from mount_bags.messages.packed_column import PackedColumn, packed
-from mount_bags.messages.stamps import FARTHEST, misdated
+from engine_mount.recordings.bag.column_parts import ColumnPart
+from engine_mount.recordings.messages.compact_times import CompactTimes, compact
+from engine_mount.recordings.messages.packed_column import PackedColumn, packed
+from engine_mount.recordings.messages.stamps import misdated
+from mount_recorder.stamp_watch import FARTHEST
 from mount_replay.fleet.catalogue.columns import BANDS, band_name
 from mount_replay.fleet.catalogue.in_bands import FloatArray, in_bands
 from mount_ros.topics import DISPLACEMENT

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 
-from mount_bags.bag.metadata import METADATA_NAME
+from mount_recorder.metadata import METADATA_NAME
 from mount_signals.sources.local import local_path
 from mount_signals.sources.source import Entry
 from mount_signals.sources.stores import entries

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mount_bags.bag.recording import ReadingError
+from engine_mount.recordings.bag.recording import ReadingError
 from mount_replay.fleet.catalogue.columns import DRIVE, REPLAY
 from mount_replay.fleet.catalogue.places import Place
 from mount_replay.fleet.catalogue.rows import Rows, named, rows_of, unreadable

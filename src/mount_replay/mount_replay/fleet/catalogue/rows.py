@@ -7,12 +7,12 @@ from datetime import UTC
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import ReadingError, Recording
-from mount_bags.container.free_memory import give_back
-from mount_bags.events.recorded_events import event_time, recorded_events
-from mount_bags.messages.series import SeriesError
-from mount_bags.run.session import session_parameters
-from mount_bags.run.told import duration_of, started_of, told_session, versions_told
+from engine_mount.recordings.bag.recording import ReadingError, Recording
+from engine_mount.recordings.container.free_memory import give_back
+from engine_mount.recordings.events.recorded_events import event_time, recorded_events
+from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.run.session import session_parameters
+from engine_mount.recordings.run.told import duration_of, started_of, told_session, versions_told
 from mount_bringup.changed_parameters import changed_parameters
 from mount_bringup.chosen import Parameters
 from mount_bringup.mount_choice import seat_of

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.bag.column_parts import ColumnPart
-from mount_bags.events.switching_trace import SwitchingTrace
-from mount_bags.messages.packed_column import BLOCK
+from engine_mount.recordings.bag.column_parts import ColumnPart
+from engine_mount.recordings.events.switching_trace import SwitchingTrace
+from engine_mount.recordings.messages.packed_column import BLOCK
 
 
 class Trace:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.bag.metadata import METADATA_NAME
-from mount_bags.bag.writer import BagWriter
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.metadata import METADATA_NAME
 
 Damage = Callable[[Path, np.random.Generator], None]
 

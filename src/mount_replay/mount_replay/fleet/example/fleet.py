@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-import mount_bags
-from mount_bags.edit.cut import cut
-from mount_bags.run.session import session_text
-from mount_bags.run.versions import versions
+import engine_mount
+from engine_mount.recordings.edit.cut import cut
 from mount_bringup.mount_choice import with_control_of_mount
 from mount_bringup.mounts import mounts_of, settings_of_mounts
 from mount_bringup.sample_rate import with_sample_rate
 from mount_bringup.settings import checked_settings
+from mount_recorder.session import session_text
+from mount_recorder.versions import versions
 from mount_replay.drive.drive import told_parameters
 from mount_replay.drive.preflight import preflight
 from mount_replay.fleet.example.damages import DAMAGES
@@ -165,5 +165,5 @@ def _piece(order: Ordered, whole: Path, folder: Path) -> Path:
     assert order.variation.cut is not None
     folder.parent.mkdir()
     begin, end = order.variation.cut
-    cut(mount_bags.open(whole), folder, begin, end, made=order.started.isoformat(timespec='seconds'))
+    cut(engine_mount.open(whole), folder, begin, end, made=order.started.isoformat(timespec='seconds'))
     return folder

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.bag.recording import Recording
-from mount_bags.run.session import session_parameters
-from mount_bags.signals.even_grid import evenly_spaced
-from mount_bags.signals.signal import signal_of
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.run.session import session_parameters
+from engine_mount.recordings.signals.even_grid import evenly_spaced
+from engine_mount.recordings.signals.signal import signal_of
 from mount_bringup.chosen import control_parameters
 from mount_bringup.sample_rate import with_sample_rate
 from mount_bringup.settings import checked_settings, defaults_of_nodes

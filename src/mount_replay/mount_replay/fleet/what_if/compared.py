@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.bag.recording import Recording
+from engine_mount.recordings.bag.recording import Recording
 from mount_bringup.chosen import control_parameters
 from mount_control.settings import check_effect
 from mount_replay.agreement import SETTLED, SETTLING

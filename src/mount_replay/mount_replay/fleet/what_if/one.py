@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mount_bags.bag.recording import open_recording
-from mount_bags.run.place import recording_hash, recording_place
-from mount_bags.run.versions import versions
+from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.run.place import recording_hash, recording_place
 from mount_control.settings import NoEffectError
+from mount_recorder.versions import versions
 from mount_replay.fleet.catalogue.places import Place
 from mount_replay.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from mount_replay.fleet.what_if.columns import ANOTHER_POLICY, DISPLACEMENT, FAILED, REPLAYED, SETPOINTS

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mount_bags.run.versions import versions
+from mount_recorder.versions import versions
 from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.places import Place, root_of
 from mount_replay.fleet.cluster import LOCAL, processes_for

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.broken import reading
 from mount_signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.broken import reading
 from mount_signals.formats.can.frames import EXTENDED, DecodedFrames
 from mount_signals.formats.content import Stated

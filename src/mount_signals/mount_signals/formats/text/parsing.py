@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.text.cells import (
     BLANK,
     MISSING,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.content import Stated
 from mount_signals.formats.text.cells import ALONE, BLANK, Decimal, Kind, cells_of, is_comment, kind_of
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.broken import reading
 from mount_signals.formats.content import Stated
 from mount_signals.formats.trees.layouts import leaves_in

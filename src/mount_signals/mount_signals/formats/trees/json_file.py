@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mount_bags.signals.signal import SignalError
+from engine_mount.recordings.signals.signal import SignalError
 from mount_signals.formats.content import Stated
 from mount_signals.formats.text.cells import date_in
 from mount_signals.formats.trees.layouts import leaves_in

@@ -5,8 +5,8 @@ from collections import deque
 from mount_driver.can_library import can
 from mount_driver.codec import MountCodec
 from mount_driver.frame import Frame
-from mount_models.arithmetic.random_numbers import RandomNumbers
 from mount_sim.electronics.faults.contract import Fault, Occasion
+from mount_sim.random_numbers import RandomNumbers
 
 Frames = list[can.Message]
 

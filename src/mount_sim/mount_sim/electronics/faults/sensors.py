@@ -2,9 +2,9 @@
 
 import math
 
-from mount_models.arithmetic.random_numbers import RandomNumbers
 from mount_sim.electronics.electronics import Reading
 from mount_sim.electronics.faults.contract import Fault, Occasion
+from mount_sim.random_numbers import RandomNumbers
 
 _STEP = 2e-3  # m, chosen
 _OUT_OF_RANGE = 0.045  # m, chosen: the signal can carry it, no mount moves so far

@@ -1,0 +1,8 @@
+"""Recordings read, audited, compared and edited."""
+
+from engine_mount.recordings.bag.recording import ReadingError, Recording, open_recording
+from engine_mount.recordings.messages.series import Series, SeriesError
+
+open = open_recording
+
+__all__ = ['ReadingError', 'Recording', 'Series', 'SeriesError', 'open', 'open_recording']

@@ -1,0 +1,201 @@
+"""Several recordings of one drive, such as its cuts, as one."""
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.recordings.bag.origin import with_step
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.edit.beside_messages import lost_beside_messages
+from engine_mount.recordings.edit.inherited_statement import sources_of, united
+from engine_mount.recordings.edit.messages import Messages, joined_payloads, read_messages, write_messages
+from engine_mount.recordings.messages.series import Times
+from engine_mount.recordings.run.session_differences import session_differences
+from mount_recorder.chunk_groups import registered_topic
+from mount_recorder.metadata import TopicInformation
+from mount_recorder.session import time_text
+from mount_ros.topics import SESSION, Delivery
+
+_HOLE = 0.1  # s, chosen: a longer silence between two parts is told
+_TOLD = 4  # differences of sessions in a refusal
+
+
+class MergeError(ValueError):
+    """Recordings do not fit together; the text says where and what to do."""
+
+
+@dataclass(frozen=True)
+class Merge:
+    """What was merged: messages written, and those that stood in more than one part."""
+
+    folder: Path
+    messages: int
+    repeated: int
+    holes: tuple[str, ...]  # times of which no part tells, in sentences
+    losses: tuple[str, ...]  # what of the parts could not be read, in sentences
+
+
+def merge(
+    recordings: Sequence[Recording], out: str | os.PathLike[str], *, different_sessions: bool = False
+) -> Merge:
+    """Write all messages of `recordings` by log time to the new recording `out`, each message once.
+
+    A message is the same where topic, times and bytes are; one that a recording itself has twice stays
+    there twice. Attachments and metadata come with them, each once, and what their recorders lost adds up.
+    Raises `MergeError` where a topic has two types, and where the sessions differ unless
+    `different_sessions`.
+    """
+    if not recordings:
+        raise MergeError('nothing to merge; name the recordings')
+    topics = _topics(recordings)
+    if not different_sessions:
+        _refuse_different_sessions(recordings)
+    parts, losses, repeated = [], [], 0
+    read: list[dict[str, int]] = [{} for _ in recordings]
+    for topic in topics.values():
+        found = []
+        for recording, counts in zip(recordings, read, strict=True):
+            if topic.name in recording.topics:
+                messages, damages = read_messages(recording, topic.name)
+                counts[topic.name] = len(messages)
+                found.append(messages)
+                losses += damages
+        parts.append(_united(topic, found))
+        repeated += sum(map(len, found)) - len(parts[-1])
+    step = {
+        'did': 'merge',
+        'recordings': [recording.short_name for recording in recordings],
+        'made': time_text(),
+    }
+    distros = [recording.information.ros_distro for recording in recordings if recording.information]
+    sources = united(map(sources_of, recordings, read))
+    custom = with_step([recording.information for recording in recordings], step)
+    kept = write_messages(out, parts, recordings, sources, custom, next(iter(distros), ''))
+    losses += [f'{name} is lost by damage' for name in lost_beside_messages(recordings)]
+    return Merge(Path(out), kept, repeated, tuple(_holes(recordings)), tuple(losses))
+
+
+def _topics(recordings: Sequence[Recording]) -> dict[str, TopicInformation]:
+    topics: dict[str, TopicInformation] = {}
+    for recording in recordings:
+        for name, topic in recording.topics.items():
+            known = topics.setdefault(name, topic)
+            if known.type != topic.type:
+                raise MergeError(
+                    f'{name} is {known.type} in one recording and {topic.type} in {recording.path}; '
+                    'they are no parts of one drive'
+                )
+            if known.type_hash and topic.type_hash and known.type_hash != topic.type_hash:
+                raise MergeError(f'{name}: {known.type} has another definition in {recording.path}')
+            if topic.offered_qos and not known.offered_qos:
+                topics[name] = replace(known, offered_qos=topic.offered_qos)
+    return topics
+
+
+def _refuse_different_sessions(recordings: Sequence[Recording]) -> None:
+    first, *others = recordings
+    known = _sessions(first)
+    for other in others:
+        sessions = _sessions(other)
+        if known.keys() & sessions.keys() or not (known or sessions):
+            continue
+        if known and sessions:
+            what = session_differences(next(iter(known.values())), next(iter(sessions.values())))
+            why = 'their sessions differ: ' + '; '.join(what[:_TOLD]) if what else 'their sessions differ'
+        else:
+            why = f'{(first if not known else other).path} has no session that says what it is'
+        raise MergeError(
+            f'{first.path} and {other.path} may be different drives: {why}; '
+            'merge them with --different-sessions'
+        )
+
+
+def _sessions(recording: Recording) -> dict[bytes, str]:
+    """Return {message: text} of all session messages in a recording."""
+    names = [name for name in recording if registered_topic(name, recording.topics[name].type) is SESSION]
+    return {
+        recording[name].payloads[place]: recording[name].message(place).data
+        for name in names
+        for place in range(len(recording[name]))
+    }
+
+
+def _united(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
+    united = Messages(
+        topic,
+        next((part.declared for part in parts if part.declared), None),
+        np.concatenate([part.log_times for part in parts]),
+        np.concatenate([part.publish_times for part in parts]),
+        joined_payloads([part.payloads for part in parts]),
+        np.concatenate([part.sequences for part in parts]),
+    )
+    order = np.argsort(united.log_times, kind='stable')
+    repeated = _repeated(united, parts, order)
+    return united.chosen(order[~np.isin(order, repeated)])
+
+
+def _repeated(united: Messages, parts: Sequence[Messages], order: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the places of messages that an earlier part has as well.
+
+    Each part may repeat what the others have as often as the one that has it most often.
+    """
+    part_of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    shared = _shared_times(parts)
+    suspects = order[np.isin(united.log_times[order], shared)]
+    most: Counter[tuple[int, int, bytes]] = Counter()
+    repeated = []
+    of_part: Counter[tuple[int, int, bytes]] = Counter()
+    part = -1
+    for place in suspects[np.argsort(part_of[suspects], kind='stable')].tolist():
+        if part_of[place] != part:
+            part = part_of[place]
+            of_part.clear()
+        key = (int(united.log_times[place]), int(united.publish_times[place]), united.payloads[place])
+        of_part[key] += 1
+        if of_part[key] <= most[key]:
+            repeated.append(place)
+        else:
+            most[key] = of_part[key]
+    return np.array(repeated, np.int64)
+
+
+def _shared_times(parts: Sequence[Messages]) -> Times:
+    """Return the log times that more than one part has."""
+    if not parts:
+        return np.empty(0, np.int64)
+    times, counts = np.unique(
+        np.concatenate([np.unique(part.log_times) for part in parts]), return_counts=True
+    )
+    return times[counts > 1]
+
+
+def _holes(recordings: Sequence[Recording]) -> list[str]:
+    """Return a sentence for each time span between the parts of which no part tells."""
+    spans = sorted(span for span in map(_streamed, recordings) if span is not None)
+    holes = []
+    latest = spans[0][1] if spans else 0
+    for first, last in spans[1:]:
+        if first - latest > _HOLE * 1e9:
+            holes.append(f'between two parts {(first - latest) / 1e9:.3f} s are missing')
+        latest = max(latest, last)
+    return holes
+
+
+def _streamed(recording: Recording) -> tuple[int, int] | None:
+    """Return first and last log time (ns) of the topic with most messages; latched ones came earlier."""
+    topics = [topic for topic in recording.topics.values() if topic.message_count]
+    streams = [topic for topic in topics if not _latched(topic)]
+    if not streams:
+        return None
+    times = recording[max(streams, key=lambda topic: topic.message_count).name].receive_times
+    return int(times.min()), int(times.max())
+
+
+def _latched(topic: TopicInformation) -> bool:
+    registered = registered_topic(topic.name, topic.type)
+    return registered is not None and registered.delivery is Delivery.LATCHED

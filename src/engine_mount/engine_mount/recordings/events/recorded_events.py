@@ -1,0 +1,110 @@
+"""What happened in a recording: its marked events, and the switching of damping where none tell of it."""
+
+import re
+from dataclasses import dataclass
+
+from engine_mount.recordings.bag.column_parts import column_parts
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.events.event_marks import Mark, read_marks
+from engine_mount.recordings.events.switching_trace import ArrivedSwitching
+from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.messages.time_axis import TimeAxis
+from mount_recorder.chunk_groups import registered_topic
+from mount_ros.topics import CONTROL_TRACE, EVENT
+
+SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
+_NUMBERED = re.compile(r'(.+?):(\d+)')
+
+
+class EventError(ValueError):
+    """An event that was asked for is not in the recording; the text lists those that are."""
+
+
+@dataclass(frozen=True)
+class RecordedEvent:
+    """Something worth finding again: when it was logged, and its time on the clock of the stamps, in ns."""
+
+    log_time: int
+    stamp: int
+    kind: str
+    text: str = ''
+
+
+def recorded_events(recording: Recording) -> list[RecordedEvent]:
+    """Return the events in `recording` in the order of their log times.
+
+    They are the marks of the topics `event`, and where these tell of no `switch_on` or no `switch_off`, the
+    changes of `damping_active` in the control trace.
+    """
+    marked = [
+        RecordedEvent(log_time, mark.time, mark.kind, mark.text)
+        for marks in recorded_marks(recording).values()
+        for log_time, mark in marks
+    ]
+    kinds = {event.kind for event in marked}
+    untold = {SWITCH_ON, SWITCH_OFF} - kinds
+    derived = [event for event in _switching(recording) if event.kind in untold] if untold else []
+    return sorted([*marked, *derived], key=lambda event: event.log_time)
+
+
+def recorded_marks(recording: Recording) -> dict[str, list[tuple[int, Mark]]]:
+    """Return the marks by topic, for each mount has its own `event`; each with its log time (ns)."""
+    return {
+        name: list(zip(recording[name].receive_times.tolist(), read_marks(recording[name]), strict=True))
+        for name, topic in recording.topics.items()
+        if registered_topic(name, topic.type) is EVENT
+    }
+
+
+def find_event(recording: Recording, wanted: str) -> RecordedEvent:
+    """Return the event meant by `wanted`: its number from 1, its kind (the first one), or `kind:number`.
+
+    In a kind `-` is as good as `_`. Raises `EventError` with the events that there are.
+    """
+    events = recorded_events(recording)
+    if wanted.isdigit():
+        fitting, number = events, int(wanted)
+    else:
+        match = _NUMBERED.fullmatch(wanted)
+        kind, number = (match[1], int(match[2])) if match else (wanted, 1)
+        fitting = [event for event in events if _plain(event.kind) == _plain(kind)]
+    if not 1 <= number <= len(fitting):
+        raise EventError(f'{recording.path} has no event {wanted!r}; {_listed(recording, events)}')
+    return fitting[number - 1]
+
+
+def event_time(event: RecordedEvent, axis: TimeAxis) -> float:
+    """Return when an event happened, in s on the time axis of its recording."""
+    return axis.of_mark(event.stamp, event.log_time)
+
+
+def _plain(kind: str) -> str:
+    return kind.replace('-', '_')
+
+
+def _switching(recording: Recording) -> list[RecordedEvent]:
+    if CONTROL_TRACE.name not in recording:
+        return []
+    trace = ArrivedSwitching()
+    try:
+        for part in column_parts(recording, {CONTROL_TRACE.name: (trace.COLUMN,)}):
+            trace.add(part)
+    except SeriesError:
+        return []  # no control trace of ours
+    return [
+        RecordedEvent(log_time, stamp, kind)
+        for kind, switched in zip((SWITCH_ON, SWITCH_OFF), trace.by_arrival(), strict=True)
+        for stamp, log_time in zip(switched.stamps.tolist(), switched.receive_times.tolist(), strict=True)
+    ]
+
+
+def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
+    if not events:
+        return 'it has none, and damping was never switched; cut by --from and --to'
+    axis = recording.time_axis
+    shown = [
+        f'{number} {event.kind} at {event_time(event, axis):.3f} s'
+        for number, event in enumerate(events[:12], 1)
+    ]
+    more = f' and {len(events) - 12} more' if len(events) > 12 else ''
+    return f'it has {", ".join(shown)}{more}'

@@ -1,0 +1,341 @@
+"""All messages of one topic as columns of numbers."""
+
+import functools
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.recordings.messages.compact_times import CompactTimes, Times, compact
+from engine_mount.recordings.messages.decoding import decode
+from engine_mount.recordings.messages.definitions import Definition, installed_definition
+from engine_mount.recordings.messages.layout import HEAD, OPTIONS, Layout, LayoutError, layout_of
+from mount_recorder.chunk_groups import registered_topic
+from mount_ros.topics import JOINT_STATE, Scalar, Topic
+
+Column = NDArray[np.float64]
+
+_SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
+STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
+"""Where the stamp stands in a message: paths, and places in their runs of numbers."""
+STAMP_BYTES = 8
+_OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
+_STEP = re.compile(r'([^.\[\]]+)|\[(\d+)\]')
+
+
+class SeriesError(ValueError):
+    """What was asked of a topic is not in its messages; the text says what is."""
+
+
+class Payloads:
+    """Serialised messages: one block of rows where all have the same length, else one by one."""
+
+    def __init__(self, pieces: Sequence[NDArray[np.uint8] | list[bytes]]):
+        """Take them in pieces, each an array (messages x bytes) or a list."""
+        widths = {piece.shape[1] if isinstance(piece, np.ndarray) else -1 for piece in pieces}
+        self.rows: NDArray[np.uint8] | None = None
+        self._parts: list[bytes] = []
+        if len(widths) == 1 and -1 not in widths:
+            self.rows = np.concatenate([np.asarray(piece) for piece in pieces])
+        else:
+            self._parts = [bytes(message) for piece in pieces for message in piece]
+
+    def __len__(self) -> int:
+        return len(self._parts) if self.rows is None else len(self.rows)
+
+    def __getitem__(self, index: int) -> bytes:
+        return self._parts[index] if self.rows is None else self.rows[index].tobytes()
+
+
+class Heads(NamedTuple):
+    """What is told of messages beside their bytes: when they came and were sent (ns), and their numbers.
+
+    Of chosen columns alone `sent` is empty: it is read with the messages.
+    """
+
+    received: CompactTimes
+    sent: CompactTimes
+    sequences: CompactTimes
+
+
+def heads_of(heads: np.ndarray) -> Heads:
+    """Return heads of dtype `HEAD` (n,) in little memory."""
+    columns = (heads[name].astype(np.int64) for name in ('log_time', 'publish_time', 'sequence'))
+    return Heads(*map(compact, columns))
+
+
+class Series:
+    """The messages of one topic in the order in which they were recorded.
+
+    `receive_times` and `publish_times` are those of the recording, `stamps` those of the samples (from
+    the messages' headers), all in ns; `sequences` are the publisher's numbers, 0 where it gave none.
+    `series[name]` is a column: of a `JointState` the position of
+    that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
+    `time` is that of all columns, to plot.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        type_name: str,
+        payloads: 'Payloads | Callable[[], Series]',
+        heads: 'Heads',
+        *,
+        definition: Definition | None = None,
+        columns: Mapping[str, Column] | None = None,
+        stamps: Times | None = None,
+        obstacle: str = '',
+        zero: int = 0,
+        units: Mapping[str, str] | None = None,
+    ):
+        """Take messages with their `definition`, or the sentence why there is none.
+
+        Without both the installed type tells the fields. `zero` (ns) is where `time` begins; `units` are
+        those that the recording tells of fields that no registry knows. A function in
+        place of `payloads` reads the topic anew where something else than `columns` and `stamps` is wanted.
+        """
+        self.topic = topic
+        self.type = type_name
+        self._heads = heads
+        self._payloads = payloads
+        self.columns = dict(columns or {})
+        if stamps is not None:
+            self.stamps = stamps
+        self.registered: Topic | None = registered_topic(topic, type_name)
+        self._known_definition = definition
+        self._obstacle = obstacle
+        self._zero = zero
+        self._told_units = dict(units or {})
+
+    def __len__(self) -> int:
+        return len(self._heads.received)
+
+    @functools.cached_property
+    def receive_times(self) -> Times:
+        """When the messages came in, ns."""
+        return self._heads.received.whole()
+
+    @functools.cached_property
+    def publish_times(self) -> Times:
+        """When the messages were sent, ns."""
+        if len(self._heads.sent) < len(self):
+            self._read()
+        return self._heads.sent.whole()
+
+    @functools.cached_property
+    def sequences(self) -> NDArray[np.uint32]:
+        """The numbers that the publisher gave the messages."""
+        return self._heads.sequences.whole().astype(np.uint32)
+
+    @property
+    def payloads(self) -> Payloads:
+        """The serialised messages."""
+        return self._payloads if isinstance(self._payloads, Payloads) else self._read()
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the messages are in memory, not only `columns` of them."""
+        return isinstance(self._payloads, Payloads)
+
+    def _read(self) -> Payloads:
+        """Read what is not yet there of the topic."""
+        if not isinstance(self._payloads, Payloads):
+            whole = self._payloads()
+            self._payloads, self._heads = whole.payloads, whole._heads
+        return self._payloads
+
+    @functools.cached_property
+    def stamps(self) -> Times:
+        """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
+        layout, rows = self.layout, self.payloads.rows
+        if layout is None or rows is None:
+            return np.array([self._stamp(message) for message in self._decoded], np.int64)
+        if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
+            raise self._without_stamp()
+        seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
+        return seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows)
+
+    @functools.cached_property
+    def stamp_place(self) -> int | None:
+        """Where the 8 bytes of the stamp begin, None where there is no stamp or its place varies."""
+        if self.layout is not None:
+            seconds = self.layout.numbers.get(_SECONDS)
+            return None if seconds is None else seconds.offset
+        try:
+            definition = self._definition
+        except SeriesError:
+            return None
+        kind = definition.name
+        for field in _SECONDS.split('.'):  # each the first one of its kind
+            first, kind = next(iter(definition.types[kind].items()))
+            if first != field:
+                return None
+        return HEAD
+
+    @functools.cached_property
+    def time(self) -> Column:
+        """Time in s from the beginning of the recording: of the samples, or of reception without stamps.
+
+        Stamps of another clock, as in lock-step, count from that clock's own zero.
+        """
+        try:
+            times = self.stamps
+        except SeriesError:
+            times = self.receive_times
+        if times.size and abs(int(times[0]) - self._zero) > _OTHER_CLOCK:
+            return np.asarray(times * 1e-9, np.float64)
+        return np.asarray((times - self._zero) * 1e-9, np.float64)
+
+    @functools.cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the columns."""
+        if not len(self):
+            return self.registered.names if self.registered else ()
+        layout = self.layout
+        if self.type != JOINT_STATE:
+            if layout is None:
+                raise SeriesError(f'{self.topic}: messages of different shape have no columns; use message()')
+            return tuple(path for path, numbers in layout.numbers.items() if numbers.count == 1)
+        if layout is not None:
+            return tuple(text for path, text in layout.strings.items() if path.startswith('name['))
+        try:
+            return tuple(dict.fromkeys(str(name) for message in self._decoded for name in message.name))
+        except (AttributeError, TypeError):
+            raise SeriesError(f"{self.topic}: its definition of {self.type} has no list 'name'") from None
+
+    def __getitem__(self, name: str) -> Column:
+        """Return the column `name` in the unit `unit(name)`; raises `SeriesError` with the known names."""
+        if name in self.columns:
+            return self.columns[name]
+        if self.type == JOINT_STATE:
+            return self._joint_column(name, 'position')
+        return self._path_column(name)
+
+    def derivative(self, name: str) -> Column:
+        """Return the time derivative that the messages carry for `name` (velocity of a `JointState`)."""
+        if self.type != JOINT_STATE:
+            raise SeriesError(f'{self.topic}: only JointState carries derivatives, this is {self.type}')
+        return self._joint_column(name, 'velocity')
+
+    def unit(self, name: str) -> str:
+        """Return the unit of `series[name]`, empty where neither registry nor recording tell it."""
+        return self.registered.unit(name) if self.registered else self._told_units.get(name, '')
+
+    def derivative_unit(self, name: str) -> str:
+        """Return the unit of `series.derivative(name)`, empty where the registry does not know it."""
+        return next((scalar.derivative_unit for scalar in self._scalars() if scalar.name == name), '')
+
+    def message(self, index: int) -> Any:
+        """Return message `index` as an object with its fields as attributes; raises `SeriesError`."""
+        try:
+            return decode(self.payloads[index], self._definition)
+        except LayoutError as error:
+            raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
+
+    def content(self, index: int) -> bytes:
+        """Return the bytes of message `index` without its stamp and without the options of its encoding."""
+        raw, place = self.payloads[index], self.stamp_place
+        if place is None:  # where it varies, it stands in the message's own layout
+            try:
+                seconds = layout_of(raw, self._definition).numbers.get(_SECONDS)
+            except (LayoutError, SeriesError):
+                seconds = None
+            place = seconds.offset if seconds is not None else len(raw)
+        return raw[: OPTIONS.start] + raw[OPTIONS.stop : place] + raw[place + STAMP_BYTES :]
+
+    def messages(self) -> Iterator[Any]:
+        """Yield all messages."""
+        return (self.message(index) for index in range(len(self)))
+
+    def _stamp(self, message: Any) -> int:
+        try:
+            return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        except AttributeError:  # of another type, or of a definition that is damaged
+            raise self._without_stamp() from None
+
+    def _without_stamp(self) -> SeriesError:
+        return SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
+
+    def _scalars(self) -> tuple[Scalar, ...]:
+        return self.registered.scalars if self.registered else ()
+
+    @functools.cached_property
+    def layout(self) -> Layout | None:
+        """The common layout of all messages, None where they differ or cannot be read in place."""
+        rows = self.payloads.rows
+        if rows is None or not len(rows):
+            return None
+        try:
+            layout = layout_of(rows[0].tobytes(), self._definition)
+        except LayoutError:
+            return None
+        return layout if layout.fits(rows) else None
+
+    @functools.cached_property
+    def _definition(self) -> Definition:
+        if self._obstacle:
+            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {self._obstacle}')
+        if self._known_definition is not None:
+            return self._known_definition
+        try:
+            return installed_definition(self.type)
+        except ValueError as error:
+            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
+
+    def _joint_column(self, name: str, part: str) -> Column:
+        if name not in self.names:
+            raise SeriesError(
+                f'{self.topic} has no {name!r}; it has {", ".join(self.names) or "no messages"}'
+            )
+        layout, rows = self.layout, self.payloads.rows
+        if not len(self):
+            return np.empty(0)
+        if layout is None or rows is None:
+            try:
+                return np.array([_joint_number(message, name, part) for message in self._decoded])
+            except (AttributeError, TypeError, ValueError):
+                raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}') from None
+        numbers = layout.numbers.get(part)
+        if numbers is None:
+            raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}')
+        if numbers.count != len(self.names):
+            return np.full(len(self), math.nan)
+        return numbers.column(rows, self.names.index(name))
+
+    def _path_column(self, path: str) -> Column:
+        layout, rows = self.layout, self.payloads.rows
+        owner, place = _split_place(path)
+        if layout is not None and rows is not None:
+            numbers = layout.numbers.get(path) or layout.numbers.get(owner)
+            if numbers is not None and place < numbers.count:
+                return numbers.column(rows, place).astype(np.float64)
+            raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
+        try:
+            return np.array([float(_at(message, path)) for message in self._decoded])
+        except (AttributeError, IndexError, TypeError, ValueError):
+            raise SeriesError(f'{self.topic}: not every message has a number {path!r}') from None
+
+    @functools.cached_property
+    def _decoded(self) -> list[Any]:
+        return list(self.messages())
+
+
+def _joint_number(message: Any, name: str, part: str) -> float:
+    numbers = getattr(message, part)
+    if name not in message.name or len(numbers) != len(message.name):
+        return math.nan
+    return float(numbers[message.name.index(name)])
+
+
+def _split_place(path: str) -> tuple[str, int]:
+    match = re.fullmatch(r'(.*)\[(\d+)\]', path)
+    return (match[1], int(match[2])) if match else (path, 0)
+
+
+def _at(message: Any, path: str) -> Any:
+    for name, place in _STEP.findall(path):
+        message = getattr(message, name) if name else message[int(place)]
+    return message

@@ -1,0 +1,74 @@
+"""Small drives with known answers, for comparing, cutting and merging."""
+
+from pathlib import Path
+
+import numpy as np
+from recorded_drive import PERIOD, START, joint_state
+from rosbags.typesys import Stores, get_typestore
+
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.offered_qos import OfferedQos
+from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
+
+_STORE = get_typestore(Stores.ROS2_JAZZY)
+_DELAY = 200_000  # ns from stamp to reception
+_LATCHED = (OfferedQos(durability='transient_local'),)
+
+
+def text(content: str) -> bytes:
+    """Return a `std_msgs/String`."""
+    message = _STORE.types['std_msgs/msg/String'](data=content)
+    return bytes(_STORE.serialize_cdr(message, 'std_msgs/msg/String'))
+
+
+def answers(count: int, *, on: int = 100, off: int = 300, phase: float = 0.0) -> dict[str, np.ndarray]:
+    """Return the signals of a drive of `count` ms: 8 Hz, damping from sample `on` to `off`; `phase` in s."""
+    time = np.arange(count) * 1e-3
+    displacement = 1e-3 * np.sin(2 * np.pi * 8.0 * (time - phase))
+    active = ((np.arange(count) >= on) & (np.arange(count) < off)).astype(float)
+    return {
+        'displacement': displacement,
+        'damping_active': active,
+        'current': active * (0.5 + 400.0 * np.abs(displacement)),
+        'friction_coefficient': np.where(active > 0.0, 0.3, np.nan),
+    }
+
+
+def write_answers(
+    folder: Path,
+    signals: dict[str, np.ndarray],
+    *,
+    start: int = START,
+    period: float = PERIOD,
+    session: str = 'scenario: bench\n',
+    marks: tuple[tuple[int, str], ...] = (),
+    missing: range = range(0),
+    namespace: str = '',
+) -> Path:
+    """Write a drive; `marks` are (sample, text), samples in `missing` are left out."""
+    writer = BagWriter(folder)
+    latched = (SESSION, AIR_GAP)
+    for topic in (*latched, EVENT, DISPLACEMENT, CURRENT_SETPOINT, CONTROL_TRACE):
+        writer.add_topic(f'{namespace}/{topic.name}', topic.type, _LATCHED if topic in latched else ())
+    writer.write(f'{namespace}/{SESSION.name}', text(session), start)
+    gap = joint_state(start, list(AIR_GAP.names), np.full(len(AIR_GAP.names), 4e-4), np.empty(0))
+    writer.write(f'{namespace}/{AIR_GAP.name}', gap, start + 1, start)
+    marked = dict(marks)
+    for index in range(len(signals['displacement'])):
+        stamp = start + round(index * period)
+        for topic in (DISPLACEMENT, CURRENT_SETPOINT, CONTROL_TRACE):
+            if index not in missing:
+                raw = joint_state(stamp, list(topic.names), _row(topic, signals, index), np.empty(0))
+                writer.write(f'{namespace}/{topic.name}', raw, stamp + _DELAY, stamp + _DELAY // 2)
+        if index in marked:
+            writer.write(f'{namespace}/{EVENT.name}', text(marked[index]), stamp + _DELAY)
+    writer.close()
+    return folder
+
+
+def _row(topic, signals: dict[str, np.ndarray], index: int) -> np.ndarray:
+    if topic is DISPLACEMENT:
+        return signals['displacement'][index : index + 1]
+    if topic is CURRENT_SETPOINT:
+        return signals['current'][index : index + 1]
+    return np.array([signals[name][index] if name in signals else 0.0 for name in topic.names])

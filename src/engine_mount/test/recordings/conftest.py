@@ -1,0 +1,26 @@
+"""What the tests share: small recordings, the genuine bags beside the repository."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+# The tests are imported one by one (importmode importlib); what they share is found by this path.
+sys.path.insert(0, str(Path(__file__).parent))
+
+from recorded_drive import write_drive
+
+
+@pytest.fixture
+def drive(tmp_path) -> Path:
+    """Return a recording of 500 samples of three topics."""
+    return write_drive(tmp_path / 'drive', 500)
+
+
+@pytest.fixture
+def genuine() -> Path:
+    """Return the folder of bags that rosbag2 itself wrote."""
+    folder = Path(__file__).parents[5] / 'shared' / 'data' / 'rosbag2'
+    if not folder.is_dir():
+        pytest.skip('no genuine bags: ../shared/data/rosbag2 beside the repository is absent')
+    return folder

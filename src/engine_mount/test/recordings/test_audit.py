@@ -1,0 +1,92 @@
+"""What the audit says of recordings with known losses."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
+
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit.report import as_json, as_table
+from engine_mount.recordings.run.screen import Screen
+from mount_recorder.bag_writer import BagWriter
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
+
+
+def test_sound_recording_has_nothing_to_tell(drive):
+    audits = audit(engine_mount.open(drive))
+    assert all(entry.sound for entry in audits.values())
+    displacement = audits['/displacement']
+    assert (displacement.expected, displacement.present, displacement.lost) == (500, 500, 0)
+    assert displacement.longest_gap_s == pytest.approx(1e-3)
+    assert displacement.answers.unanswered == 0
+
+
+def test_lost_samples_are_counted_with_the_longest_gap(tmp_path):
+    entry = audit(engine_mount.open(write_drive(tmp_path / 'bag', 100, skipped=range(40, 47))))[
+        '/displacement'
+    ]
+    assert (entry.expected, entry.present, entry.lost, entry.duplicated) == (100, 93, 7, 0)
+    assert entry.longest_gap_s == pytest.approx(8e-3)
+    assert not entry.sound
+
+
+def test_displacement_without_its_setpoint_is_counted(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    for topic in RECORDED:
+        writer.add_topic(f'/{topic.name}', topic.type)
+    for index in range(100):
+        writer.write('/displacement', sample(DISPLACEMENT, index), START + index)
+        if 20 <= index < 80 and index not in (30, 31):
+            writer.write('/current_setpoint', sample(CURRENT_SETPOINT, index), START + index)
+    writer.close()
+    assert audit(engine_mount.open(tmp_path / 'bag'))['/displacement'].answers.unanswered == 2
+
+
+def test_topics_without_a_rate_have_no_expectation(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/session', 'std_msgs/msg/String')
+    writer.add_topic('/displacement', DISPLACEMENT.type)
+    writer.write('/session', b'\x00\x01\x00\x00\x01\x00\x00\x00\x00', START)
+    writer.close()
+    audits = audit(engine_mount.open(tmp_path / 'bag'))
+    assert audits['/session'].expected is None
+    assert audits['/session'].present == 1
+    assert audits['/displacement'].remark == 'no message'
+
+
+def test_late_stamps_of_a_phone_are_neither_losses_nor_repetitions(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/phone', DISPLACEMENT.type)
+    stamps = START + 10 * PERIOD * np.arange(6000)
+    late = np.random.default_rng(1).choice(6000, 8, replace=False)
+    stamps[late] += 7 * PERIOD
+    for stamp in stamps.tolist():
+        writer.write('/phone', ScalarsLayout(DISPLACEMENT).pack(stamp, (0.0,)), stamp)
+    writer.close()
+    entry = audit(engine_mount.open(tmp_path / 'bag'))['/phone']
+    assert (entry.expected, entry.present, entry.lost, entry.duplicated) == (6000, 6000, 0, 0)
+    assert entry.remark == 'rate of 100 Hz taken from the stamps'
+
+
+def test_json_holds_the_figures_and_no_nan(tmp_path):
+    recording = engine_mount.open(write_drive(tmp_path / 'bag', 1))
+    audits = audit(recording)
+    text = json.dumps(as_json(audits, losses(recording, audits)), allow_nan=False)
+    entry = json.loads(text)['topics']['/displacement']
+    assert entry['longest_gap_s'] is None
+    assert {'expected', 'present', 'lost', 'duplicated', 'longest_gap_s'} <= entry.keys()
+    assert (entry['expected'], entry['present'], entry['lost'], entry['duplicated']) == (1, 1, 0, 0)
+
+
+def test_table_names_every_topic_and_its_losses(tmp_path):
+    shown = io.StringIO()
+    audits = audit(engine_mount.open(write_drive(tmp_path / 'bag', 100, skipped=range(40, 47))))
+    Screen(shown).table(as_table(audits))
+    text = shown.getvalue()
+    assert '/coil_ripple' in text
+    assert '8.0' in text

@@ -1,0 +1,213 @@
+"""What recover, cut and merge keep besides messages: attachments, metadata, sequence numbers, losses."""
+
+import functools
+import itertools
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from recorded_drive import PERIOD, START, sample
+
+import engine_mount
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.edit.cut import cut
+from engine_mount.recordings.edit.merge import merge
+from engine_mount.recordings.edit.recover import recover
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.schemas import schema_text
+from mount_recorder.statement import Reception
+from mount_ros.topics import DISPLACEMENT
+
+COUNT = 200
+CALIBRATION = {'name': 'calibration.csv', 'media_type': 'text/csv', 'data': b'A,N\n0,0\n3,450\n' * 999}
+NOTES = ({'vehicle': 'B', 'track': 'north'}, {'vehicle': 'B', 'track': 'south'})
+
+
+@pytest.fixture
+def place(tmp_path):
+    """Return a new folder at each call."""
+    numbers = itertools.count()
+    return lambda: tmp_path / f'bag_{next(numbers)}'
+
+
+def by_others(folder, end=True):
+    """Write a recording as another program does; without its `end` the program was killed."""
+    folder.mkdir()
+    with (folder / 'other_0.mcap').open('wb') as stream:
+        writer = Writer(stream, chunk_size=2000)
+        writer.start('ros2')
+        schema = writer.register_schema(DISPLACEMENT.type, 'ros2msg', schema_text(DISPLACEMENT.type).encode())
+        channel = writer.register_channel('/displacement', 'cdr', schema)
+        writer.add_metadata('track', NOTES[0])
+        for index in range(COUNT):
+            time = START + index * PERIOD
+            writer.add_message(channel, time, sample(DISPLACEMENT, index), time, sequence=7 + 3 * index)
+        writer.add_attachment(START, START + 5, **CALIBRATION)
+        writer.add_metadata('track', NOTES[1])
+        if end:
+            writer.finish()
+        else:
+            stream.flush()
+    return folder
+
+
+def recovered(folder, out):
+    assert recover(folder, out).complete
+    return out
+
+
+def halves_merged(folder, out):
+    recording = engine_mount.open(folder)
+    parts = [out.with_name(f'{out.name}_{number}') for number in (1, 2)]
+    cut(recording, parts[0], None, 0.03)
+    cut(recording, parts[1], 0.03, None)
+    merge([engine_mount.open(part) for part in parts], out)
+    return out
+
+
+def all_cut(folder, out):
+    cut(engine_mount.open(folder), out)
+    return out
+
+
+COPIES = pytest.mark.parametrize('copy', [recovered, halves_merged, all_cut])
+
+
+def stored(folder):
+    (file,) = folder.glob('*.mcap')
+    with file.open('rb') as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        statistics = reader.get_summary().statistics
+        attachments = [vars(attachment) for attachment in reader.iter_attachments()]
+        notes = [dict(record.metadata) for record in reader.iter_metadata() if record.name == 'track']
+        sequences = [message.sequence for _, _, message in reader.iter_messages()]
+    assert statistics.attachment_count == len(attachments)
+    return attachments, notes, sequences
+
+
+@COPIES
+def test_attachments_metadata_and_sequence_numbers_come_with_the_messages(place, copy):
+    folder = by_others(place())
+    before = stored(folder)
+    assert before[1] == list(NOTES)
+    assert before[2] == [7 + 3 * index for index in range(COUNT)]
+    assert stored(copy(folder, place())) == before
+
+
+def test_a_recording_without_its_end_keeps_what_stands_beside_its_messages(place):
+    folder = by_others(place(), end=False)
+    result = recover(folder, place())
+    attachments, notes, sequences = stored(result.folder)
+    assert [attachment['data'] for attachment in attachments] == [CALIBRATION['data']]
+    assert notes == list(NOTES)
+    assert sequences == [7 + 3 * index for index in range(result.kept)]
+
+
+def test_what_stands_behind_damage_is_kept(place):
+    folder = by_others(place(), end=False)
+    file = folder / 'other_0.mcap'
+    content = bytearray(file.read_bytes())
+    position = engine_mount.open(folder).files[0].chunks[3].position
+    content[position : position + 200] = bytes(200)
+    file.write_bytes(content)
+    result = recover(folder, place())
+    assert 0 < result.kept < COUNT
+    attachments, notes, _ = stored(result.folder)
+    assert len(attachments) == 1
+    assert notes == list(NOTES)
+
+
+@pytest.mark.parametrize('what', [b'3,450', b'track\x22'])
+def test_damaged_attachment_or_metadata_is_said_to_be_lost(place, what):
+    folder = by_others(place())
+    file = folder / 'other_0.mcap'
+    content = bytearray(file.read_bytes())
+    position = content.index(what)
+    if what.startswith(b'track'):
+        position -= 13  # to the beginning of its record: no known one any more
+        content[position] = 0x7F
+    else:
+        content[position] ^= 1
+    file.write_bytes(content)
+    result = recover(folder, place())
+    assert (result.kept, result.complete, result.all_messages) == (COUNT, False, True)
+    assert ('track' if what.startswith(b'track') else 'attachment') in str(result)
+    assert 'nothing of the file is missing' not in str(result)
+    attachments, notes, _ = stored(result.folder)
+    assert len(attachments) + len(notes) == 2
+    name = 'track' if what.startswith(b'track') else 'attachment'
+    opened = engine_mount.open(folder)
+    for said in (cut(opened, place()).losses, merge([engine_mount.open(folder)], place()).losses):
+        assert [name in sentence for sentence in said] == [True]
+
+
+# What the recorder says of its losses.
+
+
+def lossy(folder, first=0, received=100, lost=40):
+    """Write what a recorder leaves whose queue had no room for `lost` of `received` displacements."""
+    writer = BagWriter(folder)
+    writer.add_topic('/displacement', DISPLACEMENT.type)
+    writer.add_topic('/note', 'std_msgs/msg/String')
+    writer.attach({'/displacement': Reception(received, lost), '/note': Reception(1)})
+    writer.write('/note', b'\x00\x01\x00\x00\x02\x00\x00\x00a\x00', START + first * PERIOD)
+    for index in range(first, first + received - lost):
+        writer.write('/displacement', sample(DISPLACEMENT, index), START + index * PERIOD)
+    writer.close()
+    return folder
+
+
+def losses_of(folder):
+    recording = engine_mount.open(folder)
+    audits = audit(recording)
+    lost = {name: entry.lost for name, entry in audits.items() if entry.lost}
+    assert losses(recording, audits).lossless is not bool(lost)
+    return lost
+
+
+@COPIES
+def test_losses_of_the_recorder_stay_in_the_copy(place, copy):
+    assert losses_of(lossy(place())) == {'/displacement': 40}
+    copied = copy(lossy(place()), place())
+    assert losses_of(copied) == {'/displacement': 40}
+    assert losses_of(copy(copied, place())) == {'/displacement': 40}
+
+
+def test_recovery_says_that_messages_never_reached_the_file(place):
+    result = recover(lossy(place()), place())
+    assert result.complete
+    assert 'but 40 messages never reached it, as its recorder says' in str(result)
+    assert 'never reached' not in str(recover(lossy(place(), lost=0), place()))
+
+
+def merged(folders, out):
+    merge([engine_mount.open(folder) for folder in folders], out, different_sessions=True)
+    return out
+
+
+def test_losses_of_different_recordings_add_up_in_any_order_and_each_counts_once(place):
+    parts = [lossy(place(), first) for first in (0, 60, 120)]
+    once = merged(parts, place())
+    assert losses_of(once) == {'/displacement': 120}
+    twice = functools.reduce(lambda left, right: merged([left, right], place()), [*parts, parts[0], once])
+    assert losses_of(twice) == {'/displacement': 120}
+    statement = engine_mount.open(twice).files[0].metadata['engine_mount_recorder']
+    assert (statement['received'], statement['kept'], statement['lost']) == ('303', '183', '120')
+
+
+def test_a_recording_without_losses_stays_lossless(place):
+    assert losses_of(merged([lossy(place(), lost=0), lossy(place(), 100, lost=0)], place())) == {}
+
+
+def test_what_damage_took_is_counted_beside_what_the_recorder_lost(place):
+    folder = lossy(place(), received=2000)
+    file = folder / f'{folder.name}_0.mcap'
+    content = bytearray(file.read_bytes())
+    content[engine_mount.open(folder).files[0].chunks[-1].begin + 50] ^= 1
+    file.write_bytes(content)
+    gone = 1960 - len(engine_mount.open(folder)['displacement'])
+    assert gone
+    result = recover(folder, place())
+    assert losses_of(result.folder) == {'/displacement': 40 + gone}
+    assert losses_of(halves_merged(folder, place())) == {'/displacement': 40 + gone}

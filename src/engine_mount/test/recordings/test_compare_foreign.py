@@ -1,0 +1,183 @@
+"""Comparing topics of types that this project does not know, by the definition that stands in the bag."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compared_drives import answers, write_answers
+from mcap.writer import Writer
+from recorded_drive import START
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+import engine_mount
+from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.compare.tolerances import Tolerances
+from engine_mount.recordings.compare.words import sentences
+from engine_mount.recordings.events.recorded_events import recorded_events, recorded_marks
+from mount_recorder.bag_writer import BagWriter
+
+COUNT = 50
+PERIOD = 10_000_000  # ns
+LATER = START + 90_000_000_123
+NAME = 'strange_msgs/msg/Thing'
+
+
+def write_things(file: Path, fields: str, values, start: int = START, name: str = NAME) -> Path:
+    """Write messages with the fields of `values(index)` and, where there is one, a header with the stamp."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg(fields, name))
+    definition, _ = store.generate_msgdef(name, ros_version=2)
+    with file.open('wb') as stream:
+        writer = Writer(stream)
+        writer.start(profile='ros2', library='test')
+        schema = writer.register_schema(name, 'ros2msg', definition.encode())
+        channel = writer.register_channel('/thing', 'cdr', schema)
+        for index in range(COUNT):
+            stamp = start + index * PERIOD
+            seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+            time = store.types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds)
+            header = store.types['std_msgs/msg/Header'](stamp=time, frame_id='')
+            message = store.types[name](header=header, **values(index))
+            writer.add_message(channel, stamp, bytes(store.serialize_cdr(message, name)), stamp)
+        writer.finish()
+    return file
+
+
+def compared(folder: Path, fields: str, values, others, *, start: int = START, tolerances=()):
+    a = write_things(folder / 'a.mcap', fields, values)
+    b = write_things(folder / 'b.mcap', fields, others, start)
+    return compare(engine_mount.open(a), engine_mount.open(b), Tolerances(tolerances))
+
+
+FIRST_FIELDS = {
+    'float64 value\nstd_msgs/Header header': 'of equal length',
+    'int32 value\nstd_msgs/Header header': 'of equal length',
+    'int32 value\nint32 more\nstd_msgs/Header header\nfloat64[3] rest': 'of equal length',
+    'uint8 value\nstd_msgs/Header header\nstring text': 'of many lengths',
+}
+
+
+def _values(fields: str, value, index: int) -> dict:
+    found = {'value': value}
+    if 'more' in fields:
+        found |= {'more': index, 'rest': np.arange(3.0)}
+    return {**found, 'text': 'x' * (index % 7)} if 'text' in fields else found
+
+
+@pytest.mark.parametrize('start', [START, LATER], ids=['same stamps', 'other stamps'])
+@pytest.mark.parametrize('fields', FIRST_FIELDS, ids=range(len(FIRST_FIELDS)))
+def test_a_field_before_the_header_is_compared_and_the_stamp_is_not(fields, start, tmp_path):
+    def values(index):
+        return _values(fields, index, index)
+
+    def others(index):
+        return _values(fields, index + 5 * (index == 20), index)
+
+    same = compared(tmp_path, fields, values, values, start=start)
+    assert same.equal, sentences(same)
+    different = compared(tmp_path, fields, values, others, start=start)
+    assert not different.equal
+    if FIRST_FIELDS[fields] == 'of equal length':
+        (signal,) = different.differing
+        assert (signal.name, signal.largest.difference) == ('thing.value', 5.0)
+        assert signal.first.time == pytest.approx(0.2)
+    else:
+        assert 'messages that differ: 1 of thing' in sentences(different)
+
+
+HIDDEN = 'std_msgs/Header header\nfloat64 value\nfloat32[4] ranges\nstring text'
+
+
+@pytest.mark.parametrize('tolerances', [(), ('1%',)], ids=['to the bit', 'within 1 %'])
+def test_what_no_signal_shows_is_compared_too(tolerances, tmp_path):
+    """Arrays and texts have no name of a signal of their own."""
+
+    def values(index):
+        return {'value': 100.0, 'ranges': np.arange(4, dtype=np.float32), 'text': 'same'}
+
+    def array(index):
+        return {**values(index), 'value': 100.001, 'ranges': np.array([0, 1, 2 + (index < 3), 3], np.float32)}
+
+    assert compared(tmp_path, HIDDEN, values, values, tolerances=tolerances).equal
+    told = compared(tmp_path, HIDDEN, values, array, tolerances=tolerances)
+    assert not told.equal
+    assert 'messages that differ: 3 of thing' in sentences(told)
+    text = compared(tmp_path, HIDDEN, values, lambda k: {**values(k), 'text': 'else'}, tolerances=tolerances)
+    assert f'messages that differ: {COUNT} of thing' in sentences(text)
+
+
+def test_unknown_in_both_is_equal_and_the_sign_of_zero_counts_in_arrays_too(tmp_path):
+    def values(zero):
+        ranges = np.array([np.nan, zero, 1, 2], np.float32)
+        return lambda index: {'value': float(index), 'ranges': ranges, 'text': ''}
+
+    assert compared(tmp_path, HIDDEN, values(0.0), values(0.0)).equal
+    assert not compared(tmp_path, HIDDEN, values(0.0), values(-0.0)).equal
+
+
+@pytest.mark.parametrize('part', ['position', 'velocity', 'effort'])
+def test_numbers_of_a_joint_state_that_no_column_shows_are_compared(part, tmp_path):
+    """Two names with three positions, velocities whose unit nobody knows, efforts."""
+    fields = 'std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort'
+    joint_state = 'sensor_msgs/msg/JointState'
+
+    def values(last):
+        empty = np.empty(0)
+        numbers = {'position': empty, 'velocity': empty, 'effort': empty, part: np.array([1.0, 2.0, last])}
+        return lambda index: {'name': ['one', 'two'], **numbers}
+
+    a = write_things(tmp_path / 'a.mcap', fields, values(3.0), name=joint_state)
+    b = write_things(tmp_path / 'b.mcap', fields, values(4.0), name=joint_state)
+    assert compare(engine_mount.open(a), engine_mount.open(a)).equal
+    assert not compare(engine_mount.open(a), engine_mount.open(b)).equal
+
+
+def test_a_topic_of_another_type_is_never_equal(tmp_path):
+    def values(index):
+        return {'value': index}
+
+    fields = 'std_msgs/Header header\nint32 {}'
+    a = write_things(tmp_path / 'a.mcap', fields.format('value'), values)
+    b = write_things(tmp_path / 'b.mcap', fields.format('value'), values, name='strange_msgs/msg/Other')
+    comparison = compare(engine_mount.open(a), engine_mount.open(b))
+    assert not comparison.equal
+    assert f'thing: in A it is {NAME}, in B strange_msgs/msg/Other' in sentences(comparison)
+
+
+# Names of this project that belong to others.
+
+
+@pytest.fixture
+def with_camera(tmp_path):
+    """Return a recording with a camera beside the mount whose topics are called like ours."""
+    from engine_mount.recordings.edit.merge import merge
+
+    drive = write_answers(tmp_path / 'drive', answers(400), marks=((100, 'a bump'),))
+    writer = BagWriter(tmp_path / 'camera')
+    for name in ('event', 'session', 'displacement', 'control_trace'):
+        writer.add_topic(f'/camera/{name}', 'std_msgs/msg/Int32')
+        writer.write(f'/camera/{name}', b'\x00\x01\x00\x00\x07\x00\x00\x00', START)
+    writer.close()
+    parts = [engine_mount.open(drive), engine_mount.open(tmp_path / 'camera')]
+    merge(parts, tmp_path / 'both', different_sessions=True)
+    return tmp_path
+
+
+@pytest.mark.parametrize('name', ['both', 'camera'])
+def test_a_foreign_topic_called_event_is_none_of_ours(name, with_camera):
+    recording = engine_mount.open(with_camera / name)
+    kinds = [event.kind for event in recorded_events(recording)]
+    assert kinds == (['mark', 'switch_on', 'switch_off'] if name == 'both' else [])
+    texts = [mark.text for marks in recorded_marks(recording).values() for _, mark in marks]
+    assert texts == ['a bump'] * (name == 'both')
+
+
+def test_foreign_topics_called_like_ours_are_compared_as_foreign_ones(with_camera):
+    both, drive = (engine_mount.open(with_camera / name) for name in ('both', 'drive'))
+    assert compare(both, drive).equal
+    assert set(compare(both, drive).only_a) == {
+        f'/camera/{name}' for name in ('event', 'session', 'displacement', 'control_trace')
+    }
+    itself = compare(both, both)
+    assert itself.equal
+    assert 'camera/event' in {topic.name for topic in itself.topics}

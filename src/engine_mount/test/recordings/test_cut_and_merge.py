@@ -1,0 +1,287 @@
+"""Pieces of a recording: nothing in them is changed, and put together they are the whole."""
+
+import itertools
+
+import numpy as np
+import pytest
+from compared_drives import START, answers, write_answers
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.writer import Writer
+
+import engine_mount
+from engine_mount.recordings.bag.origin import origin
+from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.edit.cut import CutError, cut
+from engine_mount.recordings.edit.merge import MergeError, merge
+from engine_mount.recordings.events.recorded_events import (
+    EventError,
+    event_time,
+    find_event,
+    recorded_events,
+)
+from mount_recorder.bag_writer import BagWriter
+
+COUNT = 400
+MARKS = ((50, '{time: 1, kind: fault, text: cable}'), (250, 'just a sentence'), (320, '{kind: fault}'))
+
+
+@pytest.fixture(scope='module')
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('whole') / 'whole'
+    return engine_mount.open(write_answers(folder, answers(COUNT), marks=MARKS))
+
+
+@pytest.fixture
+def place(tmp_path):
+    """Return a new folder at each call."""
+    numbers = itertools.count()
+    return lambda: tmp_path / f'bag_{next(numbers)}'
+
+
+def _messages(recording) -> dict[str, list[tuple[int, int, bytes]]]:
+    found = {}
+    for name in recording:
+        series = recording[name]
+        times = zip(series.receive_times.tolist(), series.publish_times.tolist(), strict=True)
+        rows = [(log, publish, series.payloads[i]) for i, (log, publish) in enumerate(times)]
+        found[name] = sorted(rows, key=lambda row: row[0])
+    return found
+
+
+def _cut(recording, folder, *times, **options):
+    cut(recording, folder, *times, **options)
+    return engine_mount.open(folder)
+
+
+def test_a_cut_has_the_messages_of_its_time_and_the_latched_ones_before(whole, place):
+    piece = _cut(whole, place(), 0.1, 0.2)
+    original = _messages(whole)
+    begin, end = START + 100_000_000, START + 200_000_000
+    for name, rows in _messages(piece).items():
+        inside = [row for row in original[name] if begin <= row[0] < end]
+        latched = name in ('/session', '/air_gap', '/event')
+        before = [row for row in original[name] if row[0] < begin][-1:] if latched else []
+        assert rows == before + inside
+    assert len(piece['displacement']) == 100
+    assert piece['event'].message(0).data == MARKS[0][1]
+
+
+def test_a_cut_keeps_topics_types_and_quality_of_service(whole, place):
+    piece = _cut(whole, place(), 0.1, 0.2)
+    for name, topic in whole.topics.items():
+        assert piece.topics[name].type == topic.type
+        assert piece.topics[name].offered_qos == topic.offered_qos
+        assert piece.topics[name].type_hash == topic.type_hash
+
+
+def test_a_cut_says_where_it_is_from(whole, place):
+    first = _cut(whole, place(), 0.1, 0.3, reason='fault')
+    step = origin(first.information)[0]
+    assert {key: step[key] for key in ('did', 'recording', 'from_s', 'to_s', 'reason')} == {
+        'did': 'cut',
+        'recording': 'whole',
+        'from_s': 0.1,
+        'to_s': 0.3,
+        'reason': 'fault',
+    }
+    assert [step['did'] for step in origin(_cut(first, place(), 0.15, 0.2).information)] == ['cut', 'cut']
+
+
+def test_seconds_mean_the_same_in_a_cut_of_a_cut(whole, place):
+    """The session at its head keeps its time."""
+    once = _cut(whole, place(), 0.15, 0.2)
+    twice = _cut(_cut(whole, place(), 0.1, 0.3), place(), 0.15, 0.2)
+    assert _messages(once) == _messages(twice)
+
+
+@pytest.mark.parametrize(
+    ('begin', 'end', 'why'),
+    [
+        (0.2, 0.1, 'must lie behind its begin'),
+        (None, -1.0, 'must lie behind its begin'),
+        (0.2, 0.2, 'must lie behind its begin'),
+        (9.0, None, 'ends at 0.399 s'),
+        (float('nan'), None, 'must be a number'),
+        (0.10030, 0.10031, 'has no message from'),
+    ],
+)
+def test_a_cut_of_nothing_is_refused(whole, place, begin, end, why):
+    folder = place()
+    with pytest.raises(CutError, match=why):
+        cut(whole, folder, begin, end)
+    assert not folder.exists()
+
+
+# Merging.
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    ends=st.lists(st.integers(1, 397), min_size=1, max_size=4, unique=True),  # ms: no piece is empty
+    shift=st.sampled_from([0.0, 0.0004]),
+    overlap=st.sampled_from([0.0, 0.0005, 0.03]),
+    order=st.randoms(use_true_random=False),
+)
+def test_cuts_merged_in_any_order_are_the_original(whole, place, ends, shift, overlap, order):
+    borders = [None, *(1e-3 * end + shift for end in sorted(ends)), None]
+    pieces = []
+    for begin, end in itertools.pairwise(borders):
+        until = end if end is None else end + overlap
+        pieces.append(_cut(whole, place(), begin, until))
+    order.shuffle(pieces)
+    folder = place()
+    merged = merge(pieces, folder)
+    united = engine_mount.open(folder)
+    assert _messages(united) == _messages(whole)
+    assert compare(whole, united).equal
+    assert merged.messages == whole.message_count
+    assert merged.repeated == sum(piece.message_count for piece in pieces) - whole.message_count
+    assert not merged.holes
+    assert not united.warnings
+
+
+def test_what_a_recording_has_twice_stays_twice(place):
+    def write(folder, copies):
+        writer = BagWriter(folder)
+        writer.add_topic('/x', 'std_msgs/msg/String')
+        for _ in range(copies):
+            writer.write('/x', b'\x00\x01\x00\x00\x02\x00\x00\x00a\x00', 1000)
+        writer.close()
+        return engine_mount.open(folder)
+
+    folder = place()
+    merged = merge([write(place(), 2), write(place(), 3), write(place(), 1)], folder)
+    assert (merged.messages, merged.repeated) == (3, 3)
+
+
+def test_a_hole_between_the_parts_is_told(whole, place):
+    parts = [_cut(whole, place(), None, 0.1), _cut(whole, place(), 0.3, None)]
+    assert merge(parts, place()).holes == ('between two parts 0.201 s are missing',)
+
+
+def test_recordings_of_different_sessions_are_merged_only_if_asked(whole, place):
+    other = engine_mount.open(write_answers(place(), answers(20), session='scenario: motorway\n'))
+    with pytest.raises(MergeError, match='scenario is bench in A, motorway in B'):
+        merge([whole, other], place())
+    folder = place()
+    merge([whole, other], folder, different_sessions=True)
+    assert len(engine_mount.open(folder)['session']) == 2
+
+
+def test_a_recording_without_session_is_not_taken_for_a_part(whole, drive, place):
+    with pytest.raises(MergeError, match='has no session'):
+        merge([whole, engine_mount.open(drive)], place())
+
+
+def test_a_topic_of_two_types_is_refused(whole, place):
+    folder = place()
+    writer = BagWriter(folder)
+    writer.add_topic('/displacement', 'std_msgs/msg/String')
+    writer.close()
+    with pytest.raises(MergeError, match='displacement is sensor_msgs/msg/JointState in one recording'):
+        merge([whole, engine_mount.open(folder)], place())
+
+
+# Events.
+
+
+def test_events_are_marks_and_switchings_in_order(whole):
+    events = recorded_events(whole)
+    assert [event.kind for event in events] == ['fault', 'switch_on', 'mark', 'switch_off', 'fault']
+    assert events[0].text == 'cable'
+    assert events[2].text == 'just a sentence'
+    assert np.diff([event.log_time for event in events]).min() > 0
+
+
+@pytest.mark.parametrize(
+    ('wanted', 'sample'),
+    [('1', 50), ('2', 100), ('fault', 50), ('fault:2', 320), ('switch-on', 100), ('switch_off', 300)],
+)
+def test_an_event_is_found_by_number_kind_or_both(whole, wanted, sample):
+    assert find_event(whole, wanted).log_time == START + sample * 1_000_000 + 200_000
+
+
+@pytest.mark.parametrize('wanted', ['0', '6', 'fault:3', 'rough', ''])
+def test_an_event_that_is_not_there_is_refused_with_those_that_are(whole, wanted):
+    with pytest.raises(EventError, match=r'1 fault at 0.050 s, 2 switch_on at 0.100 s'):
+        find_event(whole, wanted)
+
+
+def test_marked_switchings_are_not_told_twice(place):
+    marks = ((101, '{kind: switch_on}'),)
+    recording = engine_mount.open(write_answers(place(), answers(200), marks=marks))
+    assert [event.kind for event in recorded_events(recording)] == ['switch_on']
+
+
+# Bags of others.
+
+
+@pytest.mark.parametrize('name', ['cdr_test', 'talker', 'wbag'])
+def test_genuine_bags_cut_and_merged_are_the_original(genuine, place, name):
+    original = engine_mount.open(genuine / name)
+    middle = 0.5e-9 * (original.time_range[1] - original.time_range[0])
+    parts = [_cut(original, place(), None, middle), _cut(original, place(), middle, None)]
+    folder = place()
+    merge(parts, folder)
+    assert _present(engine_mount.open(folder)) == _present(original)
+
+
+def _present(recording) -> dict[str, list[tuple[int, int, bytes]]]:
+    return {name: rows for name, rows in _messages(recording).items() if rows}
+
+
+def test_types_that_nobody_installed_are_cut_with_their_definition(place):
+    folder = place()
+    file = folder / 'foreign_0.mcap'
+    folder.mkdir()
+    with file.open('wb') as stream:
+        writer = Writer(stream)
+        writer.start(profile='ros2')
+        schema = writer.register_schema('strange_msgs/msg/Thing', 'ros2msg', b'int32 number')
+        channel = writer.register_channel('/thing', 'cdr', schema, {'offered_qos_profiles': ''})
+        for second in range(10):
+            time = START + second * 1_000_000_000
+            payload = b'\x00\x01\x00\x00' + second.to_bytes(4, 'little')
+            writer.add_message(channel, time, payload, time + 7)
+        writer.finish()
+    piece = _cut(engine_mount.open(folder), place(), 2.0, 5.0)
+    original = _messages(engine_mount.open(folder))['/thing']
+    assert _messages(piece) == {'/thing': original[2:5]}
+    (topic,) = piece.files[0].topics.values()
+    assert (topic.type, topic.definition) == ('strange_msgs/msg/Thing', b'int32 number')
+
+
+# Time.
+
+
+def _times(recording) -> dict[str, list[float]]:
+    times: dict[str, list[float]] = {}
+    for event in recorded_events(recording):
+        times.setdefault(event.kind, []).append(round(event_time(event, recording.time_axis), 6))
+    return times
+
+
+def test_the_same_moment_has_the_same_time_among_events_in_a_cut_and_in_a_comparison(whole, place):
+    """However long before the first sample the session came, and whenever the moment was received."""
+    drive = engine_mount.open(write_answers(place(), answers(COUNT), marks=MARKS))
+    writer = BagWriter(folder := place())
+    for name, rows in _messages(drive).items():
+        writer.add_topic(name, drive.topics[name].type)
+        for log, _, payload in rows:
+            writer.write(name, payload, log - 3_000_000_000 if name == '/session' else log + 5_000_000)
+    writer.close()
+    late = engine_mount.open(folder)
+    assert _times(late) == _times(drive)
+    assert _times(late) == {'fault': [0.05, 0.32], 'switch_on': [0.1], 'mark': [0.25], 'switch_off': [0.3]}
+    with pytest.raises(EventError, match=r'1 fault at 0.050 s, 2 switch_on at 0.100 s'):
+        find_event(late, 'rough')
+    later = answers(COUNT, on=112)
+    changes = compare(late, engine_mount.open(write_answers(place(), later))).switching_changes
+    assert [(change.time_a, change.time_b) for change in changes] == [
+        (pytest.approx(0.1), pytest.approx(0.112))
+    ]
+    piece = _cut(late, place(), 0.1, 0.3)
+    assert _times(piece)['mark'] == [0.25]
+    assert piece['displacement'].stamps[0] == START + 100_000_000
+    assert len(piece['displacement']) == 200

@@ -1,0 +1,133 @@
+"""A file cut anywhere, with any byte changed: what is read is what was written, and a sentence says the rest.
+
+The originals are small recordings with every byte of a message defined, so that messages compare as bytes.
+"""
+
+import random
+import shutil
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from recorded_drive import sample
+
+import engine_mount
+from engine_mount.recordings import ReadingError
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit.report import as_json, as_table, sentences
+from engine_mount.recordings.edit.recover import RecoveryError, recover
+from mount_recorder.bag_writer import BagWriter
+from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
+
+TIMES = 200
+LATCHED = b'\x00\x01\x00\x00\x02\x00\x00\x00a\x00'
+START = 1_700_000_000_000_000_000
+PERIOD = 1_000_000
+
+
+@pytest.fixture(scope='module')
+def intact(tmp_path_factory) -> Path:
+    """Return 60 samples in chunks of two groups, with a latched topic and a session."""
+    folder = tmp_path_factory.mktemp('intact') / 'bag'
+    writer = BagWriter(folder, chunk_size=2500)
+    writer.add_topic('/session', 'std_msgs/msg/String')
+    for topic in (AIR_GAP, SIM_TRUTH, DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT):
+        writer.add_topic(f'/{topic.name}', topic.type)
+    writer.write('/session', LATCHED, START - 5)
+    writer.write('/air_gap', sample(AIR_GAP, 0), START - 3)
+    for index in range(60):
+        for topic in (SIM_TRUTH, DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT):
+            sent = START + index * PERIOD + 100_000
+            writer.write(f'/{topic.name}', sample(topic, index), sent + 50_000, sent)
+    writer.close()
+    return folder
+
+
+def messages_of(recording):
+    """Return (topic, payload, receive time, publish time) of every message that is read."""
+    return Counter(
+        (name, bytes(raw), int(received), int(sent))
+        for name in recording
+        for raw, received, sent in zip(*raw_columns(recording[name]), strict=True)
+    )
+
+
+def raw_columns(series):
+    return series.payloads, series.receive_times, series.publish_times
+
+
+def before_all_messages(intact, change, place, error):
+    """Require that the file was cut before the end of its first chunk."""
+    assert change is cut, f'{place}: {error}'
+    assert place < engine_mount.open(intact).files[0].chunks[0].end, f'{place}: {error}'
+
+
+def damaged_copies(intact, folder, change):
+    """Yield 200 folders in which `change` was made to the bytes of the file, with what was changed."""
+    content = (intact / 'bag_0.mcap').read_bytes()
+    generator = random.Random(20)
+    copy = folder / 'bag'
+    copy.mkdir()
+    (copy / 'metadata.yaml').write_bytes((intact / 'metadata.yaml').read_bytes())
+    for place in generator.sample(range(len(content)), TIMES):
+        (copy / 'bag_0.mcap').write_bytes(change(content, place, generator))
+        yield copy, place
+
+
+def cut(content, place, _):
+    return content[:place]
+
+
+def flip(content, place, generator):
+    return content[:place] + bytes([content[place] ^ generator.randrange(1, 256)]) + content[place + 1 :]
+
+
+@pytest.mark.parametrize('change', [cut, flip])
+def test_what_is_read_is_what_was_written_and_a_sentence_says_the_rest(intact, tmp_path, change):
+    original = messages_of(engine_mount.open(intact))
+    for copy, place in damaged_copies(intact, tmp_path, change):
+        alone = place % 2  # with and without the description beside the file
+        try:
+            recording = engine_mount.open(copy / 'bag_0.mcap' if alone else copy)
+        except ReadingError as error:
+            before_all_messages(intact, change, place, error)
+            continue
+        listed = recording.message_count
+        found = messages_of(recording)
+        assert found <= original, place
+        assert listed in (found.total(), original.total()), place
+        assert recording.warnings, place
+        assert recording.whole == (found == original) or (alone and change is cut), place
+        assert recording.whole <= (found == original), place
+        entries = audit(recording)
+        told = losses(recording, entries)
+        as_json(entries, told)
+        as_table(entries)
+        assert sentences(entries, told), place
+
+
+@pytest.mark.parametrize('change', [cut, flip])
+def test_what_is_recovered_is_what_was_written_and_the_sentence_says_how_much(intact, tmp_path, change):
+    original = messages_of(engine_mount.open(intact))
+    for copy, place in damaged_copies(intact, tmp_path, change):
+        out = tmp_path / 'out'
+        alone = place % 2
+        try:
+            found = recover(copy / 'bag_0.mcap' if alone else copy, out)
+        except (ReadingError, RecoveryError) as error:
+            before_all_messages(intact, change, place, error)
+            assert not out.exists()
+            continue
+        recovered = engine_mount.open(out)
+        messages = messages_of(recovered)
+        assert messages <= original, place
+        assert recovered.whole, place
+        assert recovered.warnings == [], place
+        assert found.kept == messages.total(), place
+        assert found.complete == (messages == original) or (alone and change is cut), place
+        assert found.complete <= (messages == original), place
+        assert ('lost' in str(found)) != found.complete, place
+        if found.lost_is_counted:
+            assert found.lost == original.total() - messages.total(), place
+        shutil.rmtree(out)

@@ -1,0 +1,201 @@
+"""A file of a recording with any bytes changed: no value that was not written passes for sound.
+
+What a checksum covers is read as it was written or not at all. A value under none may be wrong; where the
+file as a whole has a checksum, the recording is then not whole, which is an error of the audit. Where it has
+none either, which a damaged one of 0 means too, a warning says that a damaged number would go unseen.
+"""
+
+import contextlib
+import shutil
+from collections import Counter
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from recorded_drive import write_drive
+from test_other_storages import written
+
+import engine_mount
+from engine_mount.recordings import ReadingError
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.bag.metadata import MetadataError, read_metadata
+from engine_mount.recordings.container.mcap_reading.chunks import CRC_PLACE, RECORD
+from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
+from engine_mount.recordings.container.mcap_reading.summary import Proof
+from engine_mount.recordings.messages.series import SeriesError
+from mount_ros.testing import mutated
+
+SEEDS = st.integers(0, 1 << 62)
+ONE_FILE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+WRITERS = {
+    'chunks with checksums': {},
+    'chunks without': {'enable_crcs': False, 'enable_data_crcs': True, 'compression': CompressionType.NONE},
+    'no chunks': {'use_chunking': False, 'enable_data_crcs': True},
+    'no summary': {'use_statistics': False, 'repeat_channels': False, 'repeat_schemas': False},
+}
+
+
+def rewritten(source, target, options):
+    """Write the messages of one MCAP file as another program does."""
+    with source.open('rb') as old, target.open('wb') as new:
+        writer = Writer(new, chunk_size=2500, **options)
+        writer.start('ros2', 'another')
+        numbers = {}
+        for schema, channel, message in make_reader(old).iter_messages():
+            if channel.topic not in numbers:
+                known = writer.register_schema(schema.name, schema.encoding, schema.data)
+                numbers[channel.topic] = writer.register_channel(
+                    channel.topic, channel.message_encoding, known, channel.metadata
+                )
+            number = numbers[channel.topic]
+            times = message.log_time, message.publish_time, message.sequence
+            writer.add_message(number, times[0], message.data, *times[1:])
+        writer.finish()
+
+
+@pytest.fixture(scope='module', params=['ours', *WRITERS])
+def intact(request, tmp_path_factory):
+    """Return the file of a recording and its content, by several writers."""
+    folder = write_drive(tmp_path_factory.mktemp('intact') / 'bag', 5, chunk_size=700)
+    file = folder / 'bag_0.mcap'
+    if request.param != 'ours':
+        rewritten(file, folder / 'other.mcap', WRITERS[request.param])
+        (folder / 'other.mcap').replace(file)
+    return file, file.read_bytes(), contents(engine_mount.open(folder))
+
+
+def contents(recording):
+    """Return how often each message with its times and numbers is in a recording."""
+    found = Counter()
+    for name in recording:
+        series = recording[name]
+        numbers = [(0.0,)] * len(series)
+        with contextlib.suppress(SeriesError):
+            columns = [series[column] for column in series.names]
+            numbers = list(zip(series.stamps.tolist(), *columns, strict=True))
+        times = zip(series.receive_times.tolist(), series.publish_times.tolist(), strict=True)
+        for raw, time, row in zip(series.payloads, times, numbers, strict=True):
+            found[(name, bytes(raw), time, repr(row) if len(row) > 1 else '')] += 1
+    return found
+
+
+def judged(path):
+    """Return what is read of a recording, whether the audit finds it sound, and whether no checksum tells."""
+    recording = engine_mount.open(path)
+    found = contents(recording)
+    unproven = any(
+        file.data_proof() is Proof.ABSENT for file in recording.files if isinstance(file, McapFile)
+    ) and any('a damaged number in them would go unseen' in warning for warning in recording.warnings)
+    return found, losses(recording, audit(recording)).sound, unproven
+
+
+@ONE_FILE
+@given(SEEDS, st.booleans())
+@example(912, False)  # where chunks have no checksums, a stretch that is not understood puts all in doubt
+def test_what_is_read_of_a_mutated_file_is_what_was_written_or_not_sound(intact, seed, alone):
+    file, content, original = intact
+    file.write_bytes(mutated(content, seed))
+    with contextlib.suppress(ReadingError):
+        found, sound, unproven = judged(file if alone else file.parent)
+        assert found <= original or not sound or unproven
+
+
+def records_of(content):
+    """Return (opcode, position) of the records of a file, those in chunks left out."""
+    position, found = len(MCAP0_MAGIC), []
+    while position < len(content) - len(MCAP0_MAGIC):
+        opcode, length = RECORD.unpack_from(content, position)
+        found.append((opcode, position))
+        position += RECORD.size + length
+    return found
+
+
+def foreign_file(folder, writer):
+    """Return the file of a recording by one of `WRITERS`, its bytes, content and records."""
+    file = folder / 'another.mcap'
+    rewritten(write_drive(folder / 'bag', 5, chunk_size=700) / 'bag_0.mcap', file, WRITERS[writer])
+    recording = engine_mount.open(file)
+    assert recording.whole
+    content = file.read_bytes()
+    return file, bytearray(content), contents(recording), records_of(content)
+
+
+def test_a_chunk_without_a_checksum_among_others_puts_the_recording_in_doubt(tmp_path):
+    file, content, _, records = foreign_file(tmp_path, 'chunks with checksums')
+    chunks = [position for opcode, position in records if opcode == Opcode.CHUNK]
+    assert len(chunks) > 1
+    content[chunks[0] + CRC_PLACE : chunks[0] + CRC_PLACE + 4] = bytes(4)
+    file.write_bytes(content)
+    recording = engine_mount.open(file)
+    assert not recording.whole
+    assert any('no checksum, while others do' in warning for warning in recording.warnings)
+
+
+def test_a_damaged_declaration_behind_the_messages_is_none_of_them(tmp_path):
+    file, content, original, records = foreign_file(tmp_path, 'chunks without')
+    end = dict(records)[Opcode.DATA_END]
+    position = next(place for opcode, place in records if opcode == Opcode.CHANNEL and place > end)
+    content[position] = Opcode.MESSAGE
+    file.write_bytes(content)
+    assert contents(engine_mount.open(file)) <= original
+
+
+def test_where_the_summary_is_damaged_and_nothing_vouches_for_the_messages_they_are_in_doubt(tmp_path):
+    file, content, _, records = foreign_file(tmp_path, 'no chunks')
+    places = dict(records)
+    content[places[Opcode.DATA_END] + RECORD.size : places[Opcode.DATA_END] + RECORD.size + 4] = bytes(4)
+    content[places[Opcode.STATISTICS] + RECORD.size] ^= 1
+    file.write_bytes(content)
+    recording = engine_mount.open(file)
+    assert contents(recording)
+    assert not recording.whole
+
+
+def test_an_index_that_passes_for_a_message_is_left_out_of_a_file_with_chunks(tmp_path):
+    file, content, original, records = foreign_file(tmp_path, 'chunks with checksums')
+    places = dict(records)
+    content[places[Opcode.MESSAGE_INDEX]] = Opcode.MESSAGE
+    content[places[Opcode.STATISTICS] + RECORD.size] ^= 1
+    file.write_bytes(content)
+    recording = engine_mount.open(file)
+    assert contents(recording) == original
+    assert any('outside of its chunks' in warning for warning in recording.warnings)
+
+
+@pytest.fixture(scope='module')
+def database(tmp_path_factory):
+    """Return the file of a recording in sqlite3 and its bytes."""
+    file = written(tmp_path_factory.mktemp('database') / 'bag', 20) / 'bag.db3'
+    return file, file.read_bytes()
+
+
+@ONE_FILE
+@given(SEEDS, st.booleans())
+@example(1_000_000_062, False)  # the name of a column is no text
+@example(1_000_012_127, True)  # a definition without a stamp
+def test_a_mutated_database_is_read_as_far_as_it_is_one(database, seed, alone):
+    file, content = database
+    file.write_bytes(mutated(content, seed))
+    with contextlib.suppress(ReadingError):
+        judged(file if alone else file.parent)
+
+
+@given(SEEDS)
+def test_a_mutated_description_is_understood_or_refused(described, seed):
+    text = mutated(described, seed).decode(errors='surrogateescape')
+    with contextlib.suppress(MetadataError):
+        information = read_metadata(text)
+        assert information.message_count >= 0
+        assert all(isinstance(topic.name, str) for topic in information.topics)
+
+
+@pytest.fixture(scope='module')
+def described(tmp_path_factory):
+    folder = write_drive(tmp_path_factory.mktemp('described') / 'bag', 3)
+    content = (folder / 'metadata.yaml').read_bytes()
+    shutil.rmtree(folder)
+    return content

@@ -1,0 +1,43 @@
+"""Quantiles of latencies without holding them: the same numbers to the bit as with all of them at hand."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine_mount.recordings.audit.latency import EDGES, on_one_clock, setpoint_latency
+from engine_mount.recordings.messages.compact_times import compact
+
+SOON = st.lists(st.integers(-3_000, 30_000_000), min_size=2, max_size=60)
+ANY = st.lists(st.integers(-(10**13), 10**13) | st.integers(0, 3), min_size=2, max_size=60)
+
+
+def both(ages):
+    stamps = 10**18 + 1_000_000 * np.arange(len(ages))
+    return compact(stamps), compact(stamps + np.array(ages))
+
+
+def test_latencies_are_those_of_all_ages_at_once():
+    @settings(deadline=None, derandomize=True)
+    @given(SOON)
+    def check(ages):
+        found, seconds = setpoint_latency(*both(ages)), np.array(ages) * 1e-9
+        assert found.median == np.median(seconds)
+        assert found.p99 == np.quantile(seconds, 0.99)
+        assert found.worst == seconds.max()
+        assert found.counts == tuple(np.histogram(seconds, [-np.inf, *EDGES, np.inf])[0])
+
+    check()
+
+
+def test_stamps_whose_middle_age_is_more_than_a_minute_are_of_another_clock():
+    @settings(deadline=None, derandomize=True)
+    @given(ANY)
+    def check(ages):
+        assert on_one_clock(*both(ages)) == bool(abs(np.median(ages)) <= 60e9)
+
+    check()
+
+
+def test_damaged_times_that_are_farther_apart_than_any_clock_goes_are_of_another_clock():
+    stamps, times = np.array([-(2**62), 0, 2**62]), np.array([2**61, 0, -(2**61)])
+    assert not on_one_clock(compact(stamps), compact(times))

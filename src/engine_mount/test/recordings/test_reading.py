@@ -1,0 +1,440 @@
+"""Reading what this project, rosbag2 itself, a crash or a bad disk left."""
+
+import contextlib
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+from mcap.writer import CompressionType, IndexType, Writer
+from recorded_drive import PERIOD, START, joint_state, sample, write_drive
+from rosbags.typesys import Stores, get_typestore
+
+import engine_mount
+from engine_mount.recordings import ReadingError, SeriesError
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.schemas import schema_text
+from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, SIM_CHASSIS_ACCELERATION, SIM_MOUNT_FORCE
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+STRING = 'std_msgs/msg/String'
+INDICES = np.arange(500)
+
+
+def string(text):
+    return bytes(STORE.serialize_cdr(STORE.types[STRING](data=text), STRING))
+
+
+def bag_of(folder, topic, type_name, messages):
+    writer = BagWriter(folder)
+    writer.add_topic(topic, type_name)
+    for index, raw in enumerate(messages):
+        writer.write(topic, raw, START + index * PERIOD)
+    writer.close()
+    return engine_mount.open(folder)
+
+
+def test_columns_carry_names_numbers_units_and_stamps(drive):
+    recording = engine_mount.open(drive)
+    assert recording.warnings == []
+    series = recording['displacement']
+    assert series.names == ('mount',)
+    assert series.unit('mount') == 'm'
+    np.testing.assert_array_equal(series['mount'], INDICES)
+    np.testing.assert_array_equal(series.stamps, START + INDICES * PERIOD)
+    np.testing.assert_array_equal(series.receive_times, START + INDICES * PERIOD + 200_000)
+    np.testing.assert_array_equal(series.publish_times, series.receive_times)
+
+
+def test_derivatives_are_columns_too(drive):
+    series = engine_mount.open(drive)['coil_ripple']
+    np.testing.assert_array_equal(series['flux_density'], INDICES + 1 / 8)
+    np.testing.assert_array_equal(series.derivative('flux_density'), -(INDICES + 1 / 8))
+    assert (series.unit('flux_density'), series.derivative_unit('flux_density')) == ('T', 'T/s')
+
+
+def test_derivative_that_is_not_sent_is_not_a_number(drive):
+    assert np.isnan(engine_mount.open(drive)['displacement'].derivative('mount')).all()
+
+
+def test_types_and_counts_stand_without_reading_messages(drive):
+    topics = engine_mount.open(drive).topics
+    assert list(topics) == ['/displacement', '/coil_ripple', '/current_setpoint']
+    assert {topic.type for topic in topics.values()} == {JOINT_STATE}
+    assert {topic.message_count for topic in topics.values()} == {500}
+
+
+def test_single_file_is_read_like_its_folder(drive):
+    recording = engine_mount.open(drive / 'drive_0.mcap')
+    assert recording.warnings == []
+    assert recording.information == engine_mount.open(drive).information
+    assert len(recording['displacement']) == 500
+
+
+def test_topics_loaded_in_one_pass_are_those_loaded_alone(drive, monkeypatch):
+    together, alone = engine_mount.open(drive), engine_mount.open(drive)
+    names = ('displacement', 'coil_ripple')
+    together.load(names)
+    monkeypatch.setattr(together, '_blocks', lambda wanted: pytest.fail('read again'))
+    for name in names:
+        assert [*map(bytes, together[name].payloads)] == [*map(bytes, alone[name].payloads)]
+        np.testing.assert_array_equal(together[name].receive_times, alone[name].receive_times)
+    with pytest.raises(ReadingError, match='no topic'):
+        together.load(['nothing'])
+
+
+def test_latched_returns_the_last_message(drive):
+    assert engine_mount.open(drive).latched('current_setpoint').position[0] == 499.0
+
+
+def test_topic_is_found_below_its_namespace(tmp_path):
+    recording = bag_of(tmp_path / 'bag', '/mount_right/displacement', JOINT_STATE, [sample(DISPLACEMENT, 3)])
+    assert recording['displacement']['mount'] == [3.0]
+    assert 'displacement' in recording
+    assert recording['displacement'].unit('mount') == 'm'
+
+
+def test_ambiguous_topic_is_refused(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    for name in ('/left/displacement', '/right/displacement'):
+        writer.add_topic(name, JOINT_STATE)
+    writer.close()
+    with pytest.raises(ReadingError, match='ambiguous'):
+        engine_mount.open(tmp_path / 'bag')['displacement']
+
+
+def test_unknown_topic_is_refused_with_the_known_ones(drive):
+    with pytest.raises(ReadingError, match='/displacement, /coil_ripple'):
+        engine_mount.open(drive)['road']
+
+
+def test_unknown_name_is_refused_with_the_known_ones(drive):
+    with pytest.raises(SeriesError, match='coil_current, flux_density'):
+        engine_mount.open(drive)['coil_ripple']['current']
+
+
+def test_empty_topic_has_its_registered_names_and_no_rows(tmp_path):
+    series = bag_of(tmp_path / 'bag', '/coil_ripple', JOINT_STATE, [])['coil_ripple']
+    assert series.names == COIL_RIPPLE.names
+    assert series['coil_current'].size == series.stamps.size == 0
+    with pytest.raises(ReadingError, match='no message'):
+        engine_mount.open(tmp_path / 'bag').latched('coil_ripple')
+
+
+def test_undefined_bytes_between_numbers_do_not_matter(tmp_path):
+    layout = ScalarsLayout(DISPLACEMENT)
+    raws = [bytearray(layout.pack(START + index * PERIOD, [float(index)])) for index in range(10)]
+    for index, raw in enumerate(raws):
+        raw[17:20] = bytes([index] * 3)  # behind the empty frame_id
+    series = bag_of(tmp_path / 'bag', '/displacement', JOINT_STATE, map(bytes, raws))['displacement']
+    assert series.layout is not None
+    np.testing.assert_array_equal(series['mount'], range(10))
+
+
+def test_messages_of_changing_shape_are_read_by_names(tmp_path):
+    numbers = np.array([1.0, 2.0])
+    raws = [
+        joint_state(START, ['coil_current', 'flux_density'], numbers, -numbers),
+        joint_state(START + PERIOD, ['flux_density', 'coil_current'], numbers, -numbers),
+        joint_state(START + 2 * PERIOD, ['coil_current'], numbers[:1], np.empty(0)),
+    ]
+    series = bag_of(tmp_path / 'bag', '/coil_ripple', JOINT_STATE, raws)['coil_ripple']
+    assert series.names == ('coil_current', 'flux_density')
+    np.testing.assert_array_equal(series['coil_current'], [1.0, 2.0, 1.0])
+    np.testing.assert_array_equal(series['flux_density'], [2.0, 1.0, np.nan])
+    np.testing.assert_array_equal(series.derivative('coil_current'), [-1.0, -2.0, np.nan])
+    np.testing.assert_array_equal(series.stamps, START + np.arange(3) * PERIOD)
+
+
+def test_names_in_another_order_at_equal_length_are_noticed(tmp_path):
+    raws = [
+        joint_state(START, ['ab', 'ba'], np.array([1.0, 2.0]), np.empty(0)),
+        joint_state(START, ['ba', 'ab'], np.array([2.0, 1.0]), np.empty(0)),
+    ]
+    series = bag_of(tmp_path / 'bag', '/joints', JOINT_STATE, raws)['joints']
+    np.testing.assert_array_equal(series['ab'], [1.0, 1.0])
+
+
+def test_instruments_are_read_by_path(tmp_path):
+    types = STORE.types
+    vector = types['geometry_msgs/msg/Vector3']
+    raws = [
+        bytes(
+            STORE.serialize_cdr(
+                types['geometry_msgs/msg/WrenchStamped'](
+                    header=types['std_msgs/msg/Header'](
+                        stamp=types['builtin_interfaces/msg/Time'](sec=index, nanosec=5), frame_id='rack'
+                    ),
+                    wrench=types['geometry_msgs/msg/Wrench'](
+                        force=vector(x=0.0, y=0.0, z=10.0 * index), torque=vector(x=0.0, y=0.0, z=0.0)
+                    ),
+                ),
+                SIM_MOUNT_FORCE.type,
+            )
+        )
+        for index in range(5)
+    ]
+    series = bag_of(tmp_path / 'bag', '/sim/mount_force', SIM_MOUNT_FORCE.type, raws)['sim/mount_force']
+    np.testing.assert_array_equal(series['wrench.force.z'], 10.0 * np.arange(5))
+    np.testing.assert_array_equal(series.stamps, np.arange(5) * 1_000_000_000 + 5)
+    with pytest.raises(SeriesError, match=r'wrench\.force\.z'):
+        series['force']
+
+
+def test_arrays_in_a_message_are_read_by_place(tmp_path):
+    from rclpy.serialization import serialize_message
+    from sensor_msgs.msg import Imu
+
+    raws = []
+    for index in range(4):
+        message = Imu()
+        message.header.stamp.sec = index
+        message.linear_acceleration.z = 9.81 + index
+        message.linear_acceleration_covariance[8] = 0.25 * index
+        raws.append(serialize_message(message))
+    series = bag_of(tmp_path / 'bag', '/sim/chassis_acceleration', SIM_CHASSIS_ACCELERATION.type, raws)[
+        'sim/chassis_acceleration'
+    ]
+    np.testing.assert_array_equal(series['linear_acceleration.z'], 9.81 + np.arange(4))
+    np.testing.assert_array_equal(series['linear_acceleration_covariance[8]'], 0.25 * np.arange(4))
+
+
+def test_type_without_header_has_no_stamps(tmp_path):
+    recording = bag_of(tmp_path / 'bag', '/session', STRING, [string('a')])
+    with pytest.raises(SeriesError, match='use receive_times'):
+        _ = recording['session'].stamps
+
+
+def test_texts_of_changing_length_are_read(tmp_path):
+    recording = bag_of(tmp_path / 'bag', '/event', STRING, [string('a'), string('longer'), string('')])
+    assert [message.data for message in recording['event'].messages()] == ['a', 'longer', '']
+
+
+def test_garbled_message_is_refused_with_its_number(tmp_path):
+    raws = [string('fine'), b'\x00\x01\x00\x00\xff\xff\xff\x7fx']
+    recording = bag_of(tmp_path / 'bag', '/event', STRING, raws)
+    with pytest.raises(SeriesError, match='message 1'):
+        list(recording['event'].messages())
+
+
+# What is missing or damaged.
+
+
+def test_missing_metadata_file_is_a_warning(drive):
+    (drive / 'metadata.yaml').unlink()
+    recording = engine_mount.open(drive)
+    assert len(recording['displacement']) == 500
+    assert any('metadata.yaml is missing' in warning for warning in recording.warnings)
+
+
+def test_broken_metadata_file_is_a_warning(drive):
+    (drive / 'metadata.yaml').write_text('rosbag2_bagfile_information: [')
+    recording = engine_mount.open(drive)
+    assert len(recording['displacement']) == 500
+    assert any('metadata.yaml is not readable' in warning for warning in recording.warnings)
+
+
+def test_file_without_its_end_is_read_to_the_last_whole_chunk(drive):
+    path = drive / 'drive_0.mcap'
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    recording = engine_mount.open(drive)
+    count = len(recording['displacement'])
+    assert 0 < count < 500
+    np.testing.assert_array_equal(recording['displacement']['mount'], np.arange(count))
+    assert recording.topics['/displacement'].message_count == count
+    assert any('without its footer' in warning for warning in recording.warnings)
+
+
+def test_cut_between_the_indexes_of_a_chunk_loses_nothing_of_it(drive):
+    path = drive / 'drive_0.mcap'
+    content = path.read_bytes()
+    indexes = [begin for opcode, begin in records_of(content) if opcode == Opcode.MESSAGE_INDEX]
+    path.write_bytes(content[: indexes[1]])  # of three topics in the first chunk
+    recording = engine_mount.open(drive)
+    counts = [len(recording[topic]) for topic in recording]
+    assert min(counts) >= max(counts) - 1 > 0
+
+
+def test_wrong_byte_in_a_chunk_without_compression_is_noticed(tmp_path):
+    path = tmp_path / 'other.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file, compression=CompressionType.NONE)
+        writer.start('ros2', 'another')
+        writer.register_channel('/event', 'cdr', writer.register_schema(STRING, 'ros2msg', b'string data'))
+        writer.add_message(1, START, string('the text'), START)
+        writer.finish()
+    path.write_bytes(path.read_bytes().replace(b'the text', b'the test'))
+    recording = engine_mount.open(path)
+    assert len(recording['event']) == 0
+    assert any('damaged' in warning for warning in recording.warnings)
+
+
+def test_damaged_chunk_is_left_out_with_a_sentence(drive):
+    path = drive / 'drive_0.mcap'
+    content = bytearray(path.read_bytes())
+    content[1000] ^= 0xFF  # inside the first chunk
+    path.write_bytes(content)
+    recording = engine_mount.open(drive)
+    count = len(recording['displacement'])
+    assert 0 < count < 500
+    np.testing.assert_array_equal(recording['displacement']['mount'], np.arange(500 - count, 500))
+    assert any('damaged' in warning for warning in recording.warnings)
+
+
+def test_empty_and_foreign_files_are_refused_with_a_sentence(tmp_path):
+    for content, word in ((b'', 'empty'), (b'SQLite format 3\0', 'no MCAP file')):
+        path = tmp_path / 'some.mcap'
+        path.write_bytes(content)
+        with pytest.raises(ReadingError, match=word):
+            engine_mount.open(path)
+    with pytest.raises(ReadingError, match='cannot be read'):
+        engine_mount.open(tmp_path / 'nowhere.mcap')
+    (tmp_path / 'empty').mkdir()
+    with pytest.raises(ReadingError, match='holds no MCAP file'):
+        engine_mount.open(tmp_path / 'empty')
+
+
+def test_other_storage_is_refused_with_a_sentence(drive):
+    path = drive / 'metadata.yaml'
+    path.write_text(path.read_text().replace('storage_identifier: mcap', 'storage_identifier: parquet'))
+    with pytest.raises(ReadingError, match='parquet'):
+        engine_mount.open(drive)
+
+
+def test_wrong_count_in_the_metadata_file_is_a_warning(drive):
+    path = drive / 'metadata.yaml'
+    path.write_text(path.read_text().replace('message_count: 1500', 'message_count: 1600'))
+    assert any('1600 messages' in warning for warning in engine_mount.open(drive).warnings)
+
+
+def test_pieces_are_read_in_their_order_and_missing_ones_are_named(tmp_path):
+    folder = tmp_path / 'bag'
+    folder.mkdir()
+    for number in range(12):
+        piece = write_drive(tmp_path / f'piece{number}', 5)
+        (piece / f'piece{number}_0.mcap').rename(folder / f'bag_{number}.mcap')
+    recording = engine_mount.open(folder)
+    assert [file.path.name for file in recording.files] == [f'bag_{number}.mcap' for number in range(12)]
+    text = (tmp_path / 'piece0' / 'metadata.yaml').read_text()
+    listed = ''.join(f'  - bag_{number}.mcap\n' for number in (0, 1, 99))
+    (folder / 'metadata.yaml').write_text(
+        text.replace('  - piece0_0.mcap\n', listed).replace('files:\n', 'unused:\n')
+    )
+    recording = engine_mount.open(folder)
+    assert len(recording['displacement']) == 10
+    assert any('1 of 3 pieces are missing: bag_99.mcap' in warning for warning in recording.warnings)
+
+
+@pytest.mark.parametrize('compression', list(CompressionType))
+@pytest.mark.parametrize('chunked', [True, False])
+@pytest.mark.parametrize('indexed', [True, False])
+def test_files_of_other_writers_are_read(tmp_path, compression, chunked, indexed):
+    path = tmp_path / 'other.mcap'
+    with path.open('wb') as file:
+        writer = Writer(
+            file,
+            chunk_size=2000,
+            compression=compression,
+            use_chunking=chunked,
+            index_types=IndexType.ALL if indexed else IndexType.NONE,
+            repeat_channels=indexed,
+            repeat_schemas=indexed,
+        )
+        writer.start('ros2', 'another')
+        broken = writer.register_schema('pkg/msg/Broken', 'ros2msg', b'---\n')
+        writer.register_channel('/broken', 'cdr', broken)
+        schema = writer.register_schema(JOINT_STATE, 'ros2msg', schema_text(JOINT_STATE).encode())
+        channel = writer.register_channel('/displacement', 'cdr', schema)
+        for index in range(100):
+            writer.add_message(1, START + index, b'\0\1\0\0' + bytes(index % 3), START)
+            writer.add_message(channel, START + index, sample(DISPLACEMENT, index), START)
+        writer.finish()
+    recording = engine_mount.open(path)
+    np.testing.assert_array_equal(recording['displacement']['mount'], range(100))
+    assert recording.topics['/broken'].message_count == 100
+    with pytest.raises(SeriesError, match='not installed'):
+        recording['broken'].message(0)
+
+
+# An offset beyond the head of a message lands where its bytes could pass for a record of channel 1.
+@pytest.mark.parametrize(
+    'astray', [lambda offset: 12345, lambda offset: offset + 31 + 3, lambda offset: 1 << 40]
+)
+def test_index_that_points_astray_is_not_believed(drive, astray):
+    path = drive / 'drive_0.mcap'
+    content = bytearray(path.read_bytes())
+    position = next(begin for opcode, begin in records_of(content) if opcode == Opcode.MESSAGE_INDEX)
+    place = position + 9 + 6 + 8  # of the offset of its first entry
+    struct.pack_into('<Q', content, place, astray(*struct.unpack_from('<Q', content, place)))
+    path.write_bytes(content)
+    np.testing.assert_array_equal(engine_mount.open(drive)['displacement']['mount'], INDICES)
+
+
+def records_of(content):
+    """Yield opcode and beginning of each record of a file."""
+    position = 8
+    while position + 9 <= len(content):
+        opcode, length = struct.unpack_from('<BQ', content, position)
+        yield opcode, position
+        position += 9 + length
+
+
+@settings(deadline=None, derandomize=True, max_examples=60)
+@given(st.data())
+def test_no_damage_ends_in_a_traceback(tmp_path_factory, data):
+    content = bytearray(_intact(tmp_path_factory))
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path_factory.getbasetemp() / 'damaged.mcap'
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+    with contextlib.suppress(ReadingError, SeriesError):
+        recording = engine_mount.open(path)
+        for name in recording:
+            series = recording[name]
+            assert series.stamps.size == len(series)
+            assert all(series[column].size == len(series) for column in series.names)
+
+
+_INTACT: list[bytes] = []
+
+
+def _intact(tmp_path_factory):
+    if not _INTACT:
+        folder = tmp_path_factory.mktemp('intact') / 'bag'
+        write_drive(folder, 20, chunk_size=1500)
+        _INTACT.append((folder / 'bag_0.mcap').read_bytes())
+    return _INTACT[0]
+
+
+# Genuine bags.
+
+
+def test_talker_with_integer_qos_is_read(genuine):
+    recording = engine_mount.open(genuine / 'talker')
+    assert recording.warnings == []
+    assert recording.information.version == 4
+    assert recording.latched('/topic').data
+    assert recording.topics['/rosout'].offered_qos[0].durability == 'transient_local'
+    assert recording.topics['/parameter_events'].message_count == 0
+
+
+def test_split_bag_with_missing_pieces_is_read(genuine):
+    recording = engine_mount.open(genuine / 'wbag')
+    assert any('3 of 5 pieces are missing: wbag_1.mcap' in warning for warning in recording.warnings)
+    assert recording.message_count == 1246 + 1108
+    assert sum(len(recording[name]) for name in recording) == recording.message_count
+
+
+def test_types_that_are_not_installed_are_read_by_the_definition_in_the_bag(genuine):
+    recording = engine_mount.open(genuine / 'cdr_test')
+    arrays, basic = recording['/array_topic'], recording['/test_topic']
+    assert (len(arrays), len(basic)) == (4, 3)
+    assert basic['int32_value'].tolist() == [message.int32_value for message in basic.messages()]
+    assert basic['int32_value'][0] == 123
+    floats = [message.float64_values[2] for message in arrays.messages()]
+    np.testing.assert_array_equal(arrays['float64_values[2]'], floats)
+    assert any('carry no checksum' in warning for warning in recording.warnings)

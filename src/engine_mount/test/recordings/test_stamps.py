@@ -1,0 +1,199 @@
+"""Missing, repeated and late samples, in one go and one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine_mount.recordings.messages.compact_times import compact
+from engine_mount.recordings.messages.stamps import misdated, missing_samples, redated, stamp_statistics
+from mount_recorder.stamp_watch import StampWatch
+
+RATE = 1000.0
+PERIOD = 1_000_000
+START = 1_700_000_000_000_000_000
+
+
+def stamps_of(indices):
+    return np.array([START + index * PERIOD for index in indices], np.int64)
+
+
+def counts(indices):
+    found = stamp_statistics(compact(stamps_of(indices)), RATE)
+    return found.expected, found.present, found.lost, found.duplicated, found.out_of_order
+
+
+@pytest.mark.parametrize(
+    ('indices', 'expected'),
+    [
+        ([], (0, 0, 0, 0, 0)),
+        ([5], (1, 1, 0, 0, 0)),
+        (range(100), (100, 100, 0, 0, 0)),
+        ([0, 1, 4, 5], (6, 4, 2, 0, 0)),
+        ([0, 1, 1, 2], (3, 4, 0, 1, 0)),
+        ([0, 2, 1, 3], (4, 4, 0, 0, 1)),
+    ],
+)
+def test_counts(indices, expected):
+    assert counts(indices) == expected
+
+
+def test_longest_gap_is_told_in_seconds():
+    assert stamp_statistics(compact(stamps_of([0, 1, 5, 6])), RATE).longest_gap == pytest.approx(4e-3)
+    assert np.isnan(stamp_statistics(compact(stamps_of([0])), RATE).longest_gap)
+
+
+def test_clock_that_runs_100_ppm_fast_is_no_loss():
+    stamps = np.rint(np.arange(60_000) * PERIOD * 1.0001).astype(np.int64)
+    found = stamp_statistics(compact(stamps), RATE)
+    assert (found.lost, found.duplicated, found.expected) == (0, 0, 60_000)
+
+
+def test_jitter_below_a_third_of_the_period_is_no_loss():
+    jitter = np.random.default_rng(7).uniform(-0.2, 0.2, 5000)
+    stamps = np.rint((np.arange(5000) + jitter) * PERIOD).astype(np.int64)
+    found = stamp_statistics(compact(stamps), RATE)
+    assert (found.lost, found.duplicated, found.out_of_order) == (0, 0, 0)
+
+
+def counts_at(positions):
+    """Counts of samples at times given in periods."""
+    found = stamp_statistics(compact(np.rint(np.asarray(positions) * PERIOD).astype(np.int64)), RATE)
+    assert found.expected == found.present - found.duplicated + found.lost
+    return found.expected, found.present, found.lost, found.duplicated
+
+
+def moved(**stamps):
+    positions = np.arange(6000.0)
+    for name, position in stamps.items():
+        positions[int(name[1:])] = position
+    return positions
+
+
+@pytest.mark.parametrize(
+    'positions',
+    [
+        moved(_1000=1000.9),
+        moved(_1000=999.2),
+        moved(_1000=1001.7),
+        moved(_1000=1001.6, _2000=2000.7, _3000=2999.3),
+        moved(_0=0.7),
+        moved(_5999=5998.3),
+    ],
+    ids=['late', 'early', 'later than the next', 'several', 'first', 'last'],
+)
+def test_a_stamp_beside_its_place_is_neither_lost_nor_twice(positions):
+    assert counts_at(positions) == (6000, 6000, 0, 0)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_jitter_of_a_third_of_the_period_is_no_loss(seed):
+    jitter = np.random.default_rng(seed).uniform(-0.35, 0.35, 6000)
+    assert counts_at(np.sort(np.arange(6000) * 1.0001 + jitter)) == (6000, 6000, 0, 0)
+
+
+def test_under_jitter_lost_and_doubled_samples_are_still_counted():
+    jitter = np.random.default_rng(2).uniform(-0.3, 0.3, 6000)
+    positions = np.arange(6000) + jitter
+    assert counts_at(np.delete(positions, [100, 101, 3000])) == (6000, 5997, 3, 0)
+    assert counts_at(np.insert(positions, 101, positions[100])) == (6000, 6001, 0, 1)
+    assert counts_at(np.insert(positions, 101, positions[100] + 0.1)) == (6000, 6001, 0, 1)
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.lists(st.floats(0.0, 50.0), min_size=1, max_size=60))
+def test_the_counts_of_any_stamps_add_up(positions):
+    expected, present, lost, duplicated = counts_at(positions)
+    assert present == len(positions)
+    assert min(lost, duplicated) >= 0
+    assert expected >= 1
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.lists(st.integers(0, 200), min_size=1, max_size=100))
+def test_expected_is_the_span_and_the_counts_add_up(indices):
+    expected, present, lost, duplicated, _ = counts(indices)
+    assert expected == max(indices) - min(indices) + 1 == present - duplicated + lost
+    assert duplicated == len(indices) - len(set(indices))
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.lists(st.booleans(), max_size=200), st.sets(st.integers(0, 199)), st.sets(st.integers(0, 150)))
+def test_watch_counts_the_same_while_samples_arrive(dropped, repeated, swapped):
+    indices = [index for index in range(200) if index >= len(dropped) or not dropped[index]]
+    indices = [index for index in indices for _ in range(2 if index in repeated else 1)]
+    last = -2
+    for place in sorted(swapped):
+        # A sample that comes one place late, as the network may deliver it.
+        if last + 1 < place < len(indices) - 1 and indices[place] not in repeated:
+            if indices[place + 1] not in repeated and place > 0:
+                indices[place], indices[place + 1] = indices[place + 1], indices[place]
+            last = place
+    watch = StampWatch(RATE)
+    for stamp in stamps_of(indices).tolist():
+        watch.add(stamp)
+    found = stamp_statistics(compact(stamps_of(indices)), RATE)
+    assert (watch.present, watch.lost, watch.duplicated, watch.out_of_order) == (
+        found.present,
+        found.lost,
+        found.duplicated,
+        found.out_of_order,
+    )
+
+
+FAR_OFF = {
+    'future': (1 << 31) * 10**9,
+    'past': -(10**15),
+    'tomorrow': 86_400 * 10**9,
+    'a minute': -60 * 10**9,
+}
+
+
+@pytest.mark.parametrize('place', [0, 1, 7, 500, 997, 998, 999])
+@pytest.mark.parametrize('off', FAR_OFF.values(), ids=FAR_OFF)
+def test_a_stamp_far_off_is_misdated_and_no_loss(off, place):
+    stamps = START + PERIOD * np.arange(1000)
+    told = stamps.copy()
+    told[place] += off
+    wrong = misdated(told)
+    assert np.flatnonzero(wrong).tolist() == [place]
+    assert (redated(told, wrong, RATE) == stamps).all()
+
+
+def test_five_in_a_row_are_found_and_a_long_stretch_too():
+    stamps = START + PERIOD * np.arange(1000)
+    told = stamps.copy()
+    told[100:105] = 0
+    told[300:390] += 10**16
+    assert np.flatnonzero(misdated(told)).tolist() == [*range(100, 105), *range(300, 390)]
+
+
+def test_a_pause_of_a_minute_is_no_wrong_stamp():
+    stamps = START + PERIOD * np.r_[:1000, 61_000:62_000]
+    assert not misdated(stamps).any()
+    assert stamp_statistics(compact(stamps), RATE).lost == 60_000
+
+
+@pytest.mark.parametrize('off', FAR_OFF.values(), ids=FAR_OFF)
+def test_watch_counts_a_stamp_far_off_as_that_alone(off):
+    watch = StampWatch(RATE)
+    for index in range(1000):
+        watch.add(START + PERIOD * index + (off if index == 500 else 0))
+    # The sample that came with it has no time: its place stays empty.
+    assert (watch.misdated, watch.lost, watch.duplicated, watch.out_of_order) == (1, 1, 0, 0)
+
+
+def test_watch_goes_on_behind_a_pause_and_behind_a_clock_that_was_set():
+    watch = StampWatch(RATE)
+    for index in [*range(1000), *range(61_000, 62_000)]:
+        watch.add(START + PERIOD * index)
+    assert (watch.misdated, watch.lost) == (0, 60_000)
+    for index in range(1000):
+        watch.add(START - 10**15 + PERIOD * index)
+    assert (watch.misdated, watch.lost, watch.out_of_order) == (1, 60_000, 0)
+
+
+def test_samples_missing_for_a_year_are_counted_without_a_list_of_them():
+    year = 365 * 86_400
+    streams = [np.array([0, year * 1_000_000_000]), np.array([0, 1_000_000, year * 1_000_000_000])]
+    assert missing_samples(list(map(compact, streams)), 1000.0) == 1000 * year - 1

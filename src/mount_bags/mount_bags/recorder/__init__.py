@@ -1,1 +1,0 @@
-"""The recorder: from messages that arrive to a bag."""

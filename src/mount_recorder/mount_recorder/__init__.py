@@ -1,0 +1,1 @@
+"""Records the topics of the graph in rosbag2 MCAP bags."""

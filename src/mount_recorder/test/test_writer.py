@@ -1,0 +1,447 @@
+"""The recording on the disk, held against independent readers and against what can go wrong."""
+
+import contextlib
+import resource
+import signal
+import struct
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+import zstandard
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Channel, Chunk, Header, Message, MessageIndex
+from mcap.stream_reader import StreamReader
+from mcap_ros2.reader import read_ros2_messages
+from read_back import description
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+from samples import PERIOD, RECORDED, START, sample, write_drive
+from small_disk import small_disk
+
+from mount_recorder.bag_writer import BagWriter, RecordingError
+from mount_recorder.offered_qos import OfferedQos
+from mount_recorder.schemas import SchemaError, schema_text, type_hash
+from mount_recorder.split import WHOLE, SplitRule
+from mount_ros.topics import DISPLACEMENT, TOPICS
+
+STRING = 'std_msgs/msg/String'
+TYPES = sorted({topic.type for topic in TOPICS})
+
+
+@pytest.mark.parametrize('name', TYPES)
+def test_type_hash_is_the_one_that_rosbags_computes(name):
+    assert type_hash(name) == get_typestore(Stores.ROS2_JAZZY).hash_rihs01(name)
+
+
+def test_schema_text_holds_each_dependency_once_depth_first():
+    parts = schema_text('sensor_msgs/msg/Imu').split('\n' + '=' * 80 + '\n')
+    names = [part.splitlines()[0] for part in parts[1:]]
+    assert names == [
+        'MSG: geometry_msgs/Quaternion',
+        'MSG: geometry_msgs/Vector3',
+        'MSG: std_msgs/Header',
+        'MSG: builtin_interfaces/Time',
+    ]
+
+
+def test_dependency_of_two_dependencies_is_written_once():
+    text = schema_text('sensor_msgs/msg/MultiDOFJointState')
+    assert text.count('MSG: geometry_msgs/Vector3\n') == 1
+
+
+@pytest.mark.parametrize(
+    ('name', 'word'),
+    [
+        ('JointState', 'package/msg/Name'),
+        ('sensor_msgs/msg/NoSuchThing', 'NoSuchThing.msg'),
+        ('no_such_package/msg/Thing', 'no_such_package'),
+    ],
+)
+def test_unknown_type_is_refused_with_a_sentence(name, word):
+    with pytest.raises(SchemaError, match=word):
+        schema_text(name)
+
+
+def test_mcap_reader_finds_every_message_with_good_checksums(drive):
+    with (drive / 'drive_0.mcap').open('rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        messages = list(reader.iter_messages())
+        statistics = reader.get_summary().statistics
+    assert len(messages) == statistics.message_count == 1500
+    assert statistics.chunk_count > 1
+    last = [message for _, channel, message in messages if channel.topic == '/displacement'][-1]
+    assert last.data == sample(DISPLACEMENT, 499)
+    assert last.log_time == last.publish_time == START + 499 * PERIOD + 200_000
+
+
+def test_stream_reader_accepts_the_checksum_of_the_whole_file(drive):
+    with (drive / 'drive_0.mcap').open('rb') as file:
+        records = list(StreamReader(file, validate_crcs=True).records)
+    assert isinstance(records[0], Header)
+    assert records[0].profile == 'ros2'
+    assert sum(isinstance(record, Message) for record in records) == 1500
+
+
+def test_message_indexes_point_at_their_messages(drive):
+    entries = []
+    with (drive / 'drive_0.mcap').open('rb') as file:
+        for record in StreamReader(file, emit_chunks=True).records:
+            if isinstance(record, Chunk):
+                content = zstandard.decompress(record.data, record.uncompressed_size)
+            elif isinstance(record, MessageIndex):
+                entries += [
+                    (record.channel_id, time, struct.unpack_from('<BQHIQ', content, offset))
+                    for time, offset in record.records
+                ]
+    assert len(entries) == 1500
+    for channel, time, (opcode, _, found_channel, _, found_time) in entries:
+        assert (opcode, found_channel, found_time) == (Opcode.MESSAGE, channel, time)
+
+
+def test_rosbags_opens_the_recording_with_its_own_digests(drive):
+    with AnyReader([drive]) as reader:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        for connection in reader.connections:
+            assert connection.digest == store.hash_rihs01(connection.msgtype)
+        messages = [
+            reader.deserialize(raw, connection.msgtype)
+            for connection, _, raw in reader.messages()
+            if connection.topic == '/coil_ripple'
+        ]
+    assert [message.position[0] for message in messages] == list(range(500))
+    assert messages[7].name == ['coil_current', 'flux_density']
+
+
+def test_mcap_ros2_support_decodes_the_recording_by_its_schema(drive):
+    messages = list(read_ros2_messages(str(drive / 'drive_0.mcap'), topics=['/displacement']))
+    assert len(messages) == 500
+    assert messages[123].ros_msg.position == [123.0]
+
+
+def test_channel_metadata_names_qos_and_type_hash(tmp_path):
+    offer = OfferedQos(durability='transient_local')
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/text', STRING, [offer])
+    writer.write('/text', b'\x00\x01\x00\x00', START)
+    writer.close()
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        channel = next(record for record in StreamReader(file).records if isinstance(record, Channel))
+    assert channel.message_encoding == 'cdr'
+    assert channel.metadata['topic_type_hash'] == type_hash(STRING)
+    qos = yaml.safe_load(channel.metadata['offered_qos_profiles'])[0]
+    assert qos['durability'] == 'transient_local'
+    assert qos['deadline'] == {'sec': 9223372036, 'nsec': 854775807}
+
+
+def test_publishers_are_asked_at_the_first_message(tmp_path):
+    offers = []
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/text', STRING, lambda: offers)
+    offers.append(OfferedQos(reliability='best_effort'))
+    writer.write('/text', b'\x00\x01\x00\x00', START)
+    writer.close()
+    topic = description(tmp_path / 'bag')['topics_with_message_count'][0]['topic_metadata']
+    assert [offer['reliability'] for offer in topic['offered_qos_profiles']] == ['best_effort']
+
+
+def test_metadata_file_has_the_fields_of_version_9(drive):
+    text = (drive / 'metadata.yaml').read_text()
+    root = yaml.safe_load(text)['rosbag2_bagfile_information']
+    assert list(root) == [
+        'version',
+        'storage_identifier',
+        'duration',
+        'starting_time',
+        'message_count',
+        'topics_with_message_count',
+        'compression_format',
+        'compression_mode',
+        'relative_file_paths',
+        'files',
+        'custom_data',
+        'ros_distro',
+    ]
+    assert root['version'] == 9
+    assert root['storage_identifier'] == 'mcap'
+    assert root['duration'] == {'nanoseconds': 499 * PERIOD}
+    assert root['starting_time'] == {'nanoseconds_since_epoch': START + 200_000}
+    assert root['message_count'] == 1500
+    assert root['compression_format'] == root['compression_mode'] == ''
+    assert root['relative_file_paths'] == ['drive_0.mcap']
+    assert root['files'][0]['message_count'] == 1500
+    assert root['ros_distro'] == 'jazzy'
+    topic = root['topics_with_message_count'][0]
+    assert topic['message_count'] == 500
+    assert topic['topic_metadata']['type_description_hash'] == type_hash(DISPLACEMENT.type)
+
+
+def test_metadata_file_has_no_aliases(tmp_path):
+    offer = OfferedQos()
+    writer = BagWriter(tmp_path / 'bag')
+    for name in ('/one', '/two'):
+        writer.add_topic(name, STRING, [offer, offer])
+    writer.close()
+    text = (tmp_path / 'bag' / 'metadata.yaml').read_text()
+    assert '&' not in text
+    assert '*' not in text
+
+
+def test_metadata_record_in_the_file_equals_the_metadata_file(drive):
+    with (drive / 'drive_0.mcap').open('rb') as file:
+        records = list(make_reader(file).iter_metadata())
+    assert [record.name for record in records] == ['rosbag2']
+    assert yaml.safe_load(records[0].metadata['serialized_metadata']) == description(drive)
+
+
+def test_recording_without_messages_is_a_valid_recording(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/text', STRING)
+    writer.close()
+    with AnyReader([tmp_path / 'bag']) as reader:
+        assert [connection.topic for connection in reader.connections] == ['/text']
+        assert list(reader.messages()) == []
+
+
+names = st.lists(st.from_regex(r'/[a-z][a-z0-9_]{0,12}', fullmatch=True), min_size=1, max_size=4, unique=True)
+messages = st.lists(
+    st.tuples(st.integers(0, 3), st.binary(max_size=200), st.integers(0, 2**62), st.integers(0, 2**62)),
+    max_size=60,
+)
+
+
+@settings(deadline=None, derandomize=True, max_examples=40)
+@given(names, messages, st.integers(1, 2000))
+def test_whatever_was_written_is_read(tmp_path_factory, names, messages, chunk_size):
+    folder = tmp_path_factory.mktemp('bags') / 'bag'
+    writer = BagWriter(folder, chunk_size=chunk_size)
+    for name in names:
+        writer.add_topic(name, STRING)
+    written = [(names[number % len(names)], *rest) for number, *rest in messages]
+    for message in written:
+        writer.write(*message)
+    writer.close()
+    with (folder / 'bag_0.mcap').open('rb') as file:
+        read = [
+            (channel.topic, message.data, message.log_time, message.publish_time)
+            for _, channel, message in make_reader(file, validate_crcs=True).iter_messages(
+                log_time_order=False
+            )
+        ]
+    assert sorted(read) == sorted(written)
+
+
+def test_existing_folder_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match='exists already'):
+        BagWriter(tmp_path)
+
+
+def test_closing_twice_changes_nothing(drive):
+    writer = BagWriter(drive.parent / 'bag')
+    writer.add_topic('/text', STRING)
+    writer.close()
+    content = (writer.folder / 'bag_0.mcap').read_bytes()
+    writer.close()
+    assert (writer.folder / 'bag_0.mcap').read_bytes() == content
+
+
+def test_writing_after_close_is_refused(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/text', STRING)
+    writer.write('/text', b'1234', START)
+    writer.close()
+    with pytest.raises(RecordingError, match='closed'):
+        writer.write('/text', b'1234', START)
+
+
+def test_topic_that_was_not_announced_is_refused(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    with pytest.raises(RecordingError, match='add_topic'):
+        writer.write('/text', b'1234', START)
+    writer.close()
+
+
+def test_nothing_is_left_beside_the_recording(drive):
+    assert sorted(path.name for path in drive.iterdir()) == ['drive_0.mcap', 'metadata.yaml']
+
+
+def fill(writer, limit=100_000):
+    """Write until the disk refuses; return how many messages were handed over and the refusal."""
+    for topic in RECORDED:
+        writer.add_topic(f'/{topic.name}', topic.type)
+    for index in range(limit):
+        try:
+            writer.write(f'/{RECORDED[index % 3].name}', sample(RECORDED[index % 3], index), START + index)
+        except RecordingError as error:
+            return index + 1, str(error)
+    pytest.fail('the disk never became full')
+
+
+def test_full_disk_leaves_a_complete_recording_up_to_the_last_chunk(tmp_path):
+    writer = BagWriter(tmp_path / 'bag', open_file=small_disk((1 << 20) + 300_000))
+    handed, sentence = fill(writer)
+    assert 'no space left' in sentence
+    assert 'closed and readable' in sentence
+    assert str(writer.kept) in sentence
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        read = list(make_reader(file, validate_crcs=True).iter_messages())
+    assert len(read) == writer.kept
+    assert 0 < handed - writer.kept < 1000
+    with AnyReader([tmp_path / 'bag']) as reader:
+        assert reader.message_count == writer.kept
+    assert not list((tmp_path / 'bag').glob('.*'))
+
+
+def test_room_for_the_end_grows_with_the_recording(tmp_path, monkeypatch):
+    monkeypatch.setattr('mount_recorder.record_file.RESERVE_STEP', 4096)
+    writer = BagWriter(tmp_path / 'bag', chunk_size=1, open_file=small_disk(1 << 20))
+    _, sentence = fill(writer)
+    assert 'closed and readable' in sentence
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        summary = make_reader(file).get_summary()
+    assert len(summary.chunk_indexes) == writer.kept > 1500
+
+
+def test_writing_goes_on_being_refused_after_the_disk_was_full(tmp_path):
+    writer = BagWriter(tmp_path / 'bag', open_file=small_disk((1 << 20) + 100_000))
+    _, sentence = fill(writer)
+    with pytest.raises(RecordingError, match='no space left'):
+        writer.write('/displacement', b'1234', START)
+    writer.close()
+    assert writer.failure == sentence
+
+
+def test_broken_disk_leaves_whole_chunks(tmp_path):
+    writer = BagWriter(tmp_path / 'bag', open_file=small_disk(1 << 24))
+    for topic in RECORDED:
+        writer.add_topic(f'/{topic.name}', topic.type)
+    for index in range(1000):
+        writer.write('/displacement', sample(DISPLACEMENT, index), START + index)
+    kept = writer.kept
+    writer._piece.file.broken = True
+    with pytest.raises(RecordingError, match='ends without its summary but with whole chunks'):
+        writer.close()
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        assert sum(isinstance(record, Message) for record in records_until_cut(file)) == kept > 0
+
+
+def test_disk_too_small_to_begin_leaves_nothing_behind(tmp_path):
+    with pytest.raises(RecordingError, match='cannot be started'):
+        BagWriter(tmp_path / 'bag', open_file=small_disk(100))
+    assert not (tmp_path / 'bag').exists()
+
+
+def test_limit_on_the_size_of_files_ends_the_recording_with_whole_chunks(tmp_path):
+    code = f"""
+        import resource, signal, sys
+        sys.path.insert(0, {str(Path(__file__).parent)!r})
+        from test_writer import fill
+        from mount_recorder.bag_writer import BagWriter
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20))
+        writer = BagWriter({str(tmp_path / 'bag')!r})
+        print(*fill(writer))
+        print(writer.kept)
+    """
+    result = run(code)
+    assert result.returncode == 0, result.stderr
+    sentence, kept = result.stdout.splitlines()
+    assert 'no space left' in sentence
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        assert sum(isinstance(record, Message) for record in records_until_cut(file)) == int(kept) > 1000
+
+
+def test_killed_process_leaves_every_complete_chunk(tmp_path):
+    code = f"""
+        import os, signal, sys
+        sys.path.insert(0, {str(Path(__file__).parent)!r})
+        from samples import RECORDED, START, sample
+        from mount_recorder.bag_writer import BagWriter
+        writer = BagWriter({str(tmp_path / 'bag')!r})
+        for topic in RECORDED:
+            writer.add_topic('/' + topic.name, topic.type)
+        for index in range(10_000):
+            writer.write('/displacement', sample(RECORDED[0], index), START + index)
+        print(writer.kept, flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+    """
+    result = run(code)
+    assert result.returncode == -signal.SIGKILL
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        data = [record.data for record in records_until_cut(file) if isinstance(record, Message)]
+    assert len(data) == int(result.stdout) > 9000
+    assert data == [sample(DISPLACEMENT, index) for index in range(len(data))]
+
+
+def run(code):
+    return subprocess.run(
+        [sys.executable, '-c', textwrap.dedent(code)], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def records_until_cut(file):
+    """Yield the records of a file that ends without its footer."""
+    with contextlib.suppress(EndOfFile):
+        yield from StreamReader(file, validate_crcs=True).records
+
+
+def test_skipped_samples_are_really_absent(tmp_path):
+    folder = write_drive(tmp_path / 'bag', 100, skipped=range(10, 20))
+    assert description(folder)['topics_with_message_count'][0]['message_count'] == 90
+
+
+def test_limits_of_this_process_are_untouched():
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    blocks=st.lists(st.integers(0, 40), min_size=1, max_size=5),
+    widths=st.lists(st.integers(1, 300), min_size=1, max_size=4),
+    chunk_size=st.sampled_from([1, 500, 4096]),
+    split=st.sampled_from([WHOLE, SplitRule(duration=17 * PERIOD), SplitRule(size=200_000)]),
+    latched=st.booleans(),
+)
+@example(blocks=[30], widths=[69], chunk_size=500, split=WHOLE, latched=False)  # chunks filled to the byte
+def test_many_messages_at_once_make_the_file_of_messages_one_by_one(
+    tmp_path_factory, blocks, widths, chunk_size, split, latched
+):
+    folder = tmp_path_factory.mktemp('columns')
+    topics = ['/t0', '/event', '/t2', '/t3'][: len(widths)]  # an event is of a car: in another chunk
+    files = []
+    for at_once in (True, False):
+        place = folder / str(at_once) / 'bag'
+        writer = BagWriter(place, chunk_size=chunk_size, split=split)
+        for topic in topics:
+            writer.add_topic(topic, STRING, latched=latched and topic == topics[0])
+        generator = np.random.default_rng(1)
+        time = START
+        for count in blocks:
+            times = time + PERIOD * np.arange(count)
+            columns = [generator.integers(0, 256, (count, width), np.uint8) for width in widths]
+            if at_once:
+                writer.write_columns(topics, columns, times)
+            else:
+                for number in range(count):
+                    for topic, rows in zip(topics, columns, strict=True):
+                        writer.write(topic, rows[number].tobytes(), int(times[number]))
+            time += PERIOD * count
+        writer.close()
+        files.append({file.name: file.read_bytes() for file in sorted(place.iterdir())})
+    assert files[0] == files[1]
+
+
+def test_a_closed_recording_takes_no_columns(tmp_path):
+    writer = BagWriter(tmp_path / 'bag')
+    writer.add_topic('/t', STRING)
+    writer.close()
+    with pytest.raises(RecordingError, match='is closed'):
+        writer.write_columns(['/t'], [np.zeros((3, 8), np.uint8)], START + np.arange(3))

@@ -1,0 +1,143 @@
+"""What moves around the mount: a quarter vehicle with engine, or the engine alone (all values chosen).
+
+    m_u z_u'' = k_t (z_r - z_u) - F_s,  F_s = k_s (z_u - z_b) + c_s (z_u' - z_b')
+    m_b z_b'' = F_s - F_c,              F_c = k_c (z_b - z_c) + c_c (z_b' - z_c')
+    m_c z_c'' = F_c + F,   m_e z_e'' = F_e - F,   F = elastomer force + friction force at x = z_e - z_c
+
+z: heights of wheel (u), body (b), local chassis at the mount (c), engine (e) and road (r) from their rest;
+F: mount force on the chassis, positive for x > 0. Semi-implicit Euler; 50 us is short enough for all modes.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.record import record_type
+from mount_models.quantity import Quantity
+from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
+
+FloatArray = npt.NDArray[np.float64]
+
+_BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
+_BODIES = ('wheel', 'body', 'chassis', 'engine')
+VEHICLE_STATE = record_type(
+    [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + _BRANCHES
+)
+"""Heights (m) and velocities (m/s) of the four bodies, forces (N) of the elastomer's branches."""
+ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
+"""Mount displacement x (m), its velocity (m/s), forces (N) of the elastomer's branches."""
+
+
+class Vehicle(NamedTuple):
+    """Quarter vehicle with the share of the engine that rests on this mount."""
+
+    engine_mass: Annotated[float, Quantity('kg', 'm_e: share of the engine on this mount', 1.0, 1e4)] = 80.0
+    chassis_mass: Annotated[float, Quantity('kg', 'm_c: chassis around the mount', 0.1, 1e4)] = 20.0
+    body_mass: Annotated[float, Quantity('kg', 'm_b: share of the body', 1.0, 1e5)] = 280.0
+    wheel_mass: Annotated[float, Quantity('kg', 'm_u: wheel and what moves with it', 1.0, 1e4)] = 40.0
+    chassis_stiffness: Annotated[float, Quantity('N/m', 'k_c: local chassis to body', 1e3, 1e9)] = 8e5
+    chassis_damping: Annotated[float, Quantity('N s/m', 'c_c: local chassis to body', 0.0, 1e6)] = 400.0
+    suspension_stiffness: Annotated[float, Quantity('N/m', 'k_s: body to wheel', 1e2, 1e7)] = 2.2e4
+    suspension_damping: Annotated[float, Quantity('N s/m', 'c_s: body to wheel', 0.0, 1e6)] = 1500.0
+    tyre_stiffness: Annotated[float, Quantity('N/m', 'k_t: wheel to road', 1e3, 1e8)] = 2.0e5
+    elastomer: Elastomer = Elastomer()
+
+
+class Engine(NamedTuple):
+    """Engine on its mount, on a chassis whose acceleration is given."""
+
+    engine_mass: Annotated[float, Quantity('kg', 'm_e: share of the engine on this mount', 1.0, 1e4)] = 80.0
+    elastomer: Elastomer = Elastomer()
+
+
+class MountMotion(NamedTuple):
+    """Displacement (m), velocity (m/s) after a step; mount force (N), chassis acceleration (m/s^2) in it."""
+
+    displacement: float
+    velocity: float
+    mount_force: float
+    chassis_acceleration: float
+
+
+@compiled
+def vehicle_step(vehicle, state, road_height, engine_force, friction_force, dt):
+    """Advance `state`, a record of `VEHICLE_STATE`, by `dt` seconds and return the `MountMotion`.
+
+    `road_height` z_r in m; `engine_force` F_e in N, up; `friction_force` in N: what acts in the mount beside
+    the elastomer, at the present displacement.
+    """
+    displacement = state.engine_height - state.chassis_height
+    branch_forces = (state.slow_force, state.middle_force, state.fast_force)
+    mount = elastomer_force(vehicle.elastomer, displacement, branch_forces) + friction_force
+    tyre = vehicle.tyre_stiffness * (road_height - state.wheel_height)
+    suspension = vehicle.suspension_stiffness * (
+        state.wheel_height - state.body_height
+    ) + vehicle.suspension_damping * (state.wheel_velocity - state.body_velocity)
+    carrier = vehicle.chassis_stiffness * (
+        state.body_height - state.chassis_height
+    ) + vehicle.chassis_damping * (state.body_velocity - state.chassis_velocity)
+    chassis_acceleration = (carrier + mount) / vehicle.chassis_mass
+
+    state.wheel_velocity += dt * (tyre - suspension) / vehicle.wheel_mass
+    state.body_velocity += dt * (suspension - carrier) / vehicle.body_mass
+    state.chassis_velocity += dt * chassis_acceleration
+    state.engine_velocity += dt * (engine_force - mount) / vehicle.engine_mass
+    state.wheel_height += dt * state.wheel_velocity
+    state.body_height += dt * state.body_velocity
+    state.chassis_height += dt * state.chassis_velocity
+    state.engine_height += dt * state.engine_velocity
+
+    velocity = state.engine_velocity - state.chassis_velocity
+    slow, middle, fast = branch_step(vehicle.elastomer, branch_forces, velocity * dt, dt)
+    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    return MountMotion(state.engine_height - state.chassis_height, velocity, mount, chassis_acceleration)
+
+
+@compiled
+def engine_step(engine, state, chassis_acceleration, engine_force, friction_force, dt):
+    """Advance `state`, a record of `ENGINE_STATE`, by `dt` seconds and return the `MountMotion`.
+
+    `chassis_acceleration` in m/s^2, up; forces as in `vehicle_step`.
+    """
+    branch_forces = (state.slow_force, state.middle_force, state.fast_force)
+    mount = elastomer_force(engine.elastomer, state.displacement, branch_forces) + friction_force
+    state.velocity += dt * ((engine_force - mount) / engine.engine_mass - chassis_acceleration)
+    state.displacement += dt * state.velocity
+    slow, middle, fast = branch_step(engine.elastomer, branch_forces, state.velocity * dt, dt)
+    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    return MountMotion(state.displacement, state.velocity, mount, chassis_acceleration)
+
+
+@compiled
+def ride_without_friction(vehicle, state, road_height, engine_force, dt):
+    """Return (mount displacement, chassis acceleration), each (n,), for road heights and engine forces (n,).
+
+    Friction is off; `state` (1,) of `VEHICLE_STATE` is advanced in place. SI units, steps of `dt` seconds.
+    """
+    displacement = np.zeros(road_height.size)
+    acceleration = np.zeros(road_height.size)
+    for k in range(road_height.size):
+        motion = vehicle_step(vehicle, state[0], road_height[k], engine_force[k], 0.0, dt)
+        displacement[k] = motion.displacement
+        acceleration[k] = motion.chassis_acceleration
+    return displacement, acceleration
+
+
+def resting_vehicle() -> npt.NDArray[Any]:
+    """Return the state (1,) of a vehicle at rest; pass element 0 to `vehicle_step`."""
+    return np.zeros(1, VEHICLE_STATE)
+
+
+def modes(vehicle: Vehicle, mount_stiffness: float | None = None) -> FloatArray:
+    """Return the four undamped natural frequencies (Hz); `mount_stiffness` in N/m, k_e if not given."""
+    mount = vehicle.elastomer.static_stiffness if mount_stiffness is None else mount_stiffness
+    springs = (vehicle.tyre_stiffness, vehicle.suspension_stiffness, vehicle.chassis_stiffness, mount)
+    masses = np.array([vehicle.wheel_mass, vehicle.body_mass, vehicle.chassis_mass, vehicle.engine_mass])
+    stiffness = np.diag(np.array(springs) + np.array([*springs[1:], 0.0]))
+    for lower, spring in enumerate(springs[1:]):
+        stiffness[lower, lower + 1] = stiffness[lower + 1, lower] = -spring
+    scale = 1.0 / np.sqrt(masses)
+    squares = np.linalg.eigvalsh(stiffness * np.outer(scale, scale))
+    return np.asarray(np.sqrt(squares) / (2.0 * np.pi), dtype=np.float64)

@@ -1,0 +1,148 @@
+"""Finding the 20 mH crossing in a measured curve: exact, honest about noise, unmoved by outliers."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from mount_models.coil.crossing import CrossingError, find_crossing
+from mount_sim.plant.closing import ClosingMechanics, closed_state
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
+
+MAGNET, COIL = ReluctanceActuator(), RippleCoil()
+RAMP = np.linspace(0.0, 2.0, 1001)
+
+
+def fixed_gap_curve(currents, gap=349e-6):
+    return np.array([incremental_inductance(COIL, MAGNET, current, gap) for current in currents])
+
+
+def assembled_curve(currents):
+    mechanics, gap, inductances = ClosingMechanics(), 508e-6, []
+    for current in currents:
+        gap, _ = closed_state(mechanics, MAGNET, current, gap)
+        inductances.append(incremental_inductance(COIL, MAGNET, current, gap))
+    return np.array(inductances)
+
+
+FIXED = fixed_gap_curve(RAMP)
+ASSEMBLED = assembled_curve(RAMP)
+
+
+@pytest.mark.parametrize('gap_um', [250, 349, 492, 550])
+def test_without_noise_the_crossing_is_found_to_a_fraction_of_a_milliampere(gap_um):
+    exact = brentq(
+        lambda current: incremental_inductance(COIL, MAGNET, current, gap_um * 1e-6) - 20e-3, 0.2, 2.5
+    )
+    found = find_crossing(RAMP, fixed_gap_curve(RAMP, gap_um * 1e-6))
+    assert found.current == pytest.approx(exact, abs=1e-4)
+    assert found.current_std < 1e-4
+
+
+def test_the_slope_is_that_of_the_curve():
+    found = find_crossing(RAMP, FIXED)
+    near = found.current + np.array([-0.001, 0.001])
+    assert found.inductance_slope == pytest.approx(np.diff(fixed_gap_curve(near))[0] / 0.002, rel=0.01)
+
+
+def test_on_the_assembled_mount_the_crossing_lies_where_published():
+    assert find_crossing(RAMP, ASSEMBLED).current == pytest.approx(1.381, abs=0.0006)
+
+
+def test_the_order_of_the_samples_is_free():
+    shuffled = np.random.default_rng(1).permutation(RAMP.size)
+    assert find_crossing(RAMP[shuffled], ASSEMBLED[shuffled]) == find_crossing(RAMP, ASSEMBLED)
+
+
+def test_samples_that_are_not_finite_are_left_out():
+    spoiled = ASSEMBLED.copy()
+    spoiled[::7] = math.nan
+    spoiled[3] = math.inf
+    assert find_crossing(RAMP, spoiled).current == pytest.approx(
+        find_crossing(RAMP, ASSEMBLED).current, abs=1e-4
+    )
+
+
+def test_the_stated_standard_deviation_is_that_of_repeated_measurements():
+    random = np.random.default_rng(2)
+    exact = find_crossing(RAMP, ASSEMBLED).current
+    found = [
+        find_crossing(RAMP, ASSEMBLED * (1.0 + 0.01 * random.standard_normal(RAMP.size))) for _ in range(200)
+    ]
+    currents = np.array([one.current for one in found])
+    stated = np.mean([one.current_std for one in found])
+    assert np.std(currents) == pytest.approx(stated, rel=0.2)
+    assert np.mean(currents) == pytest.approx(exact, abs=4 * stated / math.sqrt(200))
+
+
+def test_one_per_cent_of_noise_leaves_the_contact_gap_within_two_micrometres():
+    noise = 1.0 + 0.01 * np.random.default_rng(4).standard_normal(RAMP.size)
+    found = find_crossing(RAMP, ASSEMBLED * noise)
+    milliamperes_per_um = 2.12
+    assert 2.0 * 1e3 * found.current_std / milliamperes_per_um < 2.0
+    assert 1e3 * abs(found.current - 1.3806) / milliamperes_per_um < 2.0
+
+
+def test_outliers_do_not_move_the_crossing():
+    random = np.random.default_rng(5)
+    noisy = ASSEMBLED * (1.0 + 0.01 * random.standard_normal(RAMP.size))
+    clean = find_crossing(RAMP, noisy)
+    spoiled = noisy.copy()
+    struck = random.random(RAMP.size) < 0.1
+    spoiled[struck] = random.uniform(0.0, 0.2, struck.sum())
+    assert find_crossing(RAMP, spoiled).current == pytest.approx(clean.current, abs=3 * clean.current_std)
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_not_even_every_fourth_sample_struck_to_one_side_moves_the_crossing(seed):
+    random = np.random.default_rng(seed)
+    noisy = ASSEMBLED * (1.0 + 0.01 * random.standard_normal(RAMP.size))
+    clean = find_crossing(RAMP, noisy)
+    struck = (np.abs(RAMP - clean.current) < 0.1) & (random.random(RAMP.size) < 0.25)
+    spoiled = np.where(struck, noisy * random.uniform(3.0, 5.0, RAMP.size), noisy)
+    assert find_crossing(RAMP, spoiled).current == pytest.approx(clean.current, abs=3 * clean.current_std)
+
+
+def test_another_level_can_be_asked_for():
+    found = find_crossing(RAMP, FIXED, level=30e-3)
+    assert fixed_gap_curve([found.current])[0] == pytest.approx(30e-3, abs=5e-6)
+
+
+def test_a_ramp_that_ends_too_early_is_refused_with_what_was_seen():
+    early = RAMP < 1.2
+    with pytest.raises(
+        CrossingError, match=r'must fall through 20\.0 mH; instead it lay within .* ramp reach further'
+    ):
+        find_crossing(RAMP[early], ASSEMBLED[early])
+
+
+def test_a_ramp_that_starts_too_late_is_refused():
+    late = RAMP > 1.6
+    with pytest.raises(CrossingError, match='instead it lay within'):
+        find_crossing(RAMP[late], ASSEMBLED[late])
+
+
+def test_pure_noise_is_refused():
+    noise = 20e-3 * (1.0 + 0.5 * np.random.default_rng(6).standard_normal(RAMP.size))
+    with pytest.raises(CrossingError):
+        find_crossing(RAMP, noise)
+
+
+def test_a_rising_inductance_is_refused():
+    with pytest.raises(CrossingError):
+        find_crossing(RAMP, ASSEMBLED[::-1])
+
+
+def test_too_few_samples_are_refused():
+    with pytest.raises(CrossingError, match='only 3 valid samples'):
+        find_crossing(RAMP[:3], ASSEMBLED[:3])
+    with pytest.raises(CrossingError, match=r'different currents within .* must be at least 7'):
+        find_crossing(RAMP[::40], ASSEMBLED[::40])
+
+
+def test_a_current_that_stands_still_is_refused():
+    steps = np.repeat([1.2, 1.35, 1.4, 1.6], 200)
+    with pytest.raises(CrossingError, match='ramp the current more slowly'):
+        find_crossing(steps, assembled_curve(steps))

@@ -1,0 +1,192 @@
+"""The full friction model, Eqs (7), (8): known figures, energy, and agreement with the simplified model."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.coefficient_check import CoefficientsRefusedError, check_friction
+from mount_models.friction.contact import FrictionContact
+from mount_models.friction.simplified import simplified_response
+from mount_models.quantity import quantities, with_values
+from mount_sim.plant.friction import full_response, full_step
+
+COEFS = FrictionCoefficients()
+CONTACT = FrictionContact()
+CYCLE = 0.125
+
+
+def sets_within(kind):
+    """Sets of which all parameters are anywhere within their ranges."""
+    return st.fixed_dictionaries(
+        {name: st.floats(note.low, note.high) for name, note in quantities(kind).items()}
+    ).map(lambda values: kind(**values))
+
+
+def sets_near(kind):
+    """Sets of which some parameters are anywhere within their ranges and the others at their defaults."""
+    notes = quantities(kind)
+    one = st.sampled_from(sorted(notes)).flatmap(
+        lambda name: st.tuples(st.just(name), st.floats(notes[name].low, notes[name].high))
+    )
+    return st.lists(one, max_size=4).map(lambda values: kind()._replace(**dict(values)))
+
+
+def sine_response(dt, contact=CONTACT, coefs=COEFS):
+    """Return displacement, velocity, force, sliding velocity, deflection of the last cycle of 8 Hz, 1 mm."""
+    time = np.arange(0.0, 48 * CYCLE + dt / 2, dt)
+    omega = 2.0 * np.pi / CYCLE
+    displacement = 1e-3 * np.sin(omega * time)
+    force, sliding, deflection = full_response(contact, coefs, displacement, np.full(time.size, 100.0), dt)
+    last = slice(-round(CYCLE / dt) - 1, None)
+    velocity = 1e-3 * omega * np.cos(omega * time[last])
+    return displacement[last], velocity, force[last], sliding[last], deflection[last]
+
+
+@pytest.mark.parametrize('dt', [1e-5, 1e-4, 1e-3])
+def test_sine_at_8_hertz_gives_the_known_peaks_at_every_step_length(dt):
+    displacement, _, force, _, _ = sine_response(dt)
+    assert force.max() == pytest.approx(132.46, abs=0.1)
+    assert force.min() == pytest.approx(-203.31, abs=0.1)
+    loss = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement))
+    assert loss == pytest.approx(0.629, abs=6e-4 if dt < 1e-3 else 2e-3)
+
+
+def test_sine_at_8_hertz_hardly_moves_the_creeping_element():
+    deflection = sine_response(1e-4)[4]
+    assert deflection.min() == pytest.approx(-4.0e-6, abs=0.06e-6)
+    assert deflection.max() == pytest.approx(-2.1e-6, abs=0.06e-6)
+
+
+def test_both_models_agree_in_macroslip_and_differ_in_microslip():
+    _, velocity, force, sliding, _ = sine_response(1e-4)
+    time = np.arange(0.0, 48 * CYCLE + 5e-5, 1e-4)
+    all_velocity = 1e-3 * 2.0 * np.pi * 8.0 * np.cos(2.0 * np.pi * 8.0 * time)
+    simplified, _ = simplified_response(CONTACT, COEFS, all_velocity, np.full(time.size, 100.0), 1e-4)
+    difference = force - simplified[-force.size :]
+    # macroslip: the slider has most of the velocity; the 10 % around standstill are where mu is faded out
+    macroslip = (sliding * np.sign(velocity) > 0.6 * abs(velocity)) & (abs(velocity) > 0.1 * velocity.max())
+    rms = np.sqrt(np.mean(difference[macroslip] ** 2))
+    assert rms == pytest.approx(1.6, abs=0.06)
+    assert rms / np.sqrt(np.mean(force**2)) == pytest.approx(0.010, abs=1e-3)
+    assert np.sqrt(np.mean(difference**2)) == pytest.approx(45.7, abs=0.1)
+
+
+SAWTOOTH = {  # velocity in mm/s: coefficient after reversal and at the end of the stroke, p and n
+    1: (0.632, 0.560, 0.941, 0.872),
+    2: (0.771, 0.656, 1.134, 1.022),
+    5: (0.979, 0.787, 1.424, 1.234),
+    10: (1.141, 0.911, 1.636, 1.407),
+}
+NINETY_PERCENT_MS = {1: 38, 2: 22, 5: 11, 10: 6}
+
+
+def sawtooth_stroke(speed_mm, coefs=COEFS, dt=1e-4):
+    """Return coefficients of the last rising and falling stroke of 2.5 mm either side at 100 N."""
+    period = 10.0 / speed_mm
+    phase = np.arange(0.0, 4 * period - dt / 2, dt) / period % 1.0
+    displacement = 2.5e-3 * np.where(phase < 0.5, 4.0 * phase - 1.0, 3.0 - 4.0 * phase)
+    force, _, _ = full_response(CONTACT, coefs, displacement, np.full(phase.size, 100.0), dt)
+    half = round(period / 2 / dt)
+    return force[-2 * half : -half] / 100.0, -force[-half:] / 100.0
+
+
+@pytest.mark.parametrize('speed_mm', SAWTOOTH)
+def test_coefficient_jumps_after_reversal_and_decays_along_the_stroke(speed_mm):
+    rising, falling = sawtooth_stroke(speed_mm)
+    found = (rising.max(), rising[-1], falling.max(), falling[-1])
+    assert found == pytest.approx(SAWTOOTH[speed_mm], abs=1.1e-3)
+    ninety_percent_ms = np.argmax(rising > 0.9 * rising.max()) * 0.1
+    assert ninety_percent_ms == pytest.approx(NINETY_PERCENT_MS[speed_mm], abs=0.55)
+
+
+def test_negative_b_offset_makes_the_decay_larger():
+    rising, _ = sawtooth_stroke(1, with_values(COEFS, b_offset=-14.0))
+    assert (rising.max(), rising[-1]) == pytest.approx((0.789, 0.443), abs=1.1e-3)
+
+
+def test_fast_creep_does_not_let_the_slider_run_away():
+    fast_creep = with_values(CONTACT, tangential_damping=0.05 * CONTACT.tangential_stiffness)
+    _, velocity, _, sliding, _ = sine_response(1e-4, contact=fast_creep)
+    assert abs(sliding).max() < 1.1 * abs(velocity).max()
+
+
+def test_steep_pull_breaks_away_at_the_coefficient_at_rest():
+    creep_free = with_values(CONTACT, tangential_damping=1e9)
+    for direction, coefficient in ((1.0, 0.199), (-1.0, 0.522)):
+        pull = direction * np.arange(0, 100 * coefficient * 1.01 / CONTACT.contact_stiffness, 1e-8)
+        force, sliding, _ = full_response(creep_free, COEFS, pull, np.full(pull.size, 100.0), 1e-3)
+        first = int(np.argmax(sliding != 0.0))
+        assert abs(force[first - 1]) / 100.0 == pytest.approx(coefficient, abs=1e-3)
+        assert np.all(sliding[:first] == 0.0)
+
+
+def test_held_pads_relax_into_the_two_springs_in_series():
+    step = np.full(40000, 1e-6)
+    step[0] = 0.0
+    force, sliding, _ = full_response(CONTACT, COEFS, step, np.full(step.size, 100.0), 1e-4)
+    in_series = 1.0 / (1.0 / CONTACT.contact_stiffness + 1.0 / CONTACT.tangential_stiffness)
+    assert np.all(sliding == 0.0)
+    assert force[1] == pytest.approx(CONTACT.contact_stiffness * 1e-6, rel=1e-3)
+    assert force[-1] == pytest.approx(in_series * 1e-6, rel=1e-4)
+
+
+def test_open_pads_carry_no_force_and_the_slider_follows():
+    force, slider, deflection, velocity = full_step(CONTACT, COEFS, 0.0, 3e-6, 2e-3, 0.0, 1e-4)
+    assert force == 0.0
+    assert slider + deflection == pytest.approx(2e-3, abs=1e-15)
+    assert velocity == pytest.approx(slider / 1e-4, rel=1e-12)
+
+
+def test_unknown_input_gives_unknown_force():
+    assert math.isnan(full_step(CONTACT, COEFS, 0.0, 0.0, math.nan, 50.0, 1e-4)[0])
+    assert math.isnan(full_step(CONTACT, COEFS, 0.0, 0.0, 1e-4, math.nan, 1e-4)[0])
+
+
+steps = st.lists(
+    st.tuples(st.floats(-3e-3, 3e-3), st.one_of(st.just(0.0), st.floats(0.0, 350.0))), min_size=2, max_size=40
+)
+contacts = st.builds(
+    FrictionContact,
+    tangential_stiffness=st.floats(1e6, 1e8),
+    tangential_damping=st.floats(1e4, 1e7),
+    contact_stiffness=st.floats(1e5, 1e8),
+)
+
+
+@given(
+    steps=steps, contact=contacts, b_offset=st.sampled_from([14.0, -14.0]), dt=st.sampled_from([1e-5, 1e-3])
+)
+@settings(deadline=None, derandomize=True, max_examples=150)
+def test_energy_is_never_returned_beyond_what_the_springs_hold(steps, contact, b_offset, dt):
+    coefs = with_values(COEFS, b_offset=b_offset)
+    slider = xi = old_x = stored = 0.0
+    for x, normal_force in steps:
+        force, slider, xi, velocity = full_step(contact, coefs, slider, xi, x, normal_force, dt)
+        assert force * velocity >= 0.0
+        assert normal_force > 0.0 or force == 0.0
+        still_stored = 0.5 * force**2 / contact.contact_stiffness + 0.5 * contact.tangential_stiffness * xi**2
+        work = force * (x - old_x)
+        assert still_stored <= stored + work + 1e-9 * (stored + abs(work)) + 1e-15
+        assert math.isfinite(slider)
+        stored, old_x = still_stored, x
+
+
+@settings(deadline=None, max_examples=60)
+@given(sets_near(FrictionCoefficients) | sets_within(FrictionCoefficients), sets_near(FrictionContact))
+@example(FrictionCoefficients(b_offset=30.0), FrictionContact())
+@example(FrictionCoefficients(scale=5.0), FrictionContact())
+def test_what_the_check_passes_stays_finite(coefs, contact):
+    try:
+        check_friction(coefs, contact)
+    except CoefficientsRefusedError:
+        assume(False)
+    time = 1e-3 * np.arange(20_000)
+    displacement = 1e-3 * np.sin(2.0 * np.pi * 8.0 * time)
+    load = 150.0 + 150.0 * np.sin(2.0 * np.pi * 0.3 * time)
+    force, _, _ = full_response(contact, coefs, displacement, load, 1e-3)
+    assert np.isfinite(force).all()
+    assert np.abs(force).max() < 1e5

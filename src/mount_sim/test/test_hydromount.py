@@ -1,0 +1,152 @@
+"""The hydromount: dynamic stiffness, harmonics, what the asymmetry does, and that it never returns energy."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from mount_models.arithmetic.compiled import compiled
+from mount_models.quantity import checked, quantities
+from mount_sim.plant.elastomer import Elastomer, dynamic_stiffness
+from mount_sim.plant.hydromount import (
+    HYDROMOUNT_STATE,
+    Hydromount,
+    decoupler_overrun,
+    hydromount_force,
+    hydromount_step,
+    upper_energy,
+    upper_pressure,
+)
+
+HYDROMOUNT = Hydromount()
+SYMMETRIC = HYDROMOUNT._replace(compliance_asymmetry=0.0)
+DT = 5e-5
+PERIODS, SETTLED = 30, 5
+
+
+@compiled
+def hydromount_response(hydromount, displacement, dt):
+    """Return the fluid's force (N), (n,), for `displacement` (m), (n,), samples `dt` seconds apart.
+
+    The mount is at rest at the first displacement. Add the force of the elastomer.
+    """
+    force = np.zeros(displacement.size)
+    state = np.zeros(1, HYDROMOUNT_STATE)
+    for k in range(1, displacement.size):
+        hydromount_step(hydromount, state[0], displacement[k] - displacement[k - 1], dt)
+        force[k] = hydromount_force(hydromount, state[0])
+    return force
+
+
+def shaken(frequency, amplitude, hydromount=HYDROMOUNT, dt=DT):
+    """Complex amplitudes (N) of harmonics 1 to 8 of the mount's force on a sine, elastomer included."""
+    count = round(1.0 / frequency / dt)
+    phase = 2.0 * np.pi * np.arange(PERIODS * count) / count
+    force = hydromount_response(hydromount, amplitude * np.sin(phase), dt)[-SETTLED * count :]
+    turns = np.exp(-1j * np.outer(np.arange(1, 9), phase[-SETTLED * count :]))
+    harmonics = 2j * turns @ force / force.size
+    harmonics[0] += amplitude * dynamic_stiffness(Elastomer(), frequency)
+    return harmonics
+
+
+@pytest.mark.parametrize(('amplitude', 'storage', 'loss'), [(1e-3, 266.0, 81.0), (1e-4, 184.0, 42.0)])
+def test_storage_and_loss_at_8_hz_have_their_values_in_newton_per_millimetre(amplitude, storage, loss):
+    stiffness = shaken(8.0, amplitude)[0] / amplitude / 1e3
+    assert stiffness.real == pytest.approx(storage, abs=0.5)
+    assert stiffness.imag == pytest.approx(loss, abs=0.5)
+
+
+def test_it_is_stiffer_than_the_elastomer_alone_at_27_hz():
+    assert abs(shaken(27.0, 1e-4)[0]) / 1e-4 == pytest.approx(257e3, abs=500.0)
+    assert abs(dynamic_stiffness(Elastomer(), 27.0)) == pytest.approx(194e3, abs=500.0)
+    floating = HYDROMOUNT._replace(decoupler_resistance=2e7)
+    assert abs(shaken(27.0, 1e-4, floating)[0]) / 1e-4 < 215e3
+
+
+def test_harmonics_at_8_hz_and_1_mm_have_their_values():
+    expected = [277.8, 5.03, 13.23, 2.01, 5.36, 1.02, 2.32, 0.50]
+    found = np.abs(shaken(8.0, 1e-3))
+    np.testing.assert_allclose(found, expected, rtol=0.005, atol=0.02)
+    assert np.linalg.norm(found[1:]) / found[0] == pytest.approx(0.056, abs=0.0005)
+
+
+def test_half_the_step_changes_no_harmonic_by_half_a_percent():
+    coarse, fine = np.abs(shaken(8.0, 1e-3)), np.abs(shaken(8.0, 1e-3, dt=DT / 2.0))
+    np.testing.assert_allclose(coarse, fine, rtol=0.005)
+
+
+def test_even_harmonics_come_from_the_asymmetric_bulge_alone():
+    assert np.abs(shaken(8.0, 1e-3, SYMMETRIC))[1::2].max() <= 0.01
+    assert np.abs(shaken(8.0, 1e-3))[1::2].min() >= 0.4
+
+
+@given(
+    volume=st.floats(-3e-5, 3e-5),
+    asymmetry=st.sampled_from([0.0, 0.25, 0.9]),
+)
+@example(volume=6e-11 * 6e4 * 0.875, asymmetry=0.25)
+@example(volume=-6e-11 * 6e4 * 1.125, asymmetry=0.25)
+@settings(deadline=None, derandomize=True, max_examples=200)
+def test_the_bulge_s_slope_is_its_compliance_and_its_energy_the_work_of_its_pressure(volume, asymmetry):
+    hydromount = HYDROMOUNT._replace(compliance_asymmetry=asymmetry)
+    width = 1e-9
+    low, high = (upper_pressure(hydromount, volume + side) for side in (-width, width))
+    pressure = upper_pressure(hydromount, volume)
+    compliance = 6e-11 * (1.0 - asymmetry * np.clip(pressure / 6e4, -1.0, 1.0))
+    assert 2.0 * width / (high - low) == pytest.approx(compliance, rel=2e-3)
+    work = upper_energy(hydromount, volume + width) - upper_energy(hydromount, volume - width)
+    assert work == pytest.approx(2.0 * width * pressure, rel=2e-3, abs=1e-8)
+    assert upper_energy(hydromount, volume) >= 0.0
+
+
+def test_between_its_stops_the_decoupler_is_free_and_beyond_them_not():
+    assert decoupler_overrun(HYDROMOUNT, 1.0e-6) == 0.0
+    assert decoupler_overrun(HYDROMOUNT, -0.6e-6) == 0.0
+    assert decoupler_overrun(HYDROMOUNT, 1.3e-6) == pytest.approx(0.3e-6)
+    assert decoupler_overrun(HYDROMOUNT, -0.7e-6) == pytest.approx(-0.1e-6)
+
+
+def test_a_slow_stroke_only_fills_the_soft_chamber():
+    stroke = np.linspace(0.0, 2e-3, 400_000)
+    force = hydromount_response(HYDROMOUNT, stroke, DT)
+    # A_p^2 / (C_1 + C_2), and a little pressure to drive the track
+    assert force[-1] == pytest.approx(2.5e-3**2 / (2.5e-9 + 6e-11) * 2e-3, abs=0.1)
+
+
+def test_no_volume_is_lost():
+    state = np.zeros(1, HYDROMOUNT_STATE)
+    for change in (1e-4, -3e-5, 2e-5):
+        for _ in range(50):
+            hydromount_step(HYDROMOUNT, state[0], change / 50.0, DT)
+    contained = state[0]['upper_volume'] + state[0]['lower_volume']
+    assert contained == pytest.approx(HYDROMOUNT.piston_area * 9e-5, rel=1e-9)
+    assert hydromount_force(HYDROMOUNT, state[0]) == HYDROMOUNT.piston_area * upper_pressure(
+        HYDROMOUNT, state[0]['upper_volume']
+    )
+
+
+@given(
+    frequency=st.floats(0.5, 60.0),
+    amplitude=st.floats(1e-5, 5e-3),
+    second=st.floats(0.0, 1.0),
+    asymmetry=st.sampled_from([0.0, 0.25]),
+    resistance=st.sampled_from([2e7, 1e8, 2e8]),
+)
+@settings(deadline=None, derandomize=True, max_examples=60)
+def test_it_never_returns_more_energy_than_it_was_given(frequency, amplitude, second, asymmetry, resistance):
+    hydromount = HYDROMOUNT._replace(compliance_asymmetry=asymmetry, decoupler_resistance=resistance)
+    phase = 2.0 * np.pi * frequency * np.arange(0.0, 1.0, DT)
+    stroke = amplitude * (np.sin(phase) + second * np.sin(2.7 * phase))
+    force = hydromount_response(hydromount, stroke, DT)
+    work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(stroke))
+    assert work.min() >= -1e-4 * np.abs(work).max()
+
+
+def test_its_state_is_a_named_record_at_rest():
+    assert np.zeros(1, HYDROMOUNT_STATE).dtype == HYDROMOUNT_STATE
+    assert hydromount_force(HYDROMOUNT, np.zeros(1, HYDROMOUNT_STATE)[0]) == 0.0
+
+
+def test_every_parameter_has_unit_meaning_and_a_range_that_holds_its_default():
+    assert set(quantities(HYDROMOUNT)) == set(HYDROMOUNT._fields)
+    assert checked(HYDROMOUNT) == HYDROMOUNT
