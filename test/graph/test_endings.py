@@ -66,6 +66,7 @@ def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while
     _expect_a_sound_end(bus_listener, out)
 
 
+@pytest.mark.slow
 def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_listener):
     process, out = command.start_drive(*ENDLESS)
     wait_until(lambda: _damping(bus_listener), 'damping', LIMIT)

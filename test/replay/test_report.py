@@ -149,6 +149,7 @@ def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figu
     assert result.exit_code == 1  # what was promised is not there
 
 
+@pytest.mark.slow
 def test_reports_of_folders_whose_names_hold_dots_do_not_overwrite_each_other(bench, tmp_path):
     for name in ('drive.1', 'drive.2'):
         shutil.copytree(bench / 'recording', tmp_path / name)

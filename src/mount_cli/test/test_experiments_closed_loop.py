@@ -263,6 +263,7 @@ def test_a_gap_that_does_not_reach_the_level_is_told_as_such(tmp_path):
 # Sensitivity.
 
 
+@pytest.mark.slow
 def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
     told = []
     settings = {

@@ -149,6 +149,7 @@ def test_what_could_not_be_fetched_is_tried_again(drives, tmp_path, inside, monk
     assert indexed([drives / 'a'], tmp_path).read == 1
 
 
+@pytest.mark.slow
 def test_a_killed_index_leaves_what_can_be_gone_on_with(drives, tmp_path):
     """SIGKILL of the command itself: the same tables in the end as of one that was not stopped."""
     program = f"""

@@ -285,6 +285,7 @@ if __name__ == '__main__':
 """
 
 
+@pytest.mark.slow
 def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes(fleet, tmp_path, serial):
     whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
     script = tmp_path / 'with_dask.py'
