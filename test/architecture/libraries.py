@@ -20,7 +20,7 @@ LIBRARIES = {
     'bitstruct': Library('bitstruct'),
     'can': Library('python-can', 'python3-can'),
     'cantools': Library('cantools', 'python3-cantools-pip'),
-    'dask': Library('dask'),
+    'cloudpickle': Library('cloudpickle'),
     'distributed': Library('distributed'),
     'duckdb': Library('duckdb'),
     'e2e': Library('autosar-e2e'),

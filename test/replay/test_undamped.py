@@ -1,5 +1,6 @@
 """The undamped run beside a drive: the mount without current on the same excitation, to the bit."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.edit.cut import cut
 from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
 from mount_cli.command import app
+from mount_replay.loop.recording import record_core
 from mount_report.drive.undamped import UndampedError, undamped_of
 
 SHORT = ('--duration', '3', '--set', 'mount_sim.timeline.start=2.8', '--set', 'mount_sim.motorway.gap_time=1')
@@ -59,6 +61,22 @@ def test_of_a_drive_in_real_time_it_ends_with_the_run_and_the_recording_goes_on(
     assert len(whole.stamps) - len(shorter.stamps) == 100
     np.testing.assert_array_equal(shorter.displacement, whole.displacement[:-100])
     assert shorter.begin == whole.begin
+
+
+def test_the_report_on_a_drive_in_real_time_has_the_undamped_line_and_the_isolation(drive, tmp_path):
+    # In real time the electronics sample on until the graph ends: `sim/truth` is longer than the run.
+    longer = parameters_of(drive)
+    longer['mount_sim']['timeline.duration'] += 0.033
+    record_core(tmp_path / 'recording', longer, recorded_session(drive))
+    recording = open_recording(tmp_path / 'recording')
+    assert len(recording['sim/truth']) == len(drive['sim/truth']) + 33
+    page = tmp_path / 'page.html'
+    result = CliRunner().invoke(app, ['report', str(tmp_path / 'recording'), '--out', str(page)])
+    assert result.exit_code == 0, result.output
+    html = page.read_text(encoding='utf-8')
+    assert '"name":"undamped"' in html
+    words = ' '.join(re.sub('<[^>]*>', ' ', html).split())
+    assert re.search(r'Isolation \(good\) peak displacement \S+ mm against \S+ mm undamped \(-\d+ %\)', words)
 
 
 def test_of_a_part_of_a_drive_it_is_the_same_part(drive, tmp_path):

@@ -2,14 +2,17 @@
 
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
 
+from mount_replay.fleet import processes
 from mount_replay.fleet.cluster import SchedulerLostError
 from mount_replay.fleet.runner import LOSSES, run_tasks
 
@@ -63,8 +66,6 @@ def test_a_task_that_raises_is_a_result_with_its_reason():
 
 
 def test_short_tasks_are_handed_over_several_together_and_each_is_told_once(monkeypatch):
-    import distributed
-
     class OddError(Exception):  # of no module: it cannot be sent
         pass
 
@@ -75,10 +76,8 @@ def test_short_tasks_are_handed_over_several_together_and_each_is_told_once(monk
             raise OddError('odd')
         return -place
 
-    handed, submit = [], distributed.Client.submit
-    monkeypatch.setattr(
-        distributed.Client, 'submit', lambda *told, **options: (handed.append(1), submit(*told, **options))[1]
-    )
+    handed, submit = [], ProcessPoolExecutor.submit
+    monkeypatch.setattr(ProcessPoolExecutor, 'submit', lambda *given: (handed.append(1), submit(*given))[1])
     done = sorted(run_tasks(work, range(200), workers=1), key=lambda one: one.place)
     assert [one.place for one in done] == list(range(200))
     assert {one.place: one.reason for one in done if one.reason} == {
@@ -128,6 +127,29 @@ def test_a_task_that_outgrows_the_memory_of_its_worker_is_given_up():
     done = sorted(run_tasks(work, range(3), workers=1, memory=1_000_000_000), key=lambda one: one.place)
     assert [one.result for one in done] == [None, 1, 2]
     assert 'out of memory' in done[0].reason
+
+
+def test_nobody_else_can_hand_work_to_the_processes_of_this_machine():
+    def work(place):
+        time.sleep(0.05)
+        return os.getpid()
+
+    before = {os.getpid(): sockets_of(os.getpid())}
+    tasks = run_tasks(work, range(20), workers=2)
+    workers = {next(tasks).result for _ in range(10)}
+    opened = {
+        process: sockets_of(process) - before.get(process, set()) for process in {os.getpid(), *workers}
+    }
+    tasks.close()
+    assert workers
+    assert set().union(*opened.values()) == set()
+
+
+def test_processes_that_cannot_start_end_the_run_with_a_sentence(monkeypatch):
+    monkeypatch.setattr(processes, 'prepare_worker', divmod)  # of a process number and 0 bytes: it raises
+    monkeypatch.setattr(processes, '_memory_of_machine', lambda: 0)
+    with pytest.raises(ChildProcessError, match='no worker process could start in 3 attempts'):
+        list(run_tasks(abs, range(4), workers=1))
 
 
 def test_items_are_not_all_handed_over_at_once():
@@ -194,6 +216,17 @@ def cluster(tmp_path):
         import json
 
         yield json.loads(told.read_text())['address'], scheduler
+
+
+def sockets_of(process):
+    """Return the TCP and UDP sockets (inodes) that a process holds."""
+    inodes = set()
+    for descriptor in Path(f'/proc/{process}/fd').iterdir():
+        with contextlib.suppress(OSError):
+            inodes.update(re.findall(r'socket:\[(\d+)\]', os.readlink(descriptor)))
+    tables = [Path(f'/proc/net/{kind}') for kind in ('tcp', 'tcp6', 'udp', 'udp6')]
+    of_network = {line.split()[9] for table in tables for line in table.read_text().splitlines()[1:]}
+    return inodes & of_network
 
 
 def _process(stack, kind, *arguments):

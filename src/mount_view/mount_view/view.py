@@ -61,7 +61,7 @@ def _at_work(
         for take in receivers:
             take(message)
 
-    feed.start(receive)
+    feed.start(receive, model.fail)
     model.start()
     try:
         yield model

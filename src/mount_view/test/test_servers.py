@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import os
+import signal
 import struct
 import threading
 
@@ -15,6 +17,7 @@ from mount_view.feed.feed import FeedError
 from mount_view.feed.recorded import Recorded
 from mount_view.foxglove_server import FoxgloveServer
 from mount_view.page.web import Web
+from mount_view.view import ViewOrder, serve_view
 from mount_view.window.model import Model
 
 LIMIT = 30.0  # s
@@ -39,7 +42,7 @@ def page(drive, free_port):
     web = Web(model, feed.title, lambda: 'marked', '127.0.0.1', free_port)
     web.start()
     model.start()
-    feed.start(model.take)
+    feed.start(model.take, model.fail)
     yield web
     feed.stop()
     model.stop()
@@ -118,6 +121,18 @@ def test_a_model_that_fails_says_so_and_ends_the_view(drive):
     assert ended.wait(LIMIT)
     assert model.failure == 'the view has ended: ZeroDivisionError: division by zero'
     model.stop()
+
+
+def test_a_recording_that_cannot_be_played_on_ends_the_view_and_says_why(drive, free_port, monkeypatch):
+    monkeypatch.setattr(Recorded, '_message', lambda feed, number: 1 / 0)
+    order = ViewOrder(drive, port=free_port, foxglove_port=0, beside=False)
+    ctrl_c = threading.Timer(LIMIT, os.kill, (os.getpid(), signal.SIGINT))  # ends a view that does not end
+    ctrl_c.start()
+    try:
+        with pytest.raises(FeedError, match=r'has ended: .* was not played to its end: ZeroDivisionError'):
+            serve_view(order, lambda line: None)
+    finally:
+        ctrl_c.cancel()
 
 
 @pytest.mark.parametrize('kind', ['page', 'Foxglove server'])
@@ -210,7 +225,7 @@ def test_foxglove_gets_channels_with_definitions_and_the_very_messages(drive, fr
             assert 'MSG: std_msgs/Header' in wanted['schema']
             subscription = {'id': 1, 'channelId': wanted['id']}
             await client.send_json({'op': 'subscribe', 'subscriptions': [subscription]})
-            feed.start(server.take)
+            feed.start(server.take, pytest.fail)
             return await messages_on(client, 500)
 
     try:

@@ -1,21 +1,16 @@
-"""Where tasks run: processes of this machine, or a Dask cluster by its address."""
+"""Tasks on a Dask cluster, by its address."""
 
 import contextlib
 import logging
-import os
-import signal
-import tempfile
 import threading
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from typing import Any
 
-if TYPE_CHECKING:
-    from distributed import Client
+from mount_replay.fleet.worker import Batch, WorkerLostError, run_in_turn
 
-LOCAL = 'local'
 _CLOSE = 10.0  # s, chosen: it takes 0.1 to 2 s
 _CONNECT = 10.0  # s, chosen: for an answer of the scheduler
-_THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS')
 _LOGGERS = ('distributed', 'distributed.client', 'tornado', 'tornado.application', 'asyncio')
 
 
@@ -23,135 +18,88 @@ class SchedulerLostError(ConnectionError):
     """A Dask cluster does not answer, or no longer does; the text says which."""
 
 
-@contextlib.contextmanager
-def connected(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator['Client']:
-    """Yield a client of `scheduler`; what was started for it ends with the context, and with this process.
+class ClusterWorkers:
+    """The workers of the cluster at `address`; raises `SchedulerLostError` where no scheduler answers."""
 
-    `workers` and `memory` (bytes for each worker) as in `runner.run_tasks`; more workers than tasks are not
-    started. Raises `SchedulerLostError` where no scheduler answers.
-    """
-    with _quiet():
-        if scheduler == LOCAL:
-            with (
-                _processes(processes_for(workers, tasks), memory) as cluster,
-                _ended(_client(cluster)) as client,
-            ):
-                yield client
-            return
+    def __init__(self, address: str):
+        from distributed import Client, as_completed
+
+        self._address = address
         try:
-            context = _client(scheduler)
+            self._client = Client(address, timeout=_CONNECT, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
-            raise SchedulerLostError(f'{scheduler}: no Dask scheduler answers there ({error})') from None
-        with _ended(context) as client:
-            yield client
+            raise SchedulerLostError(f'{address}: no Dask scheduler answers there ({error})') from None
+        self._arriving = as_completed(loop=self._client.loop, with_results=True, raise_errors=False)
+        self._under_way: dict[Any, int] = {}  # future: number of its tasks
 
+    @property
+    def threads(self) -> int:
+        """How many tasks the cluster does at a time."""
+        with self._noticed():
+            return max(sum(self._client.nthreads().values()), 1)
 
-def processes_for(workers: int, tasks: int) -> int:
-    """Return how many processes of this machine work at a time; `workers` 0 is one for each core."""
-    return min(workers or len(os.sched_getaffinity(0)), tasks)
+    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> Any:
+        """Hand over some tasks that one worker does in turn."""
+        with self._noticed():
+            future = self._client.submit(run_in_turn, work, items, pure=False)
+            self._under_way[future] = len(items)
+            self._arriving.add(future)
+        return future
 
+    def arrived(self, limit: float) -> list[tuple[Any, Batch[Any] | BaseException]]:
+        """Return what is done within `limit` s: a batch, why there is none, or `WorkerLostError`."""
+        with self._noticed():
+            batch = self._arriving.next_batch(block=False)
+            if not batch:
+                with self._arriving.thread_condition:
+                    self._arriving.thread_condition.wait(limit)
+                batch = self._arriving.next_batch(block=False)
+            found = [(future, self._result(future, result)) for future, result in batch]
+        for future, _ in found:
+            self._under_way.pop(future, None)
+        return found
 
-def _client(where: Any) -> 'Client':
-    from distributed import Client
+    def close(self) -> None:
+        """Leave the cluster within `_CLOSE` s; what is left then ends with this process.
 
-    return Client(where, timeout=_CONNECT, set_as_default=False)
+        After an interrupt amid Dask's own work it was seen to wait for ever.
+        """
 
+        def close() -> None:
+            with contextlib.suppress(Exception):
+                self._client.close()
 
-@contextlib.contextmanager
-def _processes(count: int, memory: int) -> Iterator[Any]:
-    """Yield a cluster of `count` processes of this machine, one thread each, that no other one can reach."""
-    import dask
-    from distributed import LocalCluster
-
-    from mount_replay.fleet.worker import Process
-
-    with (
-        tempfile.TemporaryDirectory(prefix='engine_mount_fleet_') as scratch,
-        dask.config.set(_configuration(scratch)),
-        _environment(dict.fromkeys((*_THREADS, 'PYTHONSAFEPATH'), '1')),  # none from the working directory
-    ):
-        # Threads and processes inherit which signals are blocked: Ctrl-C reaches this process alone.
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            cluster = LocalCluster(
-                n_workers=0,
-                threads_per_worker=1,
-                worker_class=Process,
-                host='127.0.0.1',
-                dashboard_address=None,
-                scheduler_kwargs={'dashboard_address': '127.0.0.1:0'},
-                silence_logs=logging.CRITICAL,
-                memory_limit=memory or 'auto',
-                preload=['mount_replay.fleet.worker'],
-            )
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        with _ended(cluster):
-            cluster.scale(count)
-            yield cluster
-
-
-@contextlib.contextmanager
-def _ended(opened: Any) -> Iterator[Any]:
-    """Yield what has a `close`, and close it within `_CLOSE` s; what is left then ends with this process.
-
-    After an interrupt amid Dask's own work it was seen to wait for ever.
-    """
-
-    def close() -> None:
-        with contextlib.suppress(Exception):
-            opened.close()
-
-    try:
-        yield opened
-    finally:
         closing = threading.Thread(target=close, daemon=True)
         closing.start()
         closing.join(_CLOSE)
 
+    def _result(self, future: Any, result: Any) -> Any:
+        from distributed import KilledWorker
 
-def _configuration(scratch: str) -> dict[str, Any]:
-    return {
-        'temporary-directory': scratch,
-        'distributed.admin.large-graph-warning-threshold': '1GB',  # items are few at a time
-        'distributed.scheduler.http.routes': [],
-        'distributed.worker.http.routes': [],
-        'distributed.scheduler.allowed-failures': 0,  # the runner counts them
-        'distributed.scheduler.worker-saturation': 1.0,
-        'distributed.worker.profile.enabled': False,  # its samples cost some per cent, and nothing reads them
-        # Dask's own limit lets each array of more than 128 KiB be mapped anew, page by page.
-        'distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_': None,
-        'distributed.worker.multiprocessing-method': 'spawn',  # this process may hold threads of middleware
-        # Nothing is kept at a worker, so there is nothing to spill; a worker that is too large is replaced.
-        'distributed.worker.memory.target': False,
-        'distributed.worker.memory.spill': False,
-        'distributed.worker.memory.pause': False,
-        'distributed.worker.memory.terminate': 1.0,
-    }
+        if isinstance(result, CancelledError):
+            self._client.nthreads()  # raises where it was the scheduler that was lost
+            return WorkerLostError()
+        if future.status != 'error':
+            return result
+        return WorkerLostError() if isinstance(result[1], KilledWorker) else result[1]
 
-
-@contextlib.contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    """Set variables of the environment, for the processes that are started meanwhile."""
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+    @contextlib.contextmanager
+    def _noticed(self) -> Iterator[None]:
+        """Raise `SchedulerLostError` where the scheduler is lost."""
+        try:
+            yield
+        except OSError as error:
+            raise SchedulerLostError(
+                f'the scheduler ({self._address}) was lost with {sum(self._under_way.values())} tasks under '
+                f'way; what was done until then stands ({error})'
+            ) from None
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def quiet_dask() -> Iterator[None]:
     """Keep Dask's log to itself: what a user needs to know comes with the results."""
     import distributed  # noqa: F401  # it sets its levels when it is loaded
 
-    # It is never heard: at exit it tells of processes that were killed a moment ago.
-    logging.getLogger('distributed.process').setLevel(logging.CRITICAL)
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

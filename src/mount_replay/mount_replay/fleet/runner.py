@@ -1,25 +1,21 @@
-"""Many independent tasks on Dask's `distributed`, whose results come as they are done."""
+"""Many independent tasks on several processes, whose results come as they are done."""
 
-import pickle
-import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
-from mount_replay.fleet.cluster import LOCAL, SchedulerLostError, connected
 from mount_replay.fleet.interrupts import remembered_interrupts
-
-if TYPE_CHECKING:
-    from distributed import Client
+from mount_replay.fleet.processes import LOCAL, LocalWorkers, processes_for
+from mount_replay.fleet.worker import Batch, WorkerLostError
 
 Item = TypeVar('Item')
 Result = TypeVar('Result')
 
 LOSSES = 3
 """So many workers may be lost with a task before it is given up; chosen."""
-_LOOK = 0.1  # s, chosen, as Dask does itself: what arrives ends the wait at once
+_LOOK = 0.1  # s, chosen: what arrives ends the wait at once
 _AHEAD = 4  # batches per thread that are handed over at a time, chosen: one runs, the others wait
 _BATCH = 0.25  # s, chosen: to hand over a batch costs some 7 ms of processor time, here and at the worker
 _MOST = 16  # tasks in a batch, chosen: so many begin anew where an interrupt or a lost worker ends it
@@ -60,73 +56,59 @@ def run_tasks(
         return
     with (
         remembered_interrupts() as raise_lost,
-        connected(scheduler, workers, len(items), memory) as client,
+        _workers(scheduler, workers, len(items), memory) as hands,
     ):
-        stream = _Stream(client, work, items, raise_lost)
-        try:
-            yield from stream.results()
-        except OSError as error:
-            raise SchedulerLostError(
-                f'the scheduler ({scheduler}) was lost with {stream.under_way} tasks under way; what was '
-                f'done until then stands ({error})'
-            ) from None
+        yield from _Stream(hands, work, items, raise_lost).results()
 
 
-@dataclass(frozen=True)
-class _Batch(Generic[Result]):
-    """What came of the first of several tasks, in `seconds`; `error` is what the last of these raised."""
+class Workers(Protocol):
+    """What does tasks: processes of this machine, or a cluster."""
 
-    results: list[Result]
-    error: Exception | None
-    seconds: float
+    @property
+    def threads(self) -> int:
+        """How many tasks are done at a time."""
 
+    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> Any:
+        """Hand over some tasks that one worker does in turn; return what `arrived` knows them by."""
 
-def _in_turn(work: Callable[[Item], Result], items: Sequence[Item]) -> _Batch[Result]:
-    """Do several tasks at a worker, up to the first that raises."""
-    begin = time.monotonic()
-    results: list[Result] = []
-    for item in items:
-        try:
-            result = work(item)
-        except Exception as error:  # whatever it is, it is told as what became of its task
-            return _Batch(results, _portable(error), time.monotonic() - begin)
-        results.append(result)
-    return _Batch(results, None, time.monotonic() - begin)
+    def arrived(self, limit: float) -> list[tuple[Any, Batch[Any] | BaseException]]:
+        """Return what is done within `limit` s: a batch, why there is none, or `WorkerLostError`."""
+
+    def close(self) -> None:
+        """End what was started."""
 
 
-def _portable(error: Exception) -> Exception:
-    """Return an error, or where it cannot be sent to another process one with its words."""
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:  # what an error of others raises there is not known
-        return RuntimeError(f'{type(error).__name__}: {error}')
-    return error
+@contextmanager
+def _workers(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator[Workers]:
+    with ExitStack() as stack:
+        opened: Workers
+        if scheduler == LOCAL:
+            opened = LocalWorkers(processes_for(workers, tasks), memory)
+        else:
+            from mount_replay.fleet.cluster import ClusterWorkers, quiet_dask
+
+            stack.enter_context(quiet_dask())
+            opened = ClusterWorkers(scheduler)
+        stack.callback(opened.close)
+        yield opened
 
 
 class _Stream(Generic[Item, Result]):
-    """The tasks of one call on one cluster."""
+    """The tasks of one call on its workers."""
 
     def __init__(
         self,
-        client: 'Client',
+        workers: Workers,
         work: Callable[[Item], Result],
         items: Sequence[Item],
         raise_lost: Callable[[], None],
     ):
-        from distributed import as_completed
-
-        self._client, self._work, self._items = client, work, items
+        self._workers, self._work, self._items = workers, work, items
         self._raise_lost = raise_lost
-        self._arriving = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         self._waiting = deque(range(len(items)))
         self._under_way: dict[Any, list[int]] = {}  # future: places of its items
         self._seconds = _BATCH  # of a task in the batch that was done last
         self._alone: dict[int, int] = {}  # place: workers lost with it; to be done at the end
-
-    @property
-    def under_way(self) -> int:
-        """Tasks that were handed over and are not done."""
-        return sum(map(len, self._under_way.values()))
 
     def results(self) -> Iterator[Done[Result]]:
         """Return all tasks as they are done, those last whose worker was lost."""
@@ -144,35 +126,27 @@ class _Stream(Generic[Item, Result]):
 
     def _fill(self) -> None:
         """Hand over what waits, as far as there is room; towards the end fewer at once: all end together."""
-        threads = max(sum(self._client.nthreads().values()), 1)
+        threads = self._workers.threads
         while self._waiting and len(self._under_way) < _AHEAD * threads:
             share = len(self._waiting) // (_AHEAD * threads)
             count = max(min(int(_BATCH / self._seconds), _MOST, share), 1)
             self._submit([self._waiting.popleft() for _ in range(count)])
 
     def _submit(self, places: list[int]) -> None:
-        items = [self._items[place] for place in places]
-        future = self._client.submit(_in_turn, self._work, items, pure=False)
+        future = self._workers.submit(self._work, [self._items[place] for place in places])
         self._under_way[future] = places
-        self._arriving.add(future)
 
     def _arrived(self) -> Iterator[Done[Result]]:
-        from distributed import KilledWorker
-
-        for future, result in self._next_batch():
-            is_lost = isinstance(result, CancelledError)
-            if is_lost:
-                self._client.nthreads()  # raises where it was the scheduler that was lost
+        for future, result in self._next():
             places = self._under_way.pop(future)
-            error = result[1] if future.status == 'error' and not is_lost else None
-            if is_lost or isinstance(error, KilledWorker):
+            if isinstance(result, WorkerLostError):
                 yield from self._given_up(places)
-            elif error is not None:  # a worker did not understand its task, or cannot send its result
-                yield from self._failed(places, error)
+            elif isinstance(result, BaseException):  # a worker cannot load its task, or send its result
+                yield from self._failed(places, result)
             else:
                 yield from self._told(places, result)
 
-    def _told(self, places: list[int], batch: _Batch[Result]) -> Iterator[Done[Result]]:
+    def _told(self, places: list[int], batch: Batch[Result]) -> Iterator[Done[Result]]:
         """Return what came of a batch; what stands behind a task that raised waits again."""
         done = len(batch.results)
         for place, result in zip(places, batch.results, strict=False):
@@ -197,13 +171,11 @@ class _Stream(Generic[Item, Result]):
             if self._alone[place] >= LOSSES:
                 yield Done(place, None, f'{LOSSES} workers were lost with it: killed, or out of memory')
 
-    def _next_batch(self) -> list[Any]:
-        """Return what has arrived, one at least; raises `KeyboardInterrupt` where Dask lost one."""
-        while not (batch := self._arriving.next_batch(block=False)):
+    def _next(self) -> list[tuple[Any, Batch[Result] | BaseException]]:
+        """Return what has arrived, one at least; raises `KeyboardInterrupt` where one was lost."""
+        while not (arrived := self._workers.arrived(_LOOK)):
             self._raise_lost()
-            with self._arriving.thread_condition:
-                self._arriving.thread_condition.wait(_LOOK)
-        return batch
+        return arrived
 
 
 def _reason(error: BaseException) -> str:

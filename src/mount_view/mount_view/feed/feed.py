@@ -20,6 +20,8 @@ class Message(NamedTuple):
 
 
 Receive = Callable[[Message], None]
+Fail = Callable[[str], None]
+"""Takes the sentence on the exception that has ended a feed."""
 
 
 class Feed(Protocol):
@@ -37,8 +39,8 @@ class Feed(Protocol):
     def live(self) -> bool:
         """Whether the messages come from a running graph."""
 
-    def start(self, receive: Receive) -> None:
-        """Begin; messages come until `stop`."""
+    def start(self, receive: Receive, on_failure: Fail) -> None:
+        """Begin; messages come until `stop`, or until `on_failure` was called."""
 
     def stop(self) -> None:
         """Return when no message comes any more; safe to call twice."""

@@ -10,7 +10,7 @@ import numpy as np
 from engine_mount.recordings.run.place import open_run
 from mount_replay.live.playback import Playback
 from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
-from mount_view.feed.feed import FeedError, Message, Receive
+from mount_view.feed.feed import Fail, FeedError, Message, Receive
 
 _PERIOD = 0.01  # s, chosen
 _LOWEST_RATE, _HIGHEST_RATE = 0.01, 1000.0
@@ -51,9 +51,9 @@ class Recorded:
         """Arrival of the first and the last message, ns."""
         return int(self._arrivals[0]), int(self._arrivals[-1])
 
-    def start(self, receive: Receive) -> None:
+    def start(self, receive: Receive, on_failure: Fail) -> None:
         """Give out what was latched before the beginning, then play."""
-        self._receive = receive
+        self._receive, self._on_failure = receive, on_failure
         self._thread.start()
 
     def stop(self) -> None:
@@ -67,6 +67,13 @@ class Recorded:
         return 'no mark was set: this is a recording'
 
     def _serve(self) -> None:
+        try:
+            self._play()
+        except Exception as error:
+            # The border of the thread: without a sentence the recording would seem to be over.
+            self._on_failure(f'{self.title} was not played to its end: {type(error).__name__}: {error}')
+
+    def _play(self) -> None:
         self._repeat_latched()
         self._playback.play(time.monotonic())
         while not self._ending.is_set() and not self._playback.finished:

@@ -15,7 +15,7 @@ from mount_recorder.collector import Collector
 from mount_ros.environment import loopback_refusal, prepare_environment
 from mount_ros.qos import control_qos
 from mount_ros.topics import TOPICS, Topic
-from mount_view.feed.feed import FeedError, Message, Receive
+from mount_view.feed.feed import Fail, FeedError, Message, Receive
 
 _ANSWER_LIMIT = 3.0  # s, chosen: of the recorder to a mark
 _PERIOD = 0.02  # s, chosen: less than a picture of the page
@@ -37,15 +37,18 @@ class RunningGraph:
             'engine_mount_view', namespace=namespace, context=self._context, enable_rosout=False
         )
         self._mark = self._node.create_client(Trigger, f'{RECORDER.name}/mark')
-        self._collector = Collector(self._node, period=_PERIOD)
+        self._collector = Collector(
+            self._node, period=_PERIOD, on_failure=lambda sentence: self._on_failure(sentence)
+        )
         self.topics: Mapping[str, Topic] = {
             self._node.resolve_topic_name(topic.name): topic for topic in TOPICS
         }
         self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
         self._stopped = False
 
-    def start(self, receive: Receive) -> None:
+    def start(self, receive: Receive, on_failure: Fail) -> None:
         """Begin to take messages."""
+        self._on_failure = on_failure
         for topic in TOPICS:
             qos = control_qos(topic, lockstep=False)
             self._collector.collect(topic, partial(_hand_over, receive, topic), qos)

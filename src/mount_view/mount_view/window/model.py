@@ -44,7 +44,8 @@ class Interval:
 class Model:
     """What is known of the graph that a feed shows; `listen` gets each new interval.
 
-    An exception ends its thread: `failure` says which, and `on_failure` is called there.
+    An exception in its thread or in that of the feed ends the view: `failure` says which, and `on_failure` is
+    called there.
     """
 
     def __init__(self, feed: Feed, *, beside: bool = True, on_failure: Callable[[], None] = lambda: None):
@@ -90,6 +91,11 @@ class Model:
         if self._thread.is_alive():
             self._thread.join()
 
+    def fail(self, reason: str) -> None:
+        """End the view: without a sentence the last picture would pass for the present one."""
+        self.failure = self.failure or f'the view has ended: {reason}'
+        self._on_failure()
+
     @property
     def silent_nodes(self) -> list[str]:
         """The nodes that have said nothing for a while."""
@@ -107,9 +113,7 @@ class Model:
         try:
             self._make_intervals()
         except Exception as error:
-            # The border of the thread: without a word the last picture would pass for the present one.
-            self.failure = f'the view has ended: {type(error).__name__}: {error}'
-            self._on_failure()
+            self.fail(f'{type(error).__name__}: {error}')
 
     def _make_intervals(self) -> None:
         next_one = time.monotonic()

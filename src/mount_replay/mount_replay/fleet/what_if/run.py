@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from mount_recorder.versions import versions
 from mount_replay.fleet.away import StoreWatch, reason_of
 from mount_replay.fleet.catalogue.places import Place, root_of
-from mount_replay.fleet.cluster import LOCAL, processes_for
 from mount_replay.fleet.foreign import NOTHING_SAID, Said
+from mount_replay.fleet.processes import LOCAL, processes_for
 from mount_replay.fleet.runner import Done, run_tasks
 from mount_replay.fleet.what_if.asked import recordings_asked
 from mount_replay.fleet.what_if.columns import ANOTHER_POLICY, FAILED, REPLAYED
