@@ -252,7 +252,7 @@ def test_foxglove_is_sent_nothing_that_it_has_left_and_a_warning_for_what_is_no_
             for text in ('{', '[]', '{"op": "fetch"}', '{"op": "subscribe"}'):
                 await client.send_str(text)
             statuses = [json.loads((await client.receive()).data) for _ in range(4)]
-            feed.start(server.take)
+            feed.start(server.take, lambda: None)
             return statuses, [(await client.receive()).data[0] for _ in range(5)]
 
     try:
